@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Says what colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` look for it.
+"""What colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` look for it.
 
 With ``OMNIBOT_DRIVER_COMPILE=1`` in the environment the core's inbound half is compiled with mypyc.
-Where that fails, for whatever reason, the package is installed as plain Python, and says why.
+If that fails, for whatever reason, the package is installed as plain Python, and the reason is
+printed.
 """
 
 import os
@@ -25,28 +26,32 @@ COMPILED_OF_OMNIBOT = (
     *("cost_model", "decoder", "fast_path", "frame_schedule", "gaps", "late_reads", "lower_bound"),
     *("misconfiguration", "modes", "schedule", "sequence", "single_imu", "translation", "trellis"),
 )
-"""What is made of bytes. What decides whether a robot moves stays as it is debugged; so do classes
-of which others are derived, and frames, which are made faster without mypyc's dataclasses."""
+"""Modules that process received bytes. Modules that decide whether a robot moves are not compiled,
+so that they run as they were debugged; nor are base classes, nor frames, which are created faster
+without mypyc's dataclasses."""
 
 
 class CompileCore(build_ext):
-    """All of it or nothing: a half-compiled core must not be installed."""
+    """The build step that compiles the core completely or not at all.
+
+    A half-compiled core must not be installed.
+    """
 
     def run(self) -> None:
-        """Never raises: plain Python is complete."""
+        """Compile the core. Never raises, because plain Python is complete without it."""
         if self.inplace:
             print(f"{NAME}: a development installation runs its sources; core: interpreted")
             return
         remove_compiled(self.build_lib)
         try:
             self._compile()
-        except (Exception, SystemExit) as error:  # mypyc exits when it meets what it cannot do
+        except (Exception, SystemExit) as error:  # mypyc exits at code that it cannot compile
             remove_compiled(self.build_lib)
             self.distribution.ext_modules = []
             print(f"{NAME}: not compiled ({error!r}); core: interpreted", file=sys.stderr)
 
     def get_outputs(self) -> list[str]:
-        """What was built."""
+        """Return the built files."""
         return [str(path) for path in compiled_in(self.build_lib)]
 
     def _compile(self) -> None:
@@ -76,27 +81,30 @@ class CompileCore(build_ext):
 
 
 class InstallAnew(install_lib):
-    """colcon leaves an earlier installation in place, and Python prefers what is compiled in it."""
+    """The install step that removes what an earlier installation compiled.
+
+    colcon leaves an earlier installation in place, and Python prefers its compiled modules.
+    """
 
     def install(self) -> list[str]:
-        """Without what an earlier one compiled."""
+        """Install after removing compiled modules of an earlier installation."""
         remove_compiled(self.install_dir)
         return super().install()
 
 
 def compiled_in(folder: str) -> list[Path]:
-    """What mypyc made of this package's modules, and what they share."""
+    """Return the files that mypyc made of this package's modules, and those that they share."""
     return [*Path(folder).glob(f"{NAME}__mypyc.*"), *Path(folder, CORE).rglob("*.so")]
 
 
 def remove_compiled(folder: str) -> None:
-    """So that the sources beside it are what runs."""
+    """Remove the compiled modules, so that the sources beside them are what runs."""
     for path in compiled_in(folder):
         path.unlink()
 
 
 def compiling() -> dict[str, object]:
-    """Arguments for setuptools; ``CompileCore`` finds the modules to compile."""
+    """Return arguments for setuptools; ``CompileCore`` finds the modules to compile."""
     commands = {"build_ext": CompileCore, "install_lib": InstallAnew}
     if os.environ.get("OMNIBOT_DRIVER_COMPILE", "0") in ("", "0"):
         return {"cmdclass": commands}

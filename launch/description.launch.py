@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Publishes the robot's description and its fixed frames, and shows it in RViz where asked to.
+"""Launch file that publishes the robot's description and fixed frames, and optionally starts RViz.
 
 The joints keep their names whatever ``frame_prefix`` is: robot_state_publisher puts it before the
 frames only, as the driver does.

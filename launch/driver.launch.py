@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Starts the driver, with its parameters from a file and, where given, other values."""
+"""Launch file that starts the driver with a parameter file; launch arguments override it."""
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -20,7 +20,7 @@ OVERRIDES = {
 
 
 def driver_node(context: LaunchContext) -> list[Node]:
-    """Return the driver; an empty argument leaves the choice to the parameter file."""
+    """Return the driver node; an empty argument leaves the choice to the parameter file."""
     overrides = {
         name: ParameterValue(LaunchConfiguration(name), value_type=type_)
         for name, (type_, _) in OVERRIDES.items()
@@ -39,7 +39,7 @@ def driver_node(context: LaunchContext) -> list[Node]:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the driver and its arguments."""
+    """Return the driver and the launch arguments."""
     return LaunchDescription(
         [
             *(
@@ -53,7 +53,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "board",
                 default_value="omnibot",
-                choices=list(PROFILES),  # launch starts the driver without a file that is missing
+                choices=list(PROFILES),  # launch would ignore a file that is missing
                 description="Motor board of the robot, for which params_file is chosen.",
             ),
             DeclareLaunchArgument(

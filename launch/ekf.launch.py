@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Starts the driver, the description and robot_localization's filter over odometry and gyro, or
-over odometry and compass where the board has one.
+"""Launch file that starts the driver, the description and robot_localization's filter.
 
-The filter publishes odom to base_link, so the driver does not. The description is needed: it says
-how the sensors are mounted, OmniBot's IMU upside down. Takes the arguments of driver.launch.py and
+The filter combines odometry and gyro, or odometry and compass where the board has one. It publishes
+odom to base_link, so the driver does not. The description is needed because it has the mounting of
+the sensors; OmniBot's IMU is upside down. The arguments are those of driver.launch.py and
 description.launch.py. A board without parameters for the filter is refused.
 """
 
@@ -31,7 +31,7 @@ FRAMES = {
 
 
 def include(name: str, arguments: dict[str, str]) -> IncludeLaunchDescription:
-    """Return another launch file of this package."""
+    """Return an action that includes another launch file of this package."""
     path = PathJoinSubstitution([FindPackageShare("omnibot_driver"), "launch", name])
     return IncludeLaunchDescription(
         PythonLaunchDescriptionSource(path), launch_arguments=arguments.items()
@@ -39,7 +39,7 @@ def include(name: str, arguments: dict[str, str]) -> IncludeLaunchDescription:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return driver, description and filter."""
+    """Return driver, description and filter, with their arguments."""
     prefix = LaunchConfiguration("frame_prefix")
     frames = {
         parameter: ParameterValue([prefix, frame], value_type=str)

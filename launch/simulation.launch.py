@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Starts the driver with a simulated board inside; takes the arguments of driver.launch.py."""
+"""Launch file that starts the driver with a simulated board inside it.
+
+It takes the arguments of driver.launch.py.
+"""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
@@ -10,7 +13,7 @@ from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the driver on a board of its own."""
+    """Return the driver on a simulated board, with the launch argument ``port``."""
     return LaunchDescription(
         [
             DeclareLaunchArgument(

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calibration file: what was measured of this robot, in YAML, read at the start, written whole
-or not at all.
+"""The calibration file: measured values of this robot, in YAML, read at start.
 
-It may hold other names as well, which are left as they are; comments in it do not survive a save.
+A save replaces the complete file or nothing. The file may hold other names as well, which a save
+keeps; comments do not survive a save.
 """
 
 import contextlib
@@ -18,11 +18,14 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.parameters import Table, Value
 
 RECORDED: Final = ("imu_rpy", "step")
-"""What the tool calibrate writes beside them, for people."""
+"""Names that the tool calibrate also writes, for people who read the file."""
 
 
 def locate(file: str) -> Path:
-    """Where this file is, ``~`` resolved. Raises ParameterError for an unknown home folder."""
+    """Return the path of the file, with ``~`` resolved.
+
+    Raises ParameterError for an unknown home folder.
+    """
     try:
         return Path(file).expanduser()
     except RuntimeError as error:
@@ -33,9 +36,9 @@ def locate(file: str) -> Path:
 
 
 def load(path: Path, table: Table) -> dict[str, Value]:
-    """The parameters in the file that this board may have there; none where there is no file yet.
+    """Return the parameters in the file that this board may have there; empty without a file.
 
-    Raises ParameterError with what to do about a file that makes no sense.
+    Raises ParameterError, with a remedy, for a file that cannot be read or has a wrong value.
     """
     content = _read(path)
     try:
@@ -49,15 +52,15 @@ def load(path: Path, table: Table) -> dict[str, Value]:
 
 
 def names(path: Path) -> list[str]:
-    """All that is in the file, read from it or not; nothing where there is no file yet."""
+    """Return all names in the file, whether the driver reads them or not; empty without a file."""
     return [str(name) for name in _read(path)]
 
 
 def save(path: Path, values: Mapping[str, Any]) -> None:
-    """Put these values into the file and leave the others. Raises ParameterError or OSError.
+    """Put these values into the file and keep the others. Raises ParameterError or OSError.
 
-    A reader, or a power failure, meanwhile finds the old file or the new one. Comments in it do
-    not survive; a symbolic link does.
+    A reader, or a power failure, meanwhile finds the old file or the new one. Comments in the file
+    do not survive; a symbolic link does.
     """
     import tempfile  # takes 1 MB, and few drivers ever save
 

@@ -1,12 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements as the bytes that rclpy would make of their messages, without making messages; and
-velocity commands from their bytes.
+"""Measurements serialised to CDR as rclpy does it, and velocity commands parsed from CDR.
 
-CDR, as DDS serialises, aligns every number to its own size, as a C struct does on a 64-bit machine:
-so Python's ``struct`` with native alignment writes it. Strings are a length and bytes with a NUL,
-sequences a length and elements. Whether that is so here is not taken for granted: ``difference``
-compares with rclpy's own.
+ROS messages are not made on the way. CDR, as DDS serialises, aligns every number to its own size,
+like a C struct on a 64-bit machine, so Python's ``struct`` with native alignment writes it. A
+string is a length and its bytes with a NUL; a sequence is a length and its elements. Whether this
+holds on this machine is not assumed: ``difference`` compares the bytes with rclpy's own.
 """
 
 import itertools
@@ -30,7 +29,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
-"""The encapsulation header; alignment counts from behind it."""
+"""The encapsulation header; alignment is counted from the byte after it."""
 STAMP: Final = "iI"
 TWIST: Final = struct.Struct("<4s6d").unpack_from
 NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)
@@ -38,7 +37,7 @@ AT_REST: Final = (0.0,) * 6
 
 
 class Serializer:
-    """``imu``, ``odometry`` and ``joint_state`` of one MessageSettings; stamps in ns."""
+    """A serialiser of IMU, odometry and joint state messages with fixed settings; stamps in ns."""
 
     def __init__(self, settings: MessageSettings) -> None:
         frame, values = _text(settings.imu_frame)
@@ -64,7 +63,7 @@ class Serializer:
         self._joints_head = (*no_values, count, *itertools.chain(*name_values), count)
 
     def imu(self, estimate: ImuEstimate, stamp_ns: int) -> bytes:
-        """Serialise what ``messages.imu_message`` makes."""
+        """Return the bytes of the message that ``messages.imu_message`` makes."""
         return LITTLE_ENDIAN + self._imu.pack(
             *divmod(stamp_ns, 10**9),
             *self._imu_head,
@@ -75,7 +74,7 @@ class Serializer:
         )
 
     def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
-        """Serialise what ``messages.odometry_message`` makes."""
+        """Return the bytes of the message that ``messages.odometry_message`` makes."""
         pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance
         half_rad = pose.yaw_rad / 2
         moving, twist_noise = AT_REST, messages.TWIST_NOT_KNOWN
@@ -96,7 +95,7 @@ class Serializer:
         )
 
     def joint_state(self, wheels: Wheels, stamp_ns: int) -> bytes:
-        """Serialise what ``messages.joint_state_message`` makes."""
+        """Return the bytes of the message that ``messages.joint_state_message`` makes."""
         _, angles, rates = wheels
         head = (*divmod(stamp_ns, 10**9), *self._joints_head, *angles)
         if rates:
@@ -105,13 +104,14 @@ class Serializer:
 
 
 def twist(data: bytes) -> BodyTwist:
-    """``messages.body_twist`` of a serialised geometry_msgs/Twist.
+    """Parse a serialised geometry_msgs/Twist; return its planar part as ``messages.body_twist``.
 
-    Raises CommandRefused for what is none, as another middleware might let through.
+    Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist, which another
+    middleware might let through.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
-        finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0  # otherwise it is NaN
+        finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0  # else the product is NaN
         if finite and encapsulation == LITTLE_ENDIAN:
             return BodyTwist(x, y, yaw)
         return messages.body_twist(deserialize_message(data, Twist))
@@ -122,26 +122,26 @@ def twist(data: bytes) -> BodyTwist:
 
 
 class Messages:
-    """The messages of a Serializer as rclpy messages, for a machine with other serialised bytes."""
+    """A Serializer's methods that return rclpy messages, for a machine where the bytes differ."""
 
     def __init__(self, settings: MessageSettings) -> None:
         self._settings = settings
 
     def imu(self, estimate: ImuEstimate, stamp_ns: int) -> Imu:
-        """Serialise a message for ``imu/data_raw``."""
+        """Return a message for ``imu/data_raw``."""
         return messages.imu_message(estimate, messages.time_message(stamp_ns), self._settings)
 
     def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> Odometry:
-        """Serialise a message for ``odom``."""
+        """Return a message for ``odom``."""
         return messages.odometry_message(estimate, messages.time_message(stamp_ns), self._settings)
 
     def joint_state(self, wheels: Wheels, stamp_ns: int) -> JointState:
-        """Serialise a message for ``joint_states``."""
+        """Return a message for ``joint_states``."""
         return messages.joint_state_message(wheels, messages.time_message(stamp_ns), self._settings)
 
 
 def difference(settings: MessageSettings) -> str:
-    """The type of a message that rclpy serialises otherwise; empty if there is none."""
+    """Return the type of a message that rclpy serialises differently; empty if all are the same."""
     reading = ImuEstimate(0.0, (1.1, -2.2, 3.3), (-4.4, 5.5, -6.6))
     noise = Covariance(1.2, 2.3, 3.4, 4.5, 5.6, 6.7)
     tangent, twist = Pose(7.7, -8.8, 9.9), BodyTwist(0.1, -0.2, 0.3)
@@ -167,7 +167,10 @@ def difference(settings: MessageSettings) -> str:
 
 
 def _same(ours: bytes, theirs: bytes, kind: type) -> bool:
-    """Padding does not count: rclpy leaves in it, and behind the end, what was there before."""
+    """Return whether both bytes mean the same message.
+
+    Padding is ignored: in it, and behind the end, rclpy leaves bytes that were there before.
+    """
     try:
         alike = deserialize_message(ours, kind) == deserialize_message(theirs, kind)
     except RMWError:
@@ -176,6 +179,6 @@ def _same(ours: bytes, theirs: bytes, kind: type) -> bool:
 
 
 def _text(text: str) -> tuple[str, tuple[int, bytes]]:
-    """Struct format and values of a string."""
+    """Return the struct format and the values of a string."""
     data = text.encode() + b"\0"
     return f"I{len(data)}s", (len(data), data)

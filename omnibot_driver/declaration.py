@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board's parameters, declared on a node: given at start, described, checked when set."""
+"""A board's parameters declared on a node: read at start, described, and checked when set."""
 
 import re
 from functools import partial
@@ -26,7 +26,7 @@ NOT_OURS: Final = re.compile(
 
 
 def declare(node: Node) -> dict[str, Any]:
-    """Every parameter's value at start. Raises ParameterError for what cannot be."""
+    """Declare all parameters and return their values at start. Raises ParameterError."""
     given = {
         name: override.value
         for name, override in node._parameter_overrides.items()
@@ -45,12 +45,16 @@ def declare(node: Node) -> dict[str, Any]:
 
 
 def ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, Any]:
-    """The values among these that are the driver's own."""
+    """Return the values of the changed parameters that are the driver's own."""
     return {item.name: item.value for item in changed if item.name in table.by_name}
 
 
 def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, parameters.Value]:
-    """What the file gives, and a word on it: a file that is not the one meant looks like none."""
+    """Return what the calibration file sets; log that, a missing file, and names that are not read.
+
+    Without the log a misspelt path would go unnoticed: it looks like a file that does not exist
+    yet.
+    """
     found, names = calibration.load(path, table), calibration.names(path)
     unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]
     if not names:
@@ -76,7 +80,7 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
 def _check(
     node: Node, table: parameters.Table, changed: list[rclpy.Parameter]
 ) -> SetParametersResult:
-    """Each value by itself, and together with those that stay as they are."""
+    """Check the changed values, each alone and together with the unchanged ones."""
     present = {item.name: item.value for item in node.get_parameters(list(table.by_name))}
     try:
         table.check_all({**present, **ours(changed, table)})

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``/diagnostics`` once a second: the link's figures, judged, as a message.
+"""Diagnostics: the figures of the link, judged and published on ``/diagnostics`` once a second.
 
-By diagnostic_updater where it is installed; else the same message without it: topic, names, levels,
-hardware id, period. The timer runs on the steady clock, so simulated time does not stop it.
+diagnostic_updater publishes them where it is installed. Otherwise this module publishes the same
+message without it: same topic, names, levels, hardware id and period. The timer runs on the steady
+clock, so simulated time does not stop it.
 """
 
 import time
@@ -24,8 +25,11 @@ Publish = Callable[[Sequence[Status]], None]
 
 
 class Diagnostics:
-    """``refusals`` is asked each time; ``hardware_id`` tells robots apart; ``to_check``: what may
-    be wrong with a board of which nothing is understood.
+    """The publisher of the diagnostics of one link.
+
+    ``refusals`` is called for each message and returns the refusals so far. ``hardware_id``
+    distinguishes robots. ``to_check`` says what may be wrong with a board whose data is not
+    understood.
     """
 
     def __init__(
@@ -64,13 +68,13 @@ def _alone(node: Node, hardware_id: str) -> Publish:
 
 
 def _through_updater(node: Node, hardware_id: str) -> tuple[Publish, float] | None:
-    """Use diagnostic_updater with its own period parameter; returns None if it is not installed."""
+    """Return a publisher that uses diagnostic_updater, and its period in s; None without it."""
     try:
         from diagnostic_updater import Updater
     except ImportError:
         return None
     updater = Updater(node, PERIOD_S)
-    updater.timer.cancel()  # it keeps ROS time
+    updater.timer.cancel()  # it runs on ROS time
     updater.setHardwareID(hardware_id)
     judged: dict[str, Status] = {}
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver as a process: signals, executor, exit code. Knows nothing of what the node does."""
+"""The driver as a process: signals, executor and exit code. Does not know what the node does."""
 
 import os
 import select
@@ -33,10 +33,11 @@ SETUP: Final = (
 
 
 class Ending:
-    """Where the main thread waits until the driver is to end, and why it is.
+    """The end of the driver: the main thread waits here until the driver is to end.
 
-    A pipe, because Python writes a signal's number into one from whichever thread the signal hits;
-    a lock that is waited for can miss it, and must not be touched by a signal handler at all.
+    It is a pipe, because Python writes a signal's number into one from whichever thread the signal
+    hits. A thread that waits for a lock can miss a signal, and a signal handler must not touch a
+    lock at all. ``defect`` is the exception that ended the driver, or None.
     """
 
     def __init__(self) -> None:
@@ -49,7 +50,7 @@ class Ending:
                 signal.signal(number, lambda *_: None)
 
     def begin(self, defect: BaseException | None = None) -> None:
-        """End the driver; with a defect, its exit code tells. Any thread may call this."""
+        """End the driver; with a defect its exit code is 1. Any thread may call this."""
         self.defect = self.defect or defect
         os.write(self._wake, b"\0")
 
@@ -64,11 +65,11 @@ class Ending:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the driver until SIGINT, SIGTERM, a shutdown of its context or a defect.
+    """Run the driver until a signal of ``STOPPED_BY``, a shutdown of its context or a defect.
 
-    Returns the exit code: 0 when asked to end, or for help; 1 after a defect, 2 if it cannot start.
-    The main thread only waits, so a signal is heard however busy the executor is, and a second one
-    cannot break into the shutdown.
+    Returns the exit code: 0 when asked to end, or for help; 1 after a defect; 2 if it cannot start.
+    The main thread only waits, so a signal takes effect however busy the executor is, and a second
+    one cannot interrupt the shutdown.
     """
     args = sys.argv if args is None else args
     with UnblockedOutput():
@@ -88,7 +89,7 @@ def _refuse(why: str) -> int:
 
 def _main(args: list[str]) -> int:
     ending = Ending()
-    # Only now, as it takes half a second: a signal meanwhile ends the driver as any other does.
+    # Imported after Ending is ready, as it takes half a second: a signal meanwhile ends the driver.
     import rclpy
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
     from rclpy.exceptions import NameValidationException, ParameterException
@@ -101,7 +102,7 @@ def _main(args: list[str]) -> int:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.get_default_context().on_shutdown(ending.begin)
         _run(ending, args)
-    except UnknownROSArgsError as error:  # its text is Python's for a list
+    except UnknownROSArgsError as error:  # its text is a Python list
         words = str(error)[1:-1].replace("', '", " ").strip("'")
         return _refuse(f"unknown argument {words}; {USAGE}")
     except NameValidationException as error:  # its second line is the name, which may be long
@@ -160,7 +161,7 @@ def _set_deadline() -> None:
         try:
             text = "omnibot_driver hung during shutdown and is terminated"
             print(text, file=sys.stderr, flush=True)
-            time.sleep(0.1)  # until that is copied
+            time.sleep(0.1)  # until the text is copied
         finally:  # also when no program reads the output
             os._exit(1)
 

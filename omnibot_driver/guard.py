@@ -1,14 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The guard: a process of its own that stops the robot when the driver no longer can.
+"""The guard: a separate process that stops the robot when the driver no longer can.
 
-It shares the driver's open lines, serial ports or connected sockets, and hears a heartbeat on its
-standard input. When the heartbeat ceases, or the driver is gone, it repeats the stop that it was
-given, for a second or until the driver is heard again: the emergency stop if the last heartbeat
-said that it is latched. It knows no board, and imports next to nothing, so that it is small and
-soon there: `keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each is what to write,
-one thing after the other, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. Where they change, the driver says
-so between two heartbeats, as ``=STOP EMERGENCY_STOP`` and a new line.
+It shares the driver's open lines, serial ports or connected sockets, and receives a heartbeat on
+its standard input. When the heartbeat ceases, or the driver has ended, it repeats the stop command
+that it was given, for a second or until the driver is alive again. If the last heartbeat said that
+the e-stop is latched, it repeats the emergency stop instead. It knows no board, and imports very
+little, so that it is small and starts quickly.
+
+`keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each argument lists what to write,
+in order, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. When they change, the driver sends ``=STOP
+EMERGENCY_STOP`` and a newline between two heartbeats.
 """
 
 import _signal as signal  # type: ignore[import-not-found]  # ``signal`` itself brings ``enum``
@@ -20,14 +22,14 @@ import termios
 
 BEAT = b"."
 LATCHED_BEAT = b"e"
-"""The driver is alive and its e-stop is latched."""
+"""Heartbeat of a driver whose e-stop is latched."""
 WORDS = b"="
 END = b"\n"
-"""Other words from now on stand between them."""
+"""End of a message that begins with ``WORDS`` and replaces both stop commands."""
 BYE = b"!"
-"""The driver has stopped the robot itself; the guard may leave."""
+"""Message that the driver has stopped the robot itself, and the guard may end."""
 LIMIT_S = 0.5
-"""After this time without a heartbeat the driver is taken to hang."""
+"""Time without a heartbeat, in s, after which the driver is taken to hang."""
 TIMES = 20
 PACE_S = 0.05
 
@@ -38,11 +40,11 @@ DRIVER = 0
 
 
 Words = list[tuple[int, bytes]]
-"""Descriptors, and what is written to them."""
+"""Descriptors, each with the bytes to write to it."""
 
 
 def watch(stop: Words, emergency_stop: Words) -> None:
-    """Watch the driver until it has gone, and a second longer unless it announced its end."""
+    """Watch the driver until it ends; send the stop if it hangs, or ends without notice."""
     patience_s: float | None = LIMIT_S
     latched, rest = False, b""
     while True:
@@ -67,7 +69,7 @@ def watch(stop: Words, emergency_stop: Words) -> None:
 
 
 def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
-    """Beats, the newest words that are whole, and the beginning of others."""
+    """Split input into heartbeats, the newest complete stop commands, and an incomplete rest."""
     beats = given = b""
     while WORDS in heard:
         before, _, after = heard.partition(WORDS)
@@ -80,7 +82,7 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int]) -> None:
-    """Say them ``TIMES`` times; stop when there is something to read from one of ``until``."""
+    """Write these packets up to ``TIMES`` times; stop early when one of ``until`` is readable."""
     lines = {line for line, _ in last_words}
     for line in lines:
         drop_what_waits(line)
@@ -93,22 +95,22 @@ def speak(last_words: Words, until: list[int]) -> None:
                 drop_what_waits(line)
             except OSError as error:
                 if error.errno in GONE:
-                    lines.discard(line)  # else a datagram was lost; the next one may be heard
+                    lines.discard(line)  # else a datagram was lost; the next one may arrive
         if not lines or select.select(until, [], [], PACE_S)[0]:
             return
 
 
 def drop_what_waits(line: int) -> None:
-    """Motion commands that are still on their way must not keep the stop waiting."""
+    """Discard unsent output: motion commands on their way must not delay the stop."""
     # contextlib would take a tenth of the guard's memory
     try:  # noqa: SIM105
         termios.tcflush(line, termios.TCOFLUSH)
     except termios.error:
-        pass  # a socket, or gone
+        pass  # a socket, or a lost line
 
 
 def words(argument: str) -> Words:
-    """Split the argument that `keeper.py` made of the last words."""
+    """Parse an argument that `keeper.py` made of packets."""
     each = (word.split(":") for word in argument.split(",") if word)
     return [(int(descriptor), bytes.fromhex(data)) for descriptor, data in each]
 

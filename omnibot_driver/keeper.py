@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keeps a guard beside an open port: the driver's side of `guard.py`.
+"""The driver's side of `guard.py`: keeps a guard process beside an open port.
 
-It starts the process, beats for it, replaces it when it dies, and sends it away. It knows no
+It starts the process, sends it heartbeats, replaces it when it dies, and ends it. It knows no
 threads and no board; its user calls ``beat`` from the thread that must stay alive.
 """
 
@@ -23,24 +23,24 @@ from omnibot_driver.core.packets import Packets
 
 BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
-"""A guard that dies at once is not started more often than this."""
+"""Shortest time between two starts, in s, for a guard that dies at once."""
 HANGS_AFTER: Final = 50
-"""A guard that has missed this many beats would not stop the robot either."""
+"""Number of unread heartbeats after which a guard would not stop the robot either."""
 MOST_DYING: Final = 3
-"""Number of killed guards that have not ended yet, above which no other is started."""
+"""Number of killed guards that have not ended yet at which another one is not started."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
-"""One that is killed and does not is in an uninterruptible sleep; the driver does not wait for
-that."""
+"""Longest wait for a killed guard to end, in s. One that takes longer is in an uninterruptible
+sleep, and the driver does not wait for it."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
-"""On a busy computer a process takes its time to start, and what it says is the stop."""
+"""Longest wait for a guard that repeats the stop, in s; a process may be slow to start."""
 
 
 class Keeper:
-    """A guard for open lines, from now until ``end``.
+    """A guard process for open lines, from construction until ``end``.
 
-    ``descriptors``: of the lines, by channel, None for one that is missing; ``stop``,
-    ``emergency_stop``: what the guard is to say, by whether the e-stop is latched.
+    ``descriptors`` are those of the lines, by channel, None for a missing line. ``stop`` is what
+    the guard sends, and ``emergency_stop`` what it sends while the e-stop is latched.
     """
 
     def __init__(
@@ -50,19 +50,19 @@ class Keeper:
         self._descriptors = descriptors
         self.last_words = stop, emergency_stop
         self._ahead = 0
-        """Bytes of words that the guard may not have read yet."""
+        """Bytes of stop commands that the guard may not have read yet."""
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
-        """Killed, and not gone yet."""
+        """Killed processes that have not ended yet."""
         self._broken = False
         self._restart_at = -math.inf
         self._told = False
         self._start()
 
     def beat(self, now: float, *, latched: bool = False) -> str:
-        """The driver is alive; call it every ``BEAT_S``, neither more nor less often.
+        """Send a heartbeat; call this every ``BEAT_S``, neither more nor less often.
 
-        Returns a sentence, once, when the guard is not as it should be. Waits for no process.
+        Returns a sentence, once, if the guard does not work as it should. Waits for no process.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -75,7 +75,7 @@ class Keeper:
         return trouble
 
     def change(self, stop: Packets, emergency_stop: Packets) -> None:
-        """What the guard is to say from now on. Waits for no process."""
+        """Replace the commands that the guard is to send. Waits for no process."""
         self.last_words = stop, emergency_stop
         if (process := self._process) is None:
             return
@@ -84,13 +84,13 @@ class Keeper:
         try:
             os.write(process.stdin.fileno(), message)
             self._ahead += len(message)
-        except OSError:  # gone, or it reads nothing: another one is started with these words
+        except OSError:  # gone, or it reads nothing: another one is started with these commands
             self._give_up(process)
 
     def end(self, *, stopped: bool) -> None:
-        """It leaves, and the port is ours alone; harmless to repeat.
+        """End the guard, after which the port is ours alone. A second call does nothing.
 
-        Unless the robot is known to have been ``stopped``, it says its last words first.
+        Unless the robot is known to have been ``stopped``, the guard sends its stop first.
         """
         self._restart_at = math.inf
         if stopped:
@@ -103,7 +103,7 @@ class Keeper:
                 process.wait(max(0.0, until - time.monotonic()))
 
     def _beat(self, process: subprocess.Popen[bytes], word: bytes) -> str:
-        """Returns what is wrong with it, and then it is given up."""
+        """Send this guard a heartbeat; if it died or hangs, give it up and return the reason."""
         assert process.stdin is not None
         pipe = process.stdin.fileno()
         try:
@@ -122,9 +122,9 @@ class Keeper:
         return "the guard process hung"
 
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill it. It may be in an uninterruptible sleep, so later beats look whether it is gone.
+        """Kill the guard without waiting for its end; later heartbeats check whether it has ended.
 
-        The e-stop goes through the lock that is held here.
+        It may be in an uninterruptible sleep, and the e-stop needs the lock that is held here.
         """
         assert process.stdin is not None
         process.stdin.close()
@@ -133,7 +133,7 @@ class Keeper:
         self._process, self._broken = None, False
 
     def _addressed(self, packets: Packets) -> str:
-        """Encode the last words for the guard, without the lines that are missing."""
+        """Encode packets for the guard, without those for missing lines."""
         return ",".join(
             f"{line}:{data.hex()}"
             for channel, data in packets
@@ -142,8 +142,9 @@ class Keeper:
 
     def _start(self) -> None:
         self._ahead = 0
-        # By its bare name: `pkill -f omnibot_driver` must not hit the guard. Nor by the name of a
-        # folder with a .venv in it: there the interpreter is a link, and needed are built-ins only.
+        # The command must not contain `omnibot_driver`, because `pkill -f` must not hit the guard:
+        # so guard.py has no folder, and the interpreter's link in a .venv is resolved. The guard
+        # needs built-in modules only.
         folder, name = os.path.split(guard.__file__)
         command = [os.path.realpath(sys.executable), "-I", "-S", name]
         try:

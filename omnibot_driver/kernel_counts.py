@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the kernel counts: bytes that a serial port lost, and how long a thread waited to run.
+"""Counts of the Linux kernel: losses of a serial port, and the time a thread waited to run.
 
-Linux only; None where it does not count.
+Each is None where the kernel does not count it.
 """
 
 import fcntl
@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Final
 
 TIOCGICOUNT: Final = 0x545D
-"""Of asm-generic/ioctls.h; the ``termios`` of Python has no name for it everywhere."""
+"""Request of asm-generic/ioctls.h; Python's ``termios`` does not name it everywhere."""
 _COUNTS: Final = struct.Struct("20i")
 _OVERRUN, _BUFFER_OVERRUN = 7, 10
-"""Places in ``serial_icounter_struct``: the receiver was not emptied in time; the tty was not."""
+"""Indices in ``serial_icounter_struct``: the receiver was not emptied in time; the tty was not."""
 
 
 def overruns(descriptor: int) -> int | None:
-    """How often bytes were lost behind the line since the port exists.
+    """Return how often the line has lost bytes since the port exists; None without a count.
 
     A pseudo-terminal and a socket lose none and count none; some USB adapters count none.
     """
@@ -30,7 +30,7 @@ def overruns(descriptor: int) -> int | None:
 
 
 def waited_s(thread_id: int) -> float | None:
-    """How long this thread of ours was ready to run, and another one ran."""
+    """Return the time for which this thread was ready to run but did not, in s; None if unknown."""
     try:
         words = Path(f"/proc/self/task/{thread_id}/schedstat").read_text().split()
         return int(words[1]) * 1e-9

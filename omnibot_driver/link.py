@@ -1,13 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The threads that serve a port and a session, and how the driver ends.
+"""The threads that serve a port and a session, and the shutdown of the driver.
 
-The *reader* opens the port, waits for bytes, hands them to the session and delivers what comes of
-them at once, on its own thread: no timer and no other thread stand between the wire and the
+The *reader* opens the port, waits for bytes, hands them to the session and delivers the results at
+once, on its own thread. No timer and no other thread delays a measurement between the wire and the
 listener. The *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the
-watchdog does not depend on an executor. It is also the one whose heartbeat the guard hears. They
-and every caller go through one lock. What the pacer and callers have to tell is delivered by the
-*teller*, so a slow listener delays neither; all of it leaves in the order of that lock.
+watchdog does not depend on an executor. It also sends the guard its heartbeat. These threads and
+every caller use one lock. Events that the pacer and callers cause are delivered by the *teller*, so
+a slow listener delays neither. All events are delivered in the order in which they occurred under
+that lock.
 """
 
 import threading
@@ -26,14 +27,14 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
-"""Longer than a guard takes to repeat Stop."""
+"""Longest wait for a thread to end, in s; longer than a guard takes to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
-"""The longest wait at the end until the robot is seen to stand, longer where a proof takes longer;
-then the guard repeats Stop."""
+"""Longest wait at the end until the robot is seen at rest, in s; longer where a proof takes longer.
+After it the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
-"""The same without a guard."""
+"""Longest wait at the end until the robot is seen at rest, without a guard, in s."""
 SILENCE_S: Final = 0.25
-"""The wait after it, in silence, that proves that the last Stop was not damaged."""
+"""Wait after the standstill, in s, in silence, which proves that the last Stop was not damaged."""
 
 T = TypeVar("T")
 
@@ -42,13 +43,13 @@ class Link:
     """One session on one port, which is opened again whenever it is lost.
 
     ``opener`` opens the transport, whose name for the user is ``port``. ``guard``: whether a
-    process of its own is to say the board's last words when this one cannot.
-    ``deliver`` gets the session's events; ``refused`` the reason why a command was not obeyed;
-    ``report`` a sentence about the port whenever it, or one of its lines, cannot be had or is lost,
-    and None when all of it is open; ``on_read`` and ``on_write`` each packet that was read and
-    written. They are called one at a time, in the order in which it happened, on the reader's
-    thread or another.
-    ``failed`` gets the exception that ended a thread, which nothing but a defect can do.
+    separate process is to send the board's stop commands when this process cannot. ``deliver`` gets
+    the session's events. ``refused`` gets the reason why a command was refused. ``report`` gets a
+    sentence about the port whenever it, or one of its lines, cannot be opened or is lost, and None
+    when all of it is open. ``on_read`` and ``on_write`` get each packet that was read or written.
+    They are called one at a time, in the order of the events, on the reader's thread or another.
+
+    ``failed`` gets the exception that ended a thread, which only a defect can cause.
     """
 
     def __init__(
@@ -88,23 +89,23 @@ class Link:
         ]
 
     def start(self) -> None:
-        """Begin to open the port; goes on until ``close``."""
+        """Start the threads, which open the port and keep it open until ``close``."""
         for thread in self._threads:
             thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """See SharedSession."""
+        """Call ``action`` with the session; see ``SharedSession.call``."""
         return self._shared.call(action)
 
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
     ) -> None:
-        """See SharedSession."""
+        """Pass a motion command to the session; see ``SharedSession.command``."""
         self._shared.command(action, wish, sent_ns)
 
     @property
     def reconnect_interval_s(self) -> float:
-        """How long the first wait for a lost port is."""
+        """Wait before a lost port is first opened again, in s."""
         return self._reader.reconnect_interval_s
 
     @reconnect_interval_s.setter
@@ -113,11 +114,11 @@ class Link:
 
     @property
     def blocked(self) -> bool:
-        """See SharedSession."""
+        """Whether the port did not accept the last packets; see ``SharedSession.blocked``."""
         return self._shared.blocked
 
     def figures(self) -> tuple[LinkFigures, SessionFigures]:
-        """All that is counted and measured, at one moment."""
+        """Return all counts and measurements of the link and the session, taken at one moment."""
         with self._shared.lock:
             link = LinkFigures(
                 port=self._name,
@@ -131,9 +132,10 @@ class Link:
             return link, self._session.figures(time.monotonic())
 
     def close(self, on_exit: OnExit) -> bool:
-        """Stop the robot, end the threads, close the port. Harmless to repeat.
+        """Stop the robot, end the threads and close the port. A second call does no harm.
 
-        Whether Stop was sent; ``stands``: whether the robot was seen to stand.
+        Returns whether Stop was sent and the threads have ended. ``stands`` then says whether the
+        robot was seen at rest.
         """
         told = False
         with self._shared.lock:
@@ -146,7 +148,7 @@ class Link:
                     told = self._shared.write_error is None and not self._shared.port.missing
                     self._shared.stood = told and self._session.shutdown.stands
                     self._shared.port.interrupt()
-                    self._shared.port = None  # nothing may follow the last words
+                    self._shared.port = None  # nothing may be sent after the shutdown sequence
             self._shared.closing.set()
             self._shared.changed.notify_all()
         *serving, teller = self._threads
@@ -163,11 +165,14 @@ class Link:
 
     @property
     def stands(self) -> bool:
-        """After ``close``: the board has shown that the robot stands."""
+        """Whether the board has shown, by the end of ``close``, that the robot is at rest."""
         return self._shared.stood
 
     def _stop_for_good(self) -> None:
-        """Under the lock, wait until the robot stands while the pacer repeats Stop."""
+        """Stop the robot and wait until it is at rest; the lock is held.
+
+        Waiting releases the lock, so that the pacer repeats Stop meanwhile.
+        """
         self._session.shutdown.begin(now := time.monotonic())
         self._shared.settle()
         alone = (

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From what the session measured to ROS messages: pure functions, no node, no arithmetic of note.
+"""Conversion between the core's values and ROS messages: pure functions without a node.
 
 Conventions: REP-103 (axes, units), REP-105 (odom to base_link), REP-145 (an IMU without
 orientation).
@@ -39,19 +39,21 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.status import Status
 
 UNMEASURED_VARIANCE: Final = 1e6
-"""For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""
+"""Variance of z, roll and pitch, which planar odometry lacks, and of an unknown twist."""
 SHORTEST_QUATERNION: Final = 1e-3
 MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""What was rolled so far, the angles in rad, unwrapped, and the rates in rad/s, if known."""
+"""Displacement rolled so far, unwrapped wheel angles in rad, wheel rates in rad/s or empty."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageSettings:
-    """Frames, prefix included; standard deviations that the covariances are made of (SI units);
-    and the wheels. What is of the IMU is empty or 0 where there is none.
+    """Frames, standard deviations (SI units) and wheels that messages are made with.
+
+    Frame names include the prefix. Without an IMU its frame name is the prefix alone, and its
+    standard deviations are 0.
     """
 
     odom_frame: str
@@ -65,7 +67,7 @@ class MessageSettings:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], wheels: Kinematics) -> "MessageSettings":
-        """Build from checked parameter values; ``wheels``: of the board's profile."""
+        """Build from checked parameter values and the wheels of the board's profile."""
         prefix = values["frame_prefix"]
         return cls(
             odom_frame=prefix + values["odom_frame"],
@@ -80,7 +82,7 @@ class MessageSettings:
 
 
 def imu_message(estimate: ImuEstimate, stamp: Time, settings: MessageSettings) -> Imu:
-    """``imu/data_raw``: specific force and angular velocity in the sensor's own axes."""
+    """Return an ``imu/data_raw`` message: specific force and angular velocity, in sensor axes."""
     force, rate = estimate.specific_force, estimate.angular_velocity
     return Imu(
         header=Header(stamp=stamp, frame_id=settings.imu_frame),
@@ -95,7 +97,7 @@ def imu_message(estimate: ImuEstimate, stamp: Time, settings: MessageSettings) -
 def odometry_message(
     estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
 ) -> Odometry:
-    """``odom``: pose of the base in the odometry frame, twist in the base's own axes."""
+    """Return an ``odom`` message: pose in the odometry frame, twist in the base's own axes."""
     pose, twist, covariance = estimate.pose, estimate.twist, estimate.covariance
     message = Odometry(
         header=Header(stamp=stamp, frame_id=settings.odom_frame),
@@ -127,7 +129,7 @@ def odometry_message(
 def transform_message(
     estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
 ) -> TransformStamped:
-    """A transform for ``/tf``: the pose of the ``odom`` with this stamp."""
+    """Return a ``/tf`` transform: the pose of the ``odom`` message with the same stamp."""
     pose = estimate.pose
     return TransformStamped(
         header=Header(stamp=stamp, frame_id=settings.odom_frame),
@@ -140,12 +142,12 @@ def transform_message(
 
 
 def unturned(kinematics: Kinematics) -> Wheels:
-    """The wheels before anything was rolled."""
+    """Return the state of wheels that have not rolled yet."""
     return Pose(), (0.0,) * len(kinematics.joints), ()
 
 
 def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -> Wheels:
-    """The wheels after what was rolled since then, by the sizes that they have now."""
+    """Return the wheels after what was rolled since ``before``, by their present sizes."""
     rolled, rolling, (then, angles, _) = estimate.rolled, estimate.rolling, before
     way = BodyTwist(rolled.x_m - then.x_m, rolled.y_m - then.y_m, rolled.yaw_rad - then.yaw_rad)
     angles = tuple(map(add, angles, kinematics.wheel_rates(way)))
@@ -153,7 +155,7 @@ def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -
 
 
 def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) -> JointState:
-    """A message for ``joint_states``."""
+    """Return a ``joint_states`` message."""
     _, angles, rates = wheels
     return JointState(
         header=Header(stamp=stamp), name=settings.wheels.joints, position=angles, velocity=rates
@@ -163,7 +165,7 @@ def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) 
 def diagnostic_message(
     statuses: Sequence[Status], stamp: Time, node_name: str, hardware_id: str
 ) -> DiagnosticArray:
-    """A message for ``/diagnostics``, with names as diagnostic_updater makes them."""
+    """Return a ``/diagnostics`` message with names as diagnostic_updater makes them."""
     return DiagnosticArray(
         header=Header(stamp=stamp),
         status=[
@@ -180,10 +182,10 @@ def diagnostic_message(
 
 
 def body_twist(twist: Any) -> BodyTwist:
-    """The planar part of a geometry_msgs/Twist.
+    """Return the planar part of a geometry_msgs/Twist, in m/s and rad/s.
 
-    Raises CommandRefused for NaN or infinity anywhere in it: a publisher that says nonsense of one
-    axis is not to be trusted with the others.
+    Raises CommandRefused for NaN or infinity in any of its six values: a publisher that sends one
+    invalid axis is not to be trusted with the others.
     """
     linear, angular = twist.linear, twist.angular
     require_finite("cmd_vel", (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
@@ -191,10 +193,11 @@ def body_twist(twist: Any) -> BodyTwist:
 
 
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
-    """The planar pose of a geometry_msgs/PoseStamped; z is not looked at.
+    """Return the planar pose of a geometry_msgs/PoseStamped; z must be finite, but is ignored.
 
-    Raises CommandRefused for another frame than ``odom_frame`` (or none), for what is not finite,
-    and for an orientation that is none or that does not stand upright.
+    Raises CommandRefused for a frame that is neither ``odom_frame`` nor empty, for a value that is
+    not finite, and for an orientation that is not a quaternion near unit length or is tilted by
+    more than ``MOST_TILT_RAD``.
     """
     frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
     if frame not in ("", odom_frame):
@@ -221,7 +224,7 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
 
 
 def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
-    """A warning about publishers on ``cmd_vel`` with another type; empty if there are none."""
+    """Return a warning about ``cmd_vel`` publishers of another type; empty without any."""
     ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
     if stamped:
         ours, other = other, ours
@@ -237,43 +240,44 @@ def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
 
 
 def age(stamp: Time, now_ns: int) -> float:
-    """Seconds since the stamp by the clock that gave both; 0 for a zero stamp, which is none."""
+    """Return the seconds since the stamp, by the clock that gave both; 0 for a zero stamp."""
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
 
 
 def is_stamped(stamped: TwistStamped | PoseStamped) -> bool:
-    """Whether the message has a stamp; zero means none."""
+    """Return whether the message has a stamp; zero means none."""
     stamp = stamped.header.stamp
     return bool(stamp.sec or stamp.nanosec)
 
 
 def raw_message(data: bytes) -> UInt8MultiArray:
-    """A message of plain bytes, without a layout."""
+    """Return a message of plain bytes, without a layout."""
     return UInt8MultiArray(data=array("B", data))
 
 
 def time_message(nanoseconds: int) -> Time:
-    """A stamp from nanoseconds since the clock's epoch."""
+    """Return a stamp from nanoseconds since the clock's epoch."""
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Wall clock less steady clock, where the wall clock was read between two steady readings.
+    """Return wall clock minus steady clock in ns; ``wall_ns`` was read between the steady times.
 
-    ``known_ns``, the offset so far, stands unless that contradicts it: a thread put to sleep
-    between the readings makes no jitter, and a step of the wall clock is followed at once.
+    ``known_ns``, the offset so far, is kept unless the readings contradict it. A thread put to
+    sleep between the readings therefore causes no jitter, and a step of the wall clock is followed
+    at once.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 
 
 def yaw_quaternion(yaw_rad: float) -> Quaternion:
-    """A rotation about z."""
+    """Return a rotation about z."""
     return Quaternion(x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))
 
 
 def isotropic(stddev: float) -> list[float]:
-    """Row-major 3x3 of a vector with the same noise along each axis."""
+    """Return the row-major 3x3 covariance of a vector with the same noise along each axis."""
     variance = stddev * stddev
     return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
 
@@ -281,7 +285,7 @@ def isotropic(stddev: float) -> list[float]:
 def planar(
     xx: float, xy: float, x_yaw: float, yy: float, y_yaw: float, yaw_yaw: float
 ) -> list[float]:
-    """Row-major 6x6 covariance of (x, y, z, roll, pitch, yaw)."""
+    """Return the row-major 6x6 covariance of (x, y, z, roll, pitch, yaw) for planar motion."""
     zero, big = 0.0, UNMEASURED_VARIANCE
     return [
         *(xx, xy, zero, zero, zero, x_yaw),

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The node: topics, services and parameters wired to a link and its session.
+"""The ROS node: topics, services and parameters connected to a link and its session.
 
-Nothing is computed here. Measurements are published by the link's reader thread as they come;
-the executor sleeps unless a message, a service call or a parameter wakes it.
+Nothing is computed here. Measurements are published by the link's reader thread as they arrive. The
+executor sleeps unless a timer, a message, a service call or a parameter wakes it.
 """
 
 import contextlib
@@ -42,7 +42,10 @@ Action = Callable[[Session, Any, float], None]
 
 
 class OmniBotDriver(Node):
-    """The driver node. Raises ParameterError when it cannot start with the given parameters."""
+    """The driver node. Raises ParameterError when it cannot start with the given parameters.
+
+    ``end`` is called when the driver has to end, with the defect or None.
+    """
 
     def __init__(
         self, *, end: Callable[[BaseException | None], object] = lambda _error: None
@@ -89,9 +92,10 @@ class OmniBotDriver(Node):
         self._link.start()
 
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
-        """Without events: the executor looks at each of them before it takes a command.
+        """Create a publisher without events.
 
-        A subscriber with an incompatible quality of service sees a warning on its own side only.
+        The executor would check each event before it takes a command. A subscriber with an
+        incompatible quality of service sees a warning on its own side only.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
@@ -121,7 +125,7 @@ class OmniBotDriver(Node):
         )
 
     def close(self) -> None:
-        """Stop the robot and give the port back; ROS entities live on until ``destroy_node``."""
+        """Stop the robot and close the port; ROS entities remain until ``destroy_node``."""
         if not self._link.close(self._values["on_exit"]):
             return
         if self._link.stands:
@@ -132,9 +136,9 @@ class OmniBotDriver(Node):
             )
 
     def report_defect(self, error: BaseException) -> None:
-        """Something that must not happen has; say so and have the driver end."""
+        """Log an exception that only a defect can cause, and end the driver."""
         if isinstance(error, RCLError) and not self.context.ok():
-            self._end(None)  # ROS was shut down under our hands
+            self._end(None)  # ROS was shut down meanwhile: not a defect
             return
         trace = "".join(traceback.format_exception(error))
         self.get_logger().fatal(
@@ -186,9 +190,9 @@ class OmniBotDriver(Node):
         *,
         may_be_old: Callable[[Any], bool] = lambda _message: False,
     ) -> Callable[..., None]:
-        """A callback that hands each message to ``action``; the link tells of a refusal.
+        """Return a callback that passes each message to ``action``; the link reports a refusal.
 
-        ``may_be_old``: whether it does not matter how long a message was under way.
+        ``may_be_old`` returns whether the transit time of a message does not matter.
         """
         transit = Transit()
 
@@ -223,7 +227,7 @@ class OmniBotDriver(Node):
         session.command_pose(messages.goal_pose(goal, frame), now)
 
     def _look_around(self) -> None:
-        """Mistakes that the middleware does not report. Each is logged once."""
+        """Log mistakes that the middleware does not report, each once."""
         for look in list(self._looks):
             if warning := look():
                 self.get_logger().warning(warning)
@@ -242,7 +246,10 @@ class OmniBotDriver(Node):
         return selfcheck.waiting_advice(self._values["port"], self.get_clock().now().nanoseconds)
 
     def _refuse(self, text: str) -> None:
-        """Counted each time, told now and then by its kind: a flood of one hides no other."""
+        """Count each refusal, and log each kind every ``WARN_EVERY_S`` at most.
+
+        A flood of one kind therefore does not hide another.
+        """
         self._refusals = Refusals(count=self._refusals.count + 1, last=text)
         kind, now_s = text.partition(":")[0], time.monotonic()
         if now_s - self._refused_at_s.get(kind, -math.inf) >= WARN_EVERY_S:

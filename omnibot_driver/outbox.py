@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What several threads have to tell, told in the order in which it happened.
+"""Calls that several threads queue, made in the order of the events that caused them.
 
-A thread puts what happened while it holds the lock under which it happened, and delivers after it
+A thread puts a call while it holds the lock under which the event occurred, and delivers after it
 has released that lock, so a slow listener delays no command. One thread delivers at a time; another
-one that comes meanwhile leaves its part to the first. This module knows threads; it does not know
-what is delivered.
+one that arrives meanwhile leaves its calls to the first. This module knows threads; it does not
+know what is delivered.
 """
 
 import threading
@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""From here on the thread that brings most of it waits for the listener."""
+"""Number of waiting calls from which on each thread that delivers waits for the listener."""
 
 Delivery = Callable[[], object]
 
@@ -33,30 +33,30 @@ class Outbox:
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
-        """``put`` and ``deliver`` at a lower price: whether the caller may deliver by itself.
+        """Return whether the caller may deliver by itself, cheaper than ``put`` and ``deliver``.
 
-        With the lock held under which it happened. If so, ``release`` is to follow.
+        Call it with the lock held under which the event occurred. If True, ``release`` must follow.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """End a claim after its delivery, or its failure."""
+        """End a claim after its delivery or its failure."""
         self._delivering.release()
         if self._waiting:
             self.deliver()
 
     @property
     def full(self) -> bool:
-        """The listener is so slow that what can be spared is better not put."""
+        """Whether the listener is so slow that a dispensable call is better not put."""
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
-        """Make the calls that wait, unless another thread is doing so: then that one makes them.
+        """Make the waiting calls, or leave them to the thread that is doing so.
 
-        Raises what they raise.
+        With a full outbox, wait for that thread. Raises what the calls raise.
         """
         waiting, delivering = self._waiting, self._delivering
-        while waiting:  # again after the release: one that was put meanwhile found it taken
+        while waiting:  # again after the release: a call put meanwhile found the lock taken
             if not delivering.acquire(blocking=self.full):
                 return
             try:
@@ -66,7 +66,7 @@ class Outbox:
                 delivering.release()
 
     def hand_over(self) -> None:
-        """Have another thread make the calls that wait, for a thread that must not be held up."""
+        """Have ``serve`` make the waiting calls, for a thread that must not be delayed."""
         if self._waiting:
             self._handed_over.set()
 

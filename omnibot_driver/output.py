@@ -2,9 +2,10 @@
 
 """Log lines that never block the process. Knows descriptors; must not know what is printed.
 
-rclpy writes log lines while it holds the interpreter: a terminal that is stopped by ctrl-S, or a
-pipe without a reader, would freeze every thread, the watchdog included, and the robot would go on
-with its last command. So what is printed goes through a pipe that would rather lose a line.
+rclpy writes log lines while it holds the interpreter. A terminal that is stopped by ctrl-S, or a
+pipe without a reader, would freeze every thread, the watchdog included, and the robot would
+continue with its last command. Output therefore passes through a pipe that loses a line rather than
+blocks.
 """
 
 import contextlib
@@ -26,7 +27,7 @@ class UnblockedOutput:
     def __enter__(self) -> Self:
         _fill_gaps()
         if os.isatty(2):
-            os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # it would see our pipe
+            os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # rcutils would see our pipe
         self._originals = [os.dup(descriptor) for descriptor in STANDARD]
         self._copiers = [
             threading.Thread(target=_copy, args=(_redirect(descriptor), original), daemon=True)
@@ -42,7 +43,7 @@ class UnblockedOutput:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if sys.stdout is not None:  # it was closed
+        if sys.stdout is not None:  # it is None if closed
             with contextlib.suppress(BlockingIOError):
                 sys.stdout.flush()
         nothing = os.open(os.devnull, os.O_WRONLY)
@@ -55,13 +56,16 @@ class UnblockedOutput:
             copier.join(LAST_WORDS_S)
             if copier.is_alive():
                 continue
-            if select.select([], [original], [], 0)[1]:  # else Python's last words would block it
+            if select.select([], [original], [], 0)[1]:  # else Python's own last output would block
                 os.dup2(original, descriptor)
             os.close(original)
 
 
 def _fill_gaps() -> None:
-    """Else the port would become a standard output that is closed: the board would get the log."""
+    """Open /dev/null on those of the descriptors 0 to 2 that are closed.
+
+    Otherwise the port would get the number of a closed standard output, and the board the log.
+    """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
         pass
     os.close(descriptor)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver says: what the session tells, on topics; news, in the log.
+"""Publication of the session's events: measurements and states on topics, news in the log.
 
-One call at a time, in the order in which things happened (`outbox.py` sees to it), so what is
-published last is the truth. Measurements come from the link's reader.
+Calls come one at a time, in the order of the events (`outbox.py` ensures that), so the state that
+is published last is the present one. Measurements come from the link's reader.
 """
 
 import contextlib
@@ -34,12 +34,12 @@ from omnibot_driver.transforms import transform_publisher
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 RAW_DEPTH: Final = 1000
-"""A recorder that is kept waiting for seconds still gets every byte."""
+"""Queue depth of raw bytes; a recorder that is delayed for seconds still gets every byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 
 
 class Publishing:
-    """Publishes measurements and states. ``settings`` may be replaced at any time."""
+    """The publisher of measurements and states. ``settings`` may be replaced at any time."""
 
     def __init__(
         self,
@@ -89,11 +89,12 @@ class Publishing:
             Extra: self._publish_extra,
         }
         self.extras: Mapping[type, Callable[[Any, int], None]] = {}
-        """Who publishes each type of value that only this board has, with its stamp in ns."""
+        """Functions that publish the types of value that only this board has, by type; they get the
+        value and its stamp in ns."""
 
     @property
     def settings(self) -> messages.MessageSettings:
-        """The frames and covariances of messages."""
+        """Frames and covariances of messages."""
         return self._settings
 
     @settings.setter
@@ -101,14 +102,14 @@ class Publishing:
         self._settings, self._make = settings, self._maker(settings)
 
     def taps(self) -> dict[str, Callable[[Packet], None]]:
-        """The functions that publish the raw bytes of a link."""
+        """Return the functions that publish a link's raw bytes, by the link's argument names."""
         return {
             "on_read": self._raw_publisher("~/raw_rx"),
             "on_write": self._raw_publisher("~/raw_tx"),
         }
 
     def deliver(self, events: Sequence[Event]) -> None:
-        """Publish events whose stamps are of the steady clock, now."""
+        """Publish events now; their stamps are of the steady clock."""
         if not events or self._over:
             return
         if self._time_is_simulated:
@@ -123,7 +124,7 @@ class Publishing:
             self._handlers[type(event)](event, offset_ns)
 
     def publish(self, events: Sequence[Event], clock_offset_ns: int) -> None:
-        """Publish events whose stamps are so far behind ROS time."""
+        """Publish events whose stamps are ``clock_offset_ns`` behind ROS time."""
         if self._over:
             return
         for event in events:
@@ -145,7 +146,7 @@ class Publishing:
             self._node.get_logger().error(f"{trouble} (retrying)")
 
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
-        """Deliver by a simulated clock, which steps, may jump back, and is 0 until it begins."""
+        """Publish by a simulated clock, which steps, may jump back, and is 0 until it begins."""
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
             self._stamped_ns = {}
@@ -162,15 +163,15 @@ class Publishing:
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
-        """ROS is being shut down; to ask it each time costs more than an Imu."""
+        """Note that ROS is being shut down; a query for each event would cost more than an Imu."""
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Time begins or ceases to be simulated; to ask each time would cost a microsecond."""
+        """Note whether time is simulated; a query for each event would cost a microsecond."""
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
-        """A publisher for each channel, with the channel's name if it has one."""
+        """Return a function that publishes packets on one topic per channel, named after it."""
         publishers = [
             self._node.create_publisher(UInt8MultiArray, f"{topic}/{name}".rstrip("/"), RAW_DEPTH)
             for name in self._channels
@@ -178,7 +179,7 @@ class Publishing:
 
         def publish(packet: Packet) -> None:
             channel, data = packet
-            with contextlib.suppress(RCLError):  # the last words outlive ROS
+            with contextlib.suppress(RCLError):  # bytes are also sent after ROS has ended
                 publishers[channel].publish(messages.raw_message(data))
 
         return publish
@@ -223,6 +224,9 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Each thing once until the board is understood again: a flapping port is reported once."""
+        """Return whether the text is new since the board was last understood.
+
+        Each text is logged once until then, so a flapping port is reported once.
+        """
         told, self._told = self._told, self._told | {text}
         return text not in told

@@ -2,8 +2,9 @@
 
 """The reader's work: open the port, wait for bytes, hand them to the session, deliver at once.
 
-No timer and no other thread stand between the wire and the listener. A port that is lost is opened
-again, with a guard beside it; whatever ends the reading, a stop is sent to the robot.
+No timer and no other thread delays a measurement between the wire and the listener. A port that is
+lost is opened again, with a guard beside it. Whatever ends the reading, a stop is sent to the
+robot.
 """
 
 import math
@@ -22,16 +23,17 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import LinesChanged, Transport
 
 COUNT_EVERY_S: Final = 1.0
-"""The kernel is asked what it lost."""
+"""Interval at which the kernel is asked for its count of losses, in s."""
 BACK_OFF: Final = 1.5
 LONGEST_WAIT_S: Final = 2.0
 
 
 class Reader:
-    """``serve`` is a thread's work. ``opener`` and what follows it are the link's.
+    """The work of the reader thread, ``serve``, and its counts.
 
-    ``trouble`` is why the port, or one of its lines, is not open; ``opened`` and ``received_bytes``
-    count, ``overruns`` is what the kernel lost of this port, where it counts that.
+    ``opener`` and the arguments after it are the link's. ``trouble`` is the reason why the port, or
+    one of its lines, is not open. ``opened`` counts openings, ``received_bytes`` bytes, and
+    ``overruns`` the kernel's losses on this port (None without a count).
     """
 
     def __init__(
@@ -57,8 +59,8 @@ class Reader:
         self._unguarded_told = False
 
     def serve(self) -> None:
-        """Until the link closes."""
-        # Once more when it ends: a robot that was lost while it drove is still to be stopped.
+        """Serve the port until the link closes."""
+        # A lost port is opened once more at the end, to stop a robot that was driving.
         while not (leaving := self._closing.is_set()) or self.opened:
             try:
                 with closing(self._open()) as port:
@@ -100,7 +102,7 @@ class Reader:
         self._outbox.deliver()
 
     def _attach_anew(self, port: Transport) -> None:
-        """Its lines have changed: all begins again, on those that are there now."""
+        """Begin again on the lines that are present now, after one was lost or came back."""
         with self._lock:
             self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
@@ -109,7 +111,7 @@ class Reader:
         try:
             self._attach(port)
         finally:
-            if keeper is not None:  # until now it was the one that guards
+            if keeper is not None:  # it has guarded until now
                 keeper.end(stopped=True)
 
     def _guarded(self, port: Transport) -> tuple[Keeper | None, list[Notice]]:
@@ -157,7 +159,7 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """With the lock held: what comes of the bytes, but for what was measured at once."""
+        """Process what follows from the received bytes besides measurements; the lock is held."""
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:
             self._shared.settle()
@@ -165,7 +167,7 @@ class Reader:
             self._shared.tell_guard()
 
     def _count(self, port: Transport, now: float) -> None:
-        """With the lock held: what the kernel lost, now and then."""
+        """Read the kernel's count of losses every ``COUNT_EVERY_S``; the lock is held."""
         if now < self._count_at:
             return
         self._count_at = now + COUNT_EVERY_S
@@ -174,15 +176,15 @@ class Reader:
             self._session.overran(self.overruns)
 
     def _detach(self, port: Transport, *, comes_back: bool) -> None:
-        """Whatever ended the reading, the robot is not left with a command to carry out."""
+        """Leave the port, and the robot without a command, whatever ended the reading."""
         with self._lock:
             if self._shared.write_error is None:
                 self._shared.write(
                     self._session.shutdown.sequence(self._shared.on_exit, time.monotonic())
                 )
-            else:  # Stop, right behind whatever is out of the kernel's reach
+            else:  # Stop, directly after what can no longer be discarded
                 port.write_if_room(self._session.shutdown.broken_off())
-            lines = len(port.descriptors or ())  # of several, some may be there to be stopped
+            lines = len(port.descriptors or ())  # of several, some may be open and need a stop
             stopped = self._shared.stood if self._closing.is_set() else comes_back and lines < 2
             keeper, self._shared.port, self._shared.keeper = self._shared.keeper, None, None
             self._session.closed(time.monotonic())
@@ -192,6 +194,6 @@ class Reader:
         self._outbox.deliver()
 
     def _tell(self, delivery: Delivery) -> None:
-        """The reader's own, of what happened without the lock."""
+        """Deliver an event of the reader that occurred without the lock."""
         self._outbox.put(delivery)
         self._outbox.deliver()

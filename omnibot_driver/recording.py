@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Recorded bytes of a port in place of a port: ``replay://bag?speed=10`` reads a rosbag2.
+"""Recorded bytes in place of a port: ``replay://bag?speed=10`` reads a rosbag2.
 
-Knows the URL and the library rosbags, which reads bags without ROS. Must not know when the bytes
-are needed, nor what they mean.
+This module knows the URL and the library rosbags, which reads bags without ROS. It must not know
+when the bytes are needed, or what they mean.
 """
 
 import math
@@ -23,10 +23,10 @@ RAW_NAME: Final = "/raw_rx"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording from one bag, a folder or a single file: a topic for each channel.
+    """A recording in one bag, a folder or a single file, with one topic for each channel.
 
-    ``speed``: factor of the playback speed, infinity for as fast as can be; ``delay_s``: until it
-    begins.
+    ``speed`` is the factor of the playback speed; infinity plays as fast as possible. ``delay_s``
+    is the time until playback begins, in s.
     """
 
     path: Path
@@ -35,7 +35,7 @@ class Recording:
     delay_s: float = 5.0
 
     def chunks(self) -> Iterator[tuple[int, Packet]]:
-        """When something came in, in ns of the recorder's time, and what. Raises LinkError."""
+        """Yield each packet, after its time in ns of the recorder's clock. Raises LinkError."""
         try:
             from rosbags.rosbag2 import Reader
             from rosbags.typesys import Stores, get_typestore
@@ -46,21 +46,21 @@ class Recording:
                 for source, at_ns, message in bag.messages(wanted):
                     content: Any = types.deserialize_cdr(message, RAW_TYPE)
                     yield at_ns, (self.topics.index(source.topic), content.data.tobytes())
-        except Exception as error:  # whatever a damaged bag makes the library stumble over
+        except Exception as error:  # a damaged bag can raise any exception
             raise LinkError(
                 f"the recording {self.path} cannot be read any further: {error}"
             ) from error
 
 
 def is_recording(url: str) -> bool:
-    """Whether the URL is of a recording."""
+    """Return whether the URL is that of a recording."""
     return url.lower().startswith(SCHEME)
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """The recording that a URL means, of a board with these channels.
+    """Return the recording that a URL means, of a board with these channels.
 
-    Raises ParameterError, which says what is wrong with it.
+    Raises ParameterError, which says what is wrong with the URL or the bag.
     """
     location, _, query = url[len(SCHEME) :].partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
@@ -87,7 +87,7 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
     try:
         with Reader(path) as bag:
             raw = sorted({item.topic for item in bag.connections if item.msgtype == RAW_TYPE})
-    except Exception as error:  # rosbags raises whatever it stumbles over
+    except Exception as error:  # rosbags can raise any exception
         raise _refusal(url, f"{path} is not a readable bag: {error}") from error
     names = [f"/{name}" if name else "" for name in channels]
     found = {

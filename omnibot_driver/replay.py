@@ -1,11 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A recorded wire fed to a session: what a `Link` is to a port, this is to a recording.
+"""A session fed from a recording: the counterpart of `Link` for recorded bytes.
 
-The only clock is the recording's. The session hears each chunk of bytes at the time at which it
-came in then, and is ticked when it asks to be, so what it says depends on nothing but the
-recording: not on this machine, not on how fast the recording is played. What it wants written
-goes nowhere.
+The only clock is the recording's. The session gets each chunk of bytes at the time at which it was
+received, and is ticked when it asks to be. Its output therefore depends on the recording alone, and
+not on this machine or on the playback speed. The bytes that it wants written are discarded.
 """
 
 import threading
@@ -24,7 +23,7 @@ from omnibot_driver.recording import Recording
 
 JOIN_TIMEOUT_S: Final = 1.0
 SHORTEST_STEP_S: Final = 0.001
-"""Between two ticks of the session, whatever it asks for."""
+"""Shortest time between two ticks of the session, in s, whatever it asks for."""
 
 T = TypeVar("T")
 
@@ -32,10 +31,10 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    ``deliver`` gets the session's events and the time of day, in ns, at which its time is zero;
-    ``refused`` the reason why a command was not obeyed; ``report`` gets None when the recording
-    begins. They are called one at a time, in the order in which it happened. ``failed`` gets the
-    exception that ended the thread, which nothing but a defect can do.
+    ``deliver`` gets the session's events and the time of day, in ns, at which the session's time is
+    zero. ``refused`` gets the reason why a command was refused. ``report`` gets None when the
+    recording begins. They are called one at a time, in the order of the events. ``failed`` gets the
+    exception that ended the thread, which only a defect can cause.
     """
 
     def __init__(
@@ -62,11 +61,11 @@ class Replay:
         self._thread = threading.Thread(target=self._guard, name="omnibot-replay", daemon=True)
 
     def start(self) -> None:
-        """Begin to play, after the recording's delay."""
+        """Begin to play after the recording's delay."""
         self._thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Call this action with the session and the present time of the recording."""
+        """Call ``action`` with the session and the present time of the recording, in s."""
         try:
             with self._lock:
                 try:
@@ -81,17 +80,20 @@ class Replay:
 
     @property
     def blocked(self) -> bool:
-        """Always empty: nothing is written, so nothing blocks."""
+        """Always False, because nothing is written."""
         return False
 
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, _sent_ns: Sequence[int]
     ) -> None:
-        """Run ``call``. It moves no robot."""
+        """Pass a command to the session by ``call``. It does not move a robot."""
         self.call(lambda session, now: action(session, wish, now))
 
     def close(self, _on_exit: OnExit) -> bool:
-        """End the thread. A second call does nothing. There is no robot to stop."""
+        """End the thread. Return False, because a recording has no robot to stop.
+
+        A second call does nothing.
+        """
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join(JOIN_TIMEOUT_S)
@@ -123,7 +125,7 @@ class Replay:
         self._tell(partial(self._deliver, [Notice(end)], self._epoch_ns))
 
     def _run_until(self, end_s: float) -> bool:
-        """Let the time pass, with everything that falls due in it; False when it is cut short."""
+        """Let the time pass and do what falls due in it; return False if ``close`` cut it short."""
         while (due_s := self._due()) < end_s:
             if not self._pass(due_s):
                 return False

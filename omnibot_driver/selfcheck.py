@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What can be seen of the driver's surroundings, and should be set otherwise.
+"""Advice on surroundings of the driver that can be observed and should be set differently.
 
-The adapter of an open port, the clock, nodes of the same name. Reads sysfs; knows no pyserial, no
-ROS, no board. What stands in the way of opening a port, its permissions among it, ``transports``
-says.
+It checks the adapter of an open port, the clock, and nodes of the same name. It reads sysfs, and
+knows no pyserial, no ROS and no board. Obstacles to opening a port, such as its permissions, are
+reported by ``transports``.
 """
 
 from collections.abc import Iterable
@@ -15,19 +15,20 @@ from omnibot_driver.core.timing import clock_fit
 
 SYSFS: Final = Path("/sys")
 LONGEST_LATENCY_MS: Final = 5
-"""Half a tick of the board. FTDI's default is 16 ms, its least 1 ms."""
+"""Longest acceptable latency timer, in ms: half a tick of the board. FTDI's default is 16 ms, its
+minimum 1 ms."""
 RECORDING: Final = "replay://"
 WITHOUT_CLOCK: Final = ("sim://", RECORDING)
-"""Ports that no real robot is behind."""
+"""URL schemes of ports without a real robot."""
 
 
 def core_kind() -> str:
-    """Whether the part of the core that can be compiled is: ``compiled`` or ``interpreted``."""
+    """Return ``compiled`` or ``interpreted``, for the part of the core that can be compiled."""
     return "interpreted" if clock_fit.__file__.endswith(".py") else "compiled"
 
 
 def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
-    """A warning about the adapter's latency timer; empty if it is short, or there is none."""
+    """Return a warning about the adapter's latency timer; empty if it is short or absent."""
     device = Path(port).resolve().name
     try:
         text = (sysfs / "class/tty" / device / "device/latency_timer").read_text(encoding="ascii")
@@ -44,7 +45,7 @@ def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
 
 
 def clock_advice(port: str, use_sim_time: bool) -> str:
-    """A warning about simulated time on a port that keeps real time; empty if there is none."""
+    """Return a warning about simulated time on a port that keeps real time; otherwise empty."""
     if not use_sim_time or port.startswith(WITHOUT_CLOCK):
         return ""
     return (
@@ -54,7 +55,7 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
 
 
 def waiting_advice(port: str, now_ns: int) -> str:
-    """A warning that the node's clock has not begun; a recording has stamps of its own."""
+    """Return a warning if the node's clock has not begun; a recording has stamps of its own."""
     if now_ns or port.startswith(RECORDING):
         return ""
     return (
@@ -64,7 +65,7 @@ def waiting_advice(port: str, now_ns: int) -> str:
 
 
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
-    """A warning that another node of this full name publishes on this node's topic."""
+    """Return a warning if another node of this full name publishes on this node's topic."""
     names = [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in publishers]
     if names.count(name) < 2:
         return ""

@@ -24,7 +24,10 @@ from omnibot_driver.replay import Replay
 
 
 class Services:
-    """``calibration_file``: where a measured bias is kept; nowhere if empty."""
+    """The services of one node, without those that only one board has.
+
+    ``calibration_file`` is where a measured bias is saved; if empty, it is not saved.
+    """
 
     def __init__(
         self, node: Node, link: Link | Replay, traits: Traits, calibration_file: str
@@ -99,7 +102,7 @@ class Services:
         return response
 
     async def _save(self, file: Path, bias: list[float], response: Trigger.Response) -> None:
-        """Runs on its own thread, since a slow disk must not delay other callbacks."""
+        """Save the bias on a thread of its own: a slow disk must not delay other callbacks."""
         answer = Future()
 
         def save() -> None:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One session and the port that is open, shared by threads: one lock, and one order for all.
+"""One session and its open port, shared by threads: one lock, and one order of all events.
 
-Each input ends with ``settle``: what is due is written, the guard knows what stops the board now,
-and what there is to tell has its place in the outbox. Starts no thread and opens no port.
+Each input ends with ``settle``: what is due is written, the guard gets the present stop command,
+and the events are queued in the outbox. This module starts no thread and opens no port.
 """
 
 import math
@@ -29,12 +29,12 @@ T = TypeVar("T")
 
 
 class SharedSession:
-    """Hold ``lock`` to use anything but ``call``, ``command`` and ``blocked``.
+    """A session, its open port, and the lock that protects both.
 
-    ``changed`` is its condition.
-
-    ``port`` and ``keeper`` are those of the open port, if there is one; ``write_error`` is why it
-    takes nothing any more. ``deliver``, ``refused`` and ``on_write`` are the link's.
+    Hold ``lock`` to use anything but ``call``, ``command`` and ``blocked``. ``changed`` is a
+    condition on this lock. ``port`` and ``keeper`` are those of the open port, or None.
+    ``write_error`` is the error after which nothing more is written to the port. ``deliver``,
+    ``refused`` and ``on_write`` are the link's.
     """
 
     def __init__(
@@ -53,21 +53,21 @@ class SharedSession:
         self.keeper: Keeper | None = None
         self.sent_bytes = 0
         self.leaving = False
-        """The link is about to end..."""
+        """Whether the link is about to end."""
         self.on_exit: OnExit = "stop"
-        """... in this way..."""
+        """State in which the link leaves the board when it ends."""
         self.stood = False
-        """... and the robot was seen to stand."""
+        """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()
-        """No thread is to go on."""
+        """Set when all threads are to end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write
         self._stall_detector = StallDetector()
         self._pacing_until = self._beat_at = -math.inf
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Do something with the session; what it has to say is on the wire before this returns.
+        """Call ``action`` with the session; what it sends is written before this returns.
 
-        What comes of it is delivered by another thread.
+        The events that result are delivered by another thread.
         """
         try:
             with self.lock:
@@ -83,10 +83,11 @@ class SharedSession:
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
     ) -> None:
-        """``call`` with a wish, which was sent at one of these times of day, as far as is known.
+        """Pass ``wish``, the motion that a sender wants, to the session by ``action``.
 
-        Raises CommandRefused for a wish that waited while this process was stalled. Every refusal
-        is delivered as well, in its place among the events.
+        ``sent_ns`` are the possible times of day, in ns, at which it was sent. Raises
+        CommandRefused for a wish that waited while this process was stalled. Each refusal is also
+        delivered, in its place among the events, unless the outbox is full.
         """
         try:
             with self.lock:
@@ -109,15 +110,15 @@ class SharedSession:
 
     @property
     def blocked(self) -> bool:
-        """Whether the port did not accept the last packets, and is opened anew.
+        """Whether the port did not accept the last packets and is to be opened again.
 
-        Only for a moment: the reader that opens it is awake already.
+        This lasts only a moment: the reader that opens the port is already awake.
         """
         with self.lock:
             return self.write_error is not None
 
     def settle(self) -> None:
-        """Write what is due, queue what there is to tell, wake a pacer that sleeps too long."""
+        """Write what is due, queue the events, and wake the pacer if it would sleep too long."""
         packets = self.session.take_output(time.monotonic())
         self.tell_guard()
         if packets:
@@ -128,7 +129,7 @@ class SharedSession:
             self.outbox.put(partial(self._deliver, events))
 
     def write(self, packets: Packets) -> None:
-        """To the open port; if it fails, the reader opens it anew."""
+        """Write packets to the open port; if that fails, the reader opens the port again."""
         if not packets or self.port is None or self.write_error is not None:
             return
         try:
@@ -143,14 +144,14 @@ class SharedSession:
                     self.outbox.put(partial(self._on_write, packet))
 
     def tell_guard(self) -> None:
-        """Tell the guard what stops the board now, if that has changed."""
+        """Send the guard the present stop commands of the board if they have changed."""
         if (keeper := self.keeper) is None:
             return
         if (words := self.session.board.last_words()) != keeper.last_words:
             keeper.change(*words)
 
     def pace(self) -> None:
-        """One pass of the pacer: do what is due, or sleep until then."""
+        """Run the pacer once: do what is due, or sleep until something is due."""
         now = time.monotonic()
         self._pacing_until = min(self.session.wake_at, self._beat_at)
         if now < self._pacing_until:
@@ -162,7 +163,7 @@ class SharedSession:
             self.settle()
 
     def heed_stall(self) -> bool:
-        """Stop the robot if this process was stalled; whether it was."""
+        """Stop the robot if this process was stalled; return whether it was."""
         return self._heed_stall(boot_time_s())
 
     def _heed_stall(self, boot_s: float) -> bool:
@@ -172,7 +173,7 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """The pacer, and so the watchdog, is alive."""
+        """Note that the pacer, and so the watchdog, is alive; send the guard its heartbeat."""
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)
         self._stall_detector.passed(boot_s, time.time_ns())

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Did this process stand still? SIGSTOP, a swapped-out or suspended host, a thread that hangs.
+"""Detection of stalls of this process: SIGSTOP, a swapped-out or suspended host, a hanging thread.
 
-While it did, its watchdog did too, and commands went on arriving for it. So when it runs again,
-nothing that was sent meanwhile is still a command. This module gets the time and whether the
-watchdog's thread runs; it knows no threads and no commands. Its time is ``boot_time_s``.
+During a stall the watchdog does not run either, and commands keep arriving. When the process runs
+again, nothing that was sent meanwhile may be obeyed. This module gets the time, and calls that show
+that the watchdog's thread runs. It knows no threads and no commands. Its time is ``boot_time_s``.
 """
 
 import math
@@ -12,30 +12,32 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""A thread that should pass ten times a second has not passed for this time. It is less than the
-guard's limit: whenever the guard steps in, this is noticed as well."""
+"""Shortest stall, in s: a thread that should pass ten times a second has not passed for this time.
+It is less than the guard's limit, so whenever the guard acts, the stall is noticed as well."""
 SETTLE_S: Final = 0.25
-"""What comes so soon after a standstill had been waiting, whatever the sender's clock says. What
-was sent so soon after it may have been sent a little before: a sender's clock is known roughly."""
+"""Time after a stall, in s, in which whatever arrives had been waiting, whatever the sender's clock
+says. A command with a send time in it may have been sent a little before: a sender's clock is known
+only roughly."""
 LATEST_S: Final = 10.0
-"""Nothing is under way for longer, retransmissions included. What seems to have been sent earlier
-has a sender whose clock is wrong."""
+"""Longest time in transit, in s, retransmissions included. A command that seems to have been sent
+earlier has a sender whose clock is wrong."""
 
 
 def boot_time_s() -> float:
-    """A steady clock that also counts the time for which the host was suspended."""
+    """Return a steady time in s that includes the time for which the host was suspended."""
     return boot_time_ns() / 1e9
 
 
 def boot_time_ns() -> int:
-    """The same in ns."""
+    """Return the time of ``boot_time_s`` in ns."""
     return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 class StallDetector:
-    """``passed`` by the watchdog's thread, ``begun`` by every thread before it does something.
+    """The state of the present stall and the end of the last one.
 
-    ``outlived_by`` is never true of what ``begun`` would tell.
+    The watchdog's thread calls ``passed``; every thread calls ``begun`` before it acts.
+    ``outlived_by`` is never True while ``begun`` would report a stall.
     """
 
     def __init__(self) -> None:
@@ -45,7 +47,7 @@ class StallDetector:
         self._from_ns = self._until_ns = 0
 
     def begun(self, now: float) -> float:
-        """Its length in seconds so far, once for each standstill; otherwise 0."""
+        """Return the length of a stall so far, in s, once for each stall; otherwise 0."""
         length_s = now - self._passed_at
         if self._begun or length_s < STANDSTILL_S:
             return 0.0
@@ -53,18 +55,19 @@ class StallDetector:
         return length_s
 
     def passed(self, now: float, wall_ns: int) -> None:
-        """Note that the watchdog's thread runs; ``wall_ns`` is the time of day."""
+        """Note that the watchdog's thread runs; ``wall_ns`` is the time of day in ns."""
         if self._begun:
             self._begun = False
-            if now >= self._over_at + LATEST_S:  # else commands of the last one are still under way
+            if now >= self._over_at + LATEST_S:  # else commands of the last are still in transit
                 self._from_ns = wall_ns - _ns(now - self._passed_at + LATEST_S)
             self._over_at = now
             self._until_ns = wall_ns + _ns(SETTLE_S)
         self._passed_at = now
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
-        """A command that was sent at this time of day, as far as is known, is not from before its
-        end.
+        """Return whether a command is not from before the end of a stall, as far as is known.
+
+        ``sent_ns`` is the time of day at which it was sent.
         """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False

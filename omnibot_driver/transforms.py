@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``/tf`` where tf2_ros is installed; elsewhere a warning, and the robot drives without it."""
+"""The publisher of ``/tf`` where tf2_ros is installed; elsewhere a warning instead of it."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -15,7 +15,7 @@ MISSING: Final = (
 
 
 def transform_publisher(node: Node) -> Callable[[TransformStamped], Any] | None:
-    """A function that publishes a transform; None, with a warning, without tf2_ros."""
+    """Return a function that publishes a transform; None, with a warning, without tf2_ros."""
     try:
         from tf2_ros import TransformBroadcaster
     except ImportError as error:

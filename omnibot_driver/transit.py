@@ -1,20 +1,22 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How long a command without a stamp was under way, by the time at which the middleware sent it.
+"""Transit time of a command without a stamp, from the time at which the middleware sent it.
 
-The sender's clock may be off by any amount, so a delay shows only against other messages: of a
-sender's messages, the one that came with the smallest difference between our clock and its clock
-was under way for the shortest time, and tells how far the two clocks are apart. What is above that
-is delay. Time that a message waited in this process is known exactly, by our own clock.
+The sender's clock may be off by any amount, so a delay shows only in comparison with other
+messages. Of a sender's messages, the one with the smallest difference between our clock and its
+clock was in transit for the shortest time. That difference is taken as the offset of the two
+clocks; the excess of any other message is its delay. The time that a message waited in this process
+is known exactly, by our own clock.
 
-Clocks step. Ours is looked at twice, as time of day and as a steady clock: a step of the time of
-day that our senders share (one host, or NTP everywhere) shows in the second alone, a step of ours
-in the first alone, and the smaller delay counts. A sender whose clock is set back by itself seems
-to be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``, the smallest
-difference among those counts. A delay that lasts as long looks the same.
+Clocks step. Ours is read twice, as time of day and as a steady clock. A step of the time of day
+that our senders share (one host, or NTP everywhere) shows in the steady difference alone, a step of
+ours in the time of day alone, and the smaller delay is used. A sender whose clock alone is set back
+seems to be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``, the
+smallest difference among those becomes its offset. A real delay that lasts as long looks the same.
 
-Middleware numbers the messages of each sender. It does not say who sent one, but a number that is
-not above a sender's last one is another sender's. This module reads no clock and knows no ROS.
+The middleware numbers the messages of each sender. It does not report who sent one, but a number
+that is not above a sender's last one belongs to another sender. This module reads no clock and
+knows no ROS.
 """
 
 import math
@@ -25,28 +27,30 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Messages that are further apart are not said to have been late all the time."""
+"""Longest pause, in s, between messages that are regarded as late without interruption."""
 LARGEST_DRIFT: Final = 5e-4
-"""Of two clocks: a crystal is off by a tenth of this, NTP corrects a clock at most at this rate."""
+"""Largest drift between two clocks, in s/s: a crystal is off by a tenth of this, NTP corrects a
+clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which an early message is less likely to be a sender's than one that is
-late by as much."""
+"""Factor by which an early message is less likely to be a sender's than one that is late by the
+same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages of which one was hardly delayed. The first of a sender may all have been: then
-those that come sooner seem to have been sent later than they were."""
+"""Number of messages after which at least one of a sender's was hardly delayed. Earlier, all may
+have been delayed; then later ones that arrive sooner seem to have been sent later than they were.
+"""
 
 Differences = tuple[float, float]
-"""Our clock less a sender's when its message came in, in s: by the time of day, and steady."""
+"""Our clock minus a sender's when its message arrived, in s: time of day, and steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
-    """One message.
+    """One message and its times, in ns.
 
-    ``sent_ns``: time of day by its sender's clock; ``received_ns``: by ours, when it came in;
-    ``now_ns``: by ours, now; ``steady_ns``: by a steady clock, now. ``number`` counts its sender's
-    messages; None where the middleware does not.
+    ``sent_ns`` is the time of day by its sender's clock. ``received_ns`` is the time of day by ours
+    when it came in, ``now_ns`` the present one, and ``steady_ns`` the present time of a steady
+    clock. ``number`` counts its sender's messages; None where the middleware does not.
     """
 
     sent_ns: int
@@ -58,10 +62,10 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """How old a message is: ``total_s`` since it was sent, ``waited_s`` of it in our own queue.
+    """The age of a message: ``total_s`` since it was sent, ``waited_s`` of it in our own queue.
 
-    ``sent_ns``: when it was sent, by our time of day. There are two possible times until enough
-    messages of its sender have come.
+    ``sent_ns`` is when it was sent, by our time of day. It has two possible values until enough
+    messages of its sender have arrived.
     """
 
     total_s: float
@@ -69,7 +73,7 @@ class Delay:
     sent_ns: tuple[int, ...] = ()
 
     def require(self, topic: str, longest_s: float) -> None:
-        """Raises CommandRefused for a command that was under way for longer."""
+        """Raise CommandRefused if the command is older than ``longest_s``."""
         if self.total_s <= longest_s:
             return
         if 2 * self.waited_s > self.total_s:
@@ -92,9 +96,9 @@ class Transit:
         self._senders: list[_Sender] = []
 
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
-        """How long this message was under way; one above ``longest_s`` counts as late.
+        """Return the delay of this message; one above ``longest_s`` is regarded as late.
 
-        The first of each sender is taken to have no delay.
+        The first message of each sender is taken to have no delay.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
@@ -124,7 +128,7 @@ class Transit:
 
 
 class _Sender:
-    """One of those on a topic, and its clock by both of ours."""
+    """One sender on a topic, and its clock compared with both of ours."""
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
         self.number: int | None = None
@@ -136,7 +140,7 @@ class _Sender:
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
-        """How unlikely it is that this sender sent a message, compared with others."""
+        """Return how unlikely it is that this sender sent a message, for comparison with others."""
         late_s = min(
             offset.late_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)
@@ -144,7 +148,7 @@ class _Sender:
         return late_s if late_s >= 0.0 else -CLOCK_RETREATS * late_s
 
     def hear(self, differences_s: Differences, at_s: float, longest_s: float) -> float:
-        """Note a message and return its delay."""
+        """Note a message and return its delay in s."""
         self.heard += 1
         return min(
             offset.hear(difference_s, at_s, longest_s)
@@ -153,7 +157,7 @@ class _Sender:
 
 
 class _Offset:
-    """Between one of our clocks and a sender's: the smallest difference of its messages."""
+    """The offset of one of our clocks from a sender's: the smallest difference of its messages."""
 
     def __init__(self, difference_s: float, at_s: float) -> None:
         self._least_s, self._least_at_s = difference_s, at_s
@@ -161,12 +165,12 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """The difference above the smallest one; negative for one below it."""
+        """Return the excess over the smallest difference and its drift, in s; may be negative."""
         drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
         return difference_s - self._least_s - drift_s
 
     def hear(self, difference_s: float, at_s: float, longest_s: float) -> float:
-        """Learn from a message; for how long it was under way."""
+        """Learn from a message and return its delay in s."""
         late_s = self.late_s(difference_s, at_s)
         if late_s > longest_s:
             return self._hear_late(difference_s, at_s, late_s)

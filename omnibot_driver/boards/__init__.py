@@ -2,8 +2,9 @@
 
 """The boards that the driver works with: a profile of each, imported when it is chosen.
 
-A profile is the one place where a board meets the shell around the core: its parameters, and what
-makes it of their values. The rest of the driver knows no board.
+A profile is the only place where a board meets the part of the driver outside the core. It has the
+board's parameters, and makes the board's objects from their values. The rest of the driver knows no
+board.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,49 +24,50 @@ PROFILES: Final = {
     "mart": "omnibot_driver.boards.mart",
     "fejemis": "omnibot_driver.boards.fejemis",
 }
-"""By the value of the parameter ``board``: the module that is its profile."""
+"""Modules of the profiles, by the value of the parameter ``board``."""
 DEFAULT: Final = "omnibot"
 
 Publish = Callable[[Any, int], None]
-"""Publishes a value of the board's own kind that was measured at this stamp, in ns of ROS time."""
+"""Function that publishes a value of the board's own kind; its stamp is in ns of ROS time."""
 
 
 class Profile(Protocol):
     """The functions and values of a board's profile, which is a module."""
 
     SIMULATOR: str
-    """The package of its simulated board, to be imported where it is used."""
+    """Package of the simulated board, to be imported where it is used."""
 
     PARAMETERS: Table
-    """All that can be set."""
+    """All parameters of the board."""
 
     def make(self, values: Mapping[str, Any]) -> Board:
-        """A board with these checked parameter values."""
+        """Return a board with these checked parameter values."""
 
     def settings(self, values: Mapping[str, Any]) -> object:
-        """The new value of ``Board.settings`` when parameters change."""
+        """Return the new value of ``Board.settings`` after parameters have changed."""
 
     def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
-        """A function that opens the real line."""
+        """Return a function that opens the real line."""
 
     def kinematics(self, values: Mapping[str, Any]) -> Kinematics:
-        """The wheels, by checked values."""
+        """Return the kinematics of the wheels, from checked values."""
 
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
-        """Make what only this board has: publishers, services and inputs on the node.
+        """Create what only this board has: publishers, services and inputs on the node.
 
-        Returns who publishes each type of value that comes as an ``Extra``. The link's ``call`` and
-        ``command`` reach the session. Called once, on the executor's thread, before bytes come.
+        Returns the function that publishes each type of value that comes as an ``Extra``. The
+        link's ``call`` and ``command`` reach the session. Called once, on the executor's thread,
+        before bytes arrive.
         """
 
 
 def load(name: str) -> Profile:
-    """The profile of one of ``PROFILES``."""
+    """Return the profile with this name in ``PROFILES``."""
     return cast(Profile, import_module(PROFILES[name]))
 
 
 def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transport]:
-    """A function that opens the line, or a simulated board where ``port`` says so."""
+    """Return a function that opens the line, or a simulated board if ``port`` is ``sim://``."""
     port = str(values["port"])
     if not port.lower().startswith("sim://"):
         return profile.opener(values)
@@ -74,16 +76,16 @@ def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transpor
 
 
 def table_for(given: Mapping[str, object]) -> Table:
-    """The parameters of the board that is given, or of the usual one. Raises ParameterError."""
+    """Return the parameters of the given board, or of the default one. Raises ParameterError."""
     name = given.get("board", DEFAULT)
     chosen = Parameter("board", DEFAULT, "", "", choices=tuple(PROFILES)).check(name)
     return load(str(chosen)).PARAMETERS
 
 
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
-    """Every parameter's value, for the board that is given. Raises ParameterError.
+    """Return every parameter's value, for the given board. Raises ParameterError.
 
-    A parameter of another board is refused by that board's name, an unknown one with the nearest.
+    The error names the boards that have the parameter, or the nearest name if none has it.
     """
     table = table_for(given)
     for name in given:
@@ -96,5 +98,5 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
 
 
 def owners_of(parameter: str) -> list[str]:
-    """Names of the boards that have this parameter."""
+    """Return the names of the boards that have this parameter."""
     return [name for name in PROFILES if parameter in load(name).PARAMETERS.by_name]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis sweeping robot: its parameters, and what makes it of them."""
+"""Profile of the Fejemis sweeping robot: its parameters, and what is made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -25,9 +25,9 @@ from omnibot_driver.transports.several import Several
 
 SIMULATOR: Final = "omnibot_driver.simulator.fejemis"
 USB_BAUDRATE: Final = 115200
-"""A USB port has a speed of its own, whatever this is."""
+"""Baud rate that is set; a USB port has a speed of its own, whatever this is."""
 WHEEL_RADIUS_M, TRACK_M, WHEELBASE_M = 0.0775, 0.4, 0.42
-"""Where the user gives none: the manual has the track alone."""
+"""Sizes that are used where the user gives none; the manual has the track alone."""
 PARAMETERS: Final = table(
     "fejemis",
     TRAITS,
@@ -50,12 +50,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> FejemisBoard:
-    """The pair, nothing of which is heard yet."""
+    """Return the pair of boards, from which nothing has been received yet."""
     return FejemisBoard(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> FejemisSettings:
-    """What its wire does not tell, by checked values."""
+    """Return the settings that the wire does not reveal, from checked values."""
     wheels = kinematics(values)
     return FejemisSettings(
         track_m=wheels.track_m,
@@ -71,7 +71,7 @@ def settings(values: Mapping[str, Any]) -> FejemisSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
-    """Two devices; each may be missing alone."""
+    """Return a function that opens both devices; each may be missing alone."""
     return partial(
         Several,
         [partial(SerialPort, values[name], USB_BAUDRATE, name) for name in ("port", "front_port")],
@@ -79,7 +79,7 @@ def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
 
 
 def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
-    """Left and right, and the distance of the steered wheel; usual sizes where none are given."""
+    """Return two driving wheels and a steered one, with default sizes where none are given."""
     radii_m = values["wheel_radii"] or [WHEEL_RADIUS_M]
     return SteeredKinematics(
         wheel_radius_m=sum(radii_m) / len(radii_m),
@@ -89,7 +89,11 @@ def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Steering joint, orientation, field, battery, ranges; brush, lift, light; jobs."""
+    """Create this board's own topics and services, and return its publishing functions.
+
+    They are the steering joint, orientation, magnetic field, battery, ranges; brush, lift, light;
+    and jobs.
+    """
     from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS
 
     publish: Mapping[type, Any] = FejemisTopics(node, link, values).publish

@@ -2,7 +2,8 @@
 
 """The parameters that a Fejemis has and other boards need not have. Knows no ROS.
 
-What the two Teensys keep by themselves is unset: it is written only where the user gives a value.
+What the two Teensys keep by themselves is unset by default: it is written only if the user gives a
+value.
 """
 
 import math
@@ -15,7 +16,7 @@ from omnibot_driver.core.fejemis import Written
 from omnibot_driver.parameters import Parameter
 
 MOST_GAINS: Final = 17
-"""As ``cpsteer`` lists them."""
+"""Number of gains that ``cpsteer`` lists."""
 
 FRONT_PORT: Final = (
     Parameter(
@@ -213,7 +214,7 @@ SENSORS: Final = (
 
 
 def written(values: Mapping[str, Any]) -> dict[Written, tuple[float, ...]]:
-    """What the user wants on the boards, in the units of the boards."""
+    """Return the settings that the user wants written to the boards, in the boards' units."""
     found: dict[Written, tuple[float, ...]] = {}
     radii_m, track_m = values["wheel_radii"], values["track"]
     if radii_m is not None:
@@ -242,7 +243,7 @@ _WHEELS: Final = ("wheel_radii", "gear", "encoder_ticks")
 
 
 def require_two_ports(values: Mapping[str, Any]) -> None:
-    """A robot with one Teensey twice would be half a robot."""
+    """Reject one device for both Teensys, since the robot needs both of them."""
     port, front = (str(values[name]) for name in ("port", "front_port"))
     if port == front or (port.startswith("/") and _same(port, front)):
         raise ParameterError(
@@ -252,7 +253,7 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
 
 
 def require_whole_settings(values: Mapping[str, Any]) -> None:
-    """What a board takes with one command is set together."""
+    """Reject a part of the values that a board takes with one command."""
     _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
     _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")
     offset = ("front_wheel_offset", "front_wheel_inverted")

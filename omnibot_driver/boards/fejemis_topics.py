@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What only a Fejemis has, as topics and services. Wires only."""
+"""Topics and services that only a Fejemis has. They only connect ROS to the session."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -35,7 +35,8 @@ from omnibot_driver.core.session import Session
 NAN: Final = float("nan")
 WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
-"""The angle comes 66 times a second; joint states are for eyes."""
+"""Shortest time between two published steering angles, in ns. The angle comes 66 times a second;
+joint states are for display."""
 RANGES: Final = {
     "tof": Range.INFRARED,
     "sonar": Range.ULTRASOUND,
@@ -52,7 +53,7 @@ SERVICES: Final = {
 
 
 class FejemisTopics:
-    """``publish``: who publishes each type of value."""
+    """The board's own topics and services; ``publish`` has the publishing functions by type."""
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -221,7 +222,10 @@ class FejemisTopics:
             self._warn(trouble)
 
     def _say(self, what: str, action: Callable[[Services, float], None], *, needed: bool) -> str:
-        """Why it was not said; ``needed``: it moves something, so the robot has to be nominal."""
+        """Call ``action``; return the reason if it was refused, or an empty string.
+
+        ``needed``: the action moves something, so the robot has to be nominal and without e-stop.
+        """
 
         def say(session: Session, now: float) -> str:
             if session.state in ("disconnected", "connecting"):
@@ -244,7 +248,7 @@ class FejemisTopics:
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:
-    """The one that the driver has on any board."""
+    """Return the node's publisher of this topic, which the driver has on any board."""
     name = node.resolve_topic_name(topic)
     return next(one for one in node.publishers if one.topic_name == name)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU: its parameters, and what makes it of them."""
+"""Profile of the LOIS ECU: its parameters, and what is made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -53,12 +53,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> LoisEcuBoard:
-    """The board, nothing of which is heard yet."""
+    """Return the board, from which nothing has been received yet."""
     return LoisEcuBoard(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
-    """The settings that the wire does not reveal, from checked values."""
+    """Return the settings that the wire does not reveal, from checked values."""
     wheels = kinematics(values)
     return LoisEcuSettings(
         wheel_radius_m=wheels.wheel_radius_m,
@@ -85,12 +85,12 @@ def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
-    """A device, or any URL that pyserial knows."""
+    """Return a function that opens a device, or any URL that pyserial knows."""
     return partial(SerialPort, values["port"], values["baudrate"])
 
 
 def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
-    """Left and right, of the sizes that calibration found."""
+    """Return a left and a right wheel, with the sizes that calibration found."""
     linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
     return DifferentialKinematics(
         wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]
@@ -98,7 +98,10 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Fix, time, heading, button; LED and balls; duties."""
+    """Create this board's own topics and services, and return its publishing functions.
+
+    They are the GPS fix, GPS time, heading, e-stop button; LED and balls; and duties.
+    """
     from omnibot_driver.boards.lois_ecu_topics import LoisEcuTopics  # needs ROS
 
     publish: Mapping[type, Any] = LoisEcuTopics(node, link, values).publish

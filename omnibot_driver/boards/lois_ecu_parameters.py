@@ -2,7 +2,7 @@
 
 """The parameters that the LOIS ECU has and other boards need not have. Knows no ROS.
 
-What the board keeps by itself is unset: it is written only where the user gives a value.
+What the board keeps by itself is unset by default: it is written only if the user gives a value.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Lines of 14 characters; the compass takes 34 of them in a second."""
+"""Largest rate of commands in a terminal mode, in Hz: lines of 14 characters, of which the compass
+takes 34 in a second."""
 
 WHEELS: Final = (
     Parameter(
@@ -158,7 +159,7 @@ _RANGES: Final = {
     "long_correction": (0.1, 10.0),
     "feed_forward": (0.0, 1000.0),
 }
-"""A wheel runs away with a negative gain, and the controller divides by Tn."""
+"""Allowed values: a negative gain makes a wheel run away, and the controller divides by Tn."""
 
 
 def _setting(name: str, what: str) -> Parameter:
@@ -178,7 +179,7 @@ def _setting(name: str, what: str) -> Parameter:
 SETTINGS: Final[Mapping[str, Setting]] = {
     f"{setting.name.lower()}": setting for setting in Setting if setting != Setting.RPM_LOW_PASS
 }
-"""By the name of its parameter."""
+"""Settings that the board keeps, by the name of the parameter."""
 _WORDS: Final = {
     "kp": "Gain Kp of the {} wheel's speed controller",
     "tn": "Integral time Tn of the {} wheel's speed controller, in s",
@@ -200,7 +201,7 @@ PERIODS: Final[Mapping[str, Stream]] = {
     "time_period": Stream.GPS_TIME,
     "date_period": Stream.GPS_DATE,
 }
-"""By the name of its parameter."""
+"""Messages that the board sends periodically, by the name of the parameter."""
 
 
 def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
@@ -228,7 +229,7 @@ SENT: Final = (
 
 
 def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
-    """One setting of the board chooses both, so without checksum there is no terminal mode."""
+    """Reject a terminal mode without checksum, since one setting of the board chooses both."""
     if values["terminal_mode"] != "host" and not values["checksum"]:
         raise ParameterError(
             "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"
@@ -237,7 +238,10 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
-    """Stop goes out at ``command_rate``, and the board passes it on to a sensor of 4800 baud."""
+    """Reject a command rate that is too high for a terminal mode.
+
+    Stop is sent at ``command_rate``, and the board passes it on to a sensor of 4800 baud.
+    """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(
             f"parameter 'command_rate' must be at most {MOST_TERMINAL_RATE_HZ:g} Hz in a"
@@ -247,7 +251,10 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_possible_periods(values: Mapping[str, Any]) -> None:
-    """Period 0 makes the public firmware deaf, so the shortest ones are refused."""
+    """Reject periods below ``SHORTEST_PERIOD_S``, and a period of ticks above 0.5 s or off.
+
+    A period of 0 would make the public firmware deaf to commands.
+    """
     for name in PERIODS:
         period_s = values[name]
         if period_s and period_s < SHORTEST_PERIOD_S:

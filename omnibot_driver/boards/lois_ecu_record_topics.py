@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The services that make the LOIS ECU record, each answered when its file is there. Wires only."""
+"""Services that make the LOIS ECU record; each is answered when its file is written.
+
+They only connect ROS to the session.
+"""
 
 import threading
 import time
@@ -31,7 +34,11 @@ NAMES: Final = {
 
 
 class Recorder:
-    """``values``: asked for the parameters of the moment; ``publish``: who receives the result."""
+    """The record services of one node.
+
+    ``values`` returns the present parameter values. ``publish`` has the functions that receive each
+    type of result.
+    """
 
     def __init__(self, node: Node, link: Any, values: Callable[[], Mapping[str, Any]]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -39,7 +46,7 @@ class Recorder:
         self.publish: dict[type, Callable[[Any, int], None]] = {
             RecordReading: self._on_record,
             RecordFailed: self._on_failed,
-            RecordComes: lambda _comes, _stamp_ns: None,  # that it counts as heard is enough
+            RecordComes: lambda _comes, _stamp_ns: None,  # its arrival alone matters
         }
         waiting = ReentrantCallbackGroup()
         for kind in RecordKind:

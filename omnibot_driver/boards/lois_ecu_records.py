@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A record of the LOIS ECU as a CSV file: whole under its final name, or not at all.
+"""A record of the LOIS ECU as a CSV file: complete under its final name, or not at all.
 
-Knows what was recorded and files. Knows no ROS and no lines.
+This module knows what was recorded, and files. It knows no ROS and no lines of the board.
 """
 
 import contextlib
@@ -19,17 +19,17 @@ from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.readings import RecordReading
 
 SATURATED: Final = 0xFFFF
-"""A tick that took longer than its word can tell."""
+"""Count of a tick that took longer than 16 bits can hold."""
 
 Row = tuple[object, ...]
 
 
 def table(reading: RecordReading) -> Iterator[Row]:
-    """The header, then one row for each sample; what is unknown is empty.
+    """Yield the header, then one row for each sample; an unknown value is empty.
 
-    RPM: time from tick to tick in s, and the speed that it means, besides the board's own counts.
-    Torque: counts of a 12 bit ADC, whose scale the board does not tell. Heading: degrees clockwise
-    from magnetic north.
+    RPM: time from tick to tick in s, and the speed calculated from it, besides the board's own
+    counts. Torque: counts of a 12 bit ADC, whose scale the board does not report. Heading: degrees
+    clockwise from magnetic north.
     """
     record = reading.record
     if record.kind is RecordKind.HEADING:
@@ -57,7 +57,7 @@ def table(reading: RecordReading) -> Iterator[Row]:
 
 
 def remark(reading: RecordReading) -> str:
-    """A sentence on the limits of the file; empty if there are none."""
+    """Return a sentence on the limits of the file; empty without such limits."""
     if reading.record.kind is not RecordKind.RPM:
         return ""
     if reading.count_s is None:
@@ -70,12 +70,15 @@ def remark(reading: RecordReading) -> str:
 
 
 def file_name(kind: RecordKind, at_s: float) -> str:
-    """File name of a record that ended at this time, in s of UTC since 1970."""
+    """Return the file name of a record that ended at this time, in s of UTC since 1970."""
     return f"{kind.value}_{datetime.fromtimestamp(at_s, UTC):%Y%m%dT%H%M%S_%f}.csv"
 
 
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
-    """Whether it is there: it is left out where it is not ``wanted`` any more. Raises OSError."""
+    """Write the file; return False, without a file, if it is not ``wanted`` any more.
+
+    Raises OSError.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)
     try:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What only the LOIS ECU has, as topics and services. Wires only."""
+"""Topics and services that only the LOIS ECU has. They only connect ROS to the session."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final, cast
@@ -29,7 +29,8 @@ from omnibot_driver.core.session import Session
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 FIX_VARIANCE_M2: Final = 0.4**2
-"""Of a longitude as a float32; a GPS knows its place less well, but the board does not say how."""
+"""Variance of a float32 longitude, in m². The GPS position is less accurate, but the board does not
+report its accuracy."""
 GPS_VARIANCE_M2: Final = 5.0**2
 ABSENT: Final = [-1.0] + [0.0] * 8
 TERMINAL_DEPTH: Final = 100
@@ -41,7 +42,7 @@ NOT_HEARD: Final = "no data from the board; connect it and switch it on, then ca
 
 
 class LoisEcuTopics:
-    """``publish``: who publishes each type of value."""
+    """The board's own topics and services; ``publish`` has the publishing functions by type."""
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -74,7 +75,10 @@ class LoisEcuTopics:
         self._make_what_the_modes_need()
 
     def _make_what_the_modes_need(self) -> None:
-        """Absent means absent: on the executor's thread."""
+        """Create the topics of the present modes; remove ``duty_cmd`` outside of duty mode.
+
+        Runs on the executor's thread.
+        """
         duty, terminal = (
             self._values["drive_mode"] == "duty",
             self._values["terminal_mode"] != "host",
@@ -171,7 +175,7 @@ class LoisEcuTopics:
             self._node.get_logger().warning(str(error), throttle_duration_sec=2.0)
 
     def _drive(self, session: Session, duties: list[float], now: float) -> None:
-        """Percent, as the rates of wheels that the board's settings make this duty of again."""
+        """Command duties in percent, as wheel rates that the board's settings turn into them."""
         require_finite("duty_cmd", duties)
         if len(duties) != 2:
             raise CommandRefused(

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART motion controller: its parameters, and what makes it of them."""
+"""Profile of the MART motion controller: its parameters, and what is made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -43,12 +43,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> MartBoard:
-    """The board, nothing of which is heard yet."""
+    """Return the board, from which nothing has been received yet."""
     return MartBoard(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> MartSettings:
-    """The settings that the wire does not reveal, from checked values."""
+    """Return the settings that the wire does not reveal, from checked values."""
     wheels = kinematics(values)
     sign = -1 if values["encoder_inverted"] else 1
     return MartSettings(
@@ -69,12 +69,12 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], UdpPorts]:
-    """The command port, and the stop port above it."""
+    """Return a function that opens the command port, and the stop port one above it."""
     return partial(UdpPorts, values["port"], len(TRAITS.channels))
 
 
 def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
-    """Left and right, of the sizes that calibration found."""
+    """Return a left and a right wheel, with the sizes that calibration found."""
     linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
     return DifferentialKinematics(
         wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]
@@ -82,7 +82,10 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Battery, sonars, dock; gyro bias, docking, log and downloads."""
+    """Create this board's own topics and services, and return its publishing functions.
+
+    They are the battery, sonars, dock; gyro bias, docking, log and downloads.
+    """
     from omnibot_driver.boards.mart_topics import MartTopics  # needs ROS
 
     publish: Mapping[type, Any] = MartTopics(node, link, values).publish

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What only the MART controller has, as topics and services. Wires only."""
+"""Topics and services that only the MART controller has. They only connect ROS to the session."""
 
 import math
 import threading
@@ -41,7 +41,7 @@ NOT_READY: Final = (
 
 
 class MartTopics:
-    """``publish``: who publishes each type of value."""
+    """The board's own topics and services; ``publish`` has the publishing functions by type."""
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -146,7 +146,10 @@ class MartTopics:
         return done
 
     async def _save(self, done: JobDone) -> tuple[bool, str]:
-        """Write the file on a thread of its own, since a disk may be slow."""
+        """Write the file on a thread of its own, since a disk may be slow.
+
+        Returns whether it succeeded, and the message for the caller.
+        """
         answer = Future()
         directory = Path(self._values["record_directory"]).expanduser()
         path = (directory / PurePosixPath(done.name).name).absolute()
@@ -176,7 +179,10 @@ class MartTopics:
             self._timer.cancel()
 
     def _set_time(self) -> None:
-        """Set the clock once, at a proved standstill: the server integrates its gyro by it."""
+        """Set the controller's clock once, at a proved standstill.
+
+        The controller integrates its gyro by this clock.
+        """
         utc = time.gmtime()
         fields = (utc.tm_mon, utc.tm_mday, utc.tm_year, utc.tm_hour, utc.tm_min, utc.tm_sec)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Neuron OmniBot: its parameters, and what makes it of them."""
+"""Profile of the Neuron OmniBot: its parameters, and what is made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -23,12 +23,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> OmniBot:
-    """The board, nothing of which is heard yet."""
+    """Return the board, from which nothing has been received yet."""
     return OmniBot(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """The settings that the wire does not reveal, from checked values."""
+    """Return the settings that the wire does not reveal, from checked values."""
     return OmniBotSettings(
         baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],
@@ -46,15 +46,15 @@ def settings(values: Mapping[str, Any]) -> OmniBotSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
-    """A device, or any URL that pyserial knows."""
+    """Return a function that opens a device, or any URL that pyserial knows."""
     return partial(SerialPort, values["port"], values["baudrate"])
 
 
 def kinematics(values: Mapping[str, Any]) -> OmniKinematics:
-    """The kinematics of wheels A, B and C."""
+    """Return the kinematics of wheels A, B and C."""
     return OmniKinematics(values["wheel_radius"], values["base_radius"])
 
 
 def extras(_node: Any, _link: Any, _values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """No extras: this board has no topics or services of its own."""
+    """Return nothing, since this board has no topics or services of its own."""
     return {}

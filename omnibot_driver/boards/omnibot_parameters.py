@@ -133,7 +133,10 @@ OMNIBOT: Final = (
 
 
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
-    """Reject signs that no mirror has, as they leave positions without meaning."""
+    """Reject axis signs with which a goal pose has no consistent meaning.
+
+    Mirroring x or y alone also reverses yaw, so the sign of yaw must be that of x times that of y.
+    """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:
         raise ParameterError(

@@ -2,6 +2,6 @@
 
 """The driver without ROS, ports, threads or clocks: bytes and times in, values out.
 
-Everything in here is a pure function of its arguments. What is common to all boards lives in this
-package, what is known of one board in a package of its own below it.
+Nothing in here does input or output. This package holds what all boards have in common; each board
+has a package of its own below it.
 """

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What any motor board offers a driver: the seam at which further boards join.
+"""The interface between the driver and a motor board: what to implement to add a board.
 
-Readings are what a board measured, in SI units, with no trace of its bytes. A ``Board`` turns bytes
-into readings and requests into bytes, keeps the belief about the board's mode, and makes the
-actuator that says orders. It knows no ROS, no port and no clock.
+A ``Board`` decodes bytes into readings (measurements in SI units, without a trace of the bytes) and
+encodes requests as packets. It tracks the mode that the board seems to be in, and makes the
+actuator that encodes motion orders. It does not know ROS or ports, and reads no clock: every
+``now`` is the host's steady time, in s.
 """
 
 import math
@@ -21,7 +22,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class Mode(Enum):
-    """The mode of the board, as its data shows; the value is its public name."""
+    """The mode of the board as its data shows it; the value is its public name."""
 
     UNKNOWN = "connecting"
     PAUSED = "paused"
@@ -36,18 +37,21 @@ class Mode(Enum):
 
 
 RateName = Literal["IMU", "Odometry", "Pose"]
-"""A kind of reading, as it is called in diagnostics."""
+"""Name of a kind of reading in the diagnostics."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardFigures:
-    """What a board's translator counts, since the driver began.
+    """Counters and states of a board for the diagnostics, over all connections.
 
-    ``rates_hz``: how often each kind of reading should come that the board sends; ``faults``: how
-    often the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit;
-    ``odom_hz``: how often ``odom`` goes out, where that is not with each odometry reading;
-    ``own``: what only this board has to show (its version, voltage, progress), by names for people;
-    ``trouble``: why the robot cannot be driven, in a sentence; empty if it can.
+    * ``rates_hz``: expected rate of each kind of reading that the board sends.
+    * ``trouble``: why the robot cannot be driven, as a sentence; empty if it can.
+    * ``faults``: how often the framing was lost.
+    * ``discarded_bytes``: bytes that belong to no valid frame.
+    * ``saturated``: commands that exceeded the range of the board's encoding.
+    * ``odom_hz``: rate at which ``odom`` is published, or None if that is once per odometry
+      reading.
+    * ``own``: figures that only this board has (version, voltage, progress), by readable names.
     """
 
     rates_hz: Mapping[RateName, float] = field(default_factory=dict)
@@ -60,105 +64,132 @@ class BoardFigures:
 
 
 class ReadingClock(Protocol):
-    """What stamps the readings of a board, in s of the host's steady clock."""
+    """A clock that stamps a board's readings, in s of the host's steady clock."""
 
     @property
     def skew_ppm(self) -> float:
-        """How much faster the board's clock runs than ours."""
+        """Rate error of the board's clock in ppm; positive if it is faster than the host's."""
 
     def restart(self) -> None:
-        """What the board does from here on has nothing to do with what it did before."""
+        """Forget the stream so far: what the board sends next is unrelated to it."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Of the readings that ``Board.receive`` or ``elapse`` has just told, in their order."""
+        """Return the stamps of all readings of one ``Board.receive`` or ``elapse``, in their order.
+
+        ``now`` is when they arrived; ``edge`` is ``Board.edge`` after that call.
+        """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """``stamps`` of one that came alone; None, and nothing is changed, where it is not sure."""
+        """Return the stamp of a reading that arrived alone, as a faster ``stamps``.
+
+        Return None, and change nothing, if the stamp is uncertain; ``stamps`` is then called
+        instead.
+        """
 
 
 class Board(Protocol):
-    """One kind of board. Requests raise RequestRefused where the mode forbids them.
+    """One kind of board: the translator between its bytes and the rest of the driver.
 
-    What has a body here is what a board does that has nothing to say to it.
+    Implement every method that has only a docstring here. The others are optional: their default
+    suits a board that has nothing to do there. Requests raise RequestRefused where the present mode
+    forbids them.
     """
 
     traits: Traits
-    """What it has and can do."""
+    """Capabilities of this kind of board."""
 
     settings: Any
-    """What its wire does not tell, in values of its own kind; may be replaced at any time."""
+    """Settings of this board that its data does not reveal; may be replaced at any time."""
 
     clock: ReadingClock | None = None
-    """What stamps its readings, where they carry the board's time; None: ticks, or arrival."""
+    """Clock for readings that carry the board's time, or None to stamp by IMU tick or arrival."""
 
     @property
     def mode(self) -> Mode:
-        """The present belief."""
+        """Mode that the board is believed to be in."""
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """The place where the last read ended.
+        """Where the last read ended among the IMU samples; an input of ``clock``.
 
-        None while the framing is in doubt, or without news.
+        None while the framing is uncertain, or if the read shows nothing new about it.
         """
         return None
 
     @property
     def figures(self) -> BoardFigures:
-        """Counters for the person who maintains the line."""
+        """Counters and states for the diagnostics."""
         return BoardFigures()
 
     @property
     def advice(self) -> str | None:
-        """Advice on settings that contradict the board's data; None if there is none."""
+        """Advice on settings that contradict the board's data; None without a contradiction."""
         return None
 
     @property
     def refusal(self) -> str:
-        """The reason why motion is refused, with a remedy; empty if it is allowed."""
+        """Reason why motion is refused, with a remedy; empty if it is allowed.
+
+        A command to stand still is never refused for this reason.
+        """
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Advice on the settings by a specific force at rest; empty if it is gravity."""
+        """Return advice on the settings if the specific force at rest, in m/s², is not gravity.
+
+        Empty if it is.
+        """
         return ""
 
     def connect(self) -> None:
-        """Begin a new connection: forget all held bytes and beliefs."""
+        """Begin a new connection: forget the mode, and all bytes and conclusions of the old one."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Decode bytes; returns the readings that they complete, in order, and updates ``mode``."""
+        """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
+
+        ``now`` is when the bytes arrived. A reading may complete with a later call than the one
+        that brings its last byte, if the board has to wait for evidence that it is valid.
+        """
 
     def flush(self, now: float) -> list[Reading]:
-        """The line is closed: return what the held bytes still prove."""
+        """Return the readings that the held bytes still prove, as the line is closed."""
         return []
 
     def silence(self) -> None:
-        """Forget the mode, as the board has been silent for too long."""
+        """Forget the mode, as the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
-        """This process did not run for a while: the guard may have switched off what turned."""
+        """Note that this process stalled: the guard may have sent what stops the board.
+
+        The guard is the process that sends ``last_words`` when this one hangs. Motors other than
+        the wheels, such as a brush, may then be off as well.
+        """
         return
 
     @property
     def wake_at(self) -> float:
-        """The time at which ``due`` must be called again; infinity if the board needs no calls."""
+        """Time at which ``due`` and ``elapse`` must be called again, in s; infinity if never."""
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """What keeps the board talking and is not a command: subscriptions, polls, relays.
+        """Return the packets that are due besides commands: subscriptions, polls, relayed values.
 
-        It counts as written.
+        The caller writes them, so regard them as written. Called when ``wake_at`` has come.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """The readings that follow from elapsed time; called when ``wake_at`` has come."""
+        """Return the readings that follow from elapsed time; called when ``wake_at`` has come.
+
+        If all of them are OdometryReadings or NoticeReadings, the board may still be silent. Any
+        other reading shows that it is alive.
+        """
         return []
 
     def leave(self) -> None:
-        """The driver ends: from now on ``due`` has nothing that is not needed for a stop."""
+        """Prepare for the end of the driver: from now on ``due`` returns only what a stop needs."""
         return
 
     def reset_odometry(self) -> None:
@@ -166,46 +197,56 @@ class Board(Protocol):
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether its displacements can currently prove a standstill."""
+        """Whether the board's displacements can currently prove that the robot stands still."""
         return True
 
     def actuator(self, proof: StopProof) -> Actuator:
-        """The part that encodes orders and reports stops and motions to ``proof``. Made once."""
+        """Return the part that encodes motion orders; called once.
+
+        It reports each stop and each motion that it sends to ``proof``.
+        """
 
     def wake(self) -> Packets:
-        """The bytes that wake a board in any state, end a partial command and stop the wheels."""
+        """Return the packets that wake the board, end a partial command and stop the wheels.
+
+        They must work in any state of the board.
+        """
 
     def start(self) -> Packets:
-        """Make the board run, whatever its mode is; harmless to repeat."""
+        """Return the packets that make the board run, whatever its mode is; harmless to repeat."""
         return NO_PACKETS
 
     def pause(self) -> Packets:
-        """Pause a running board. Refused when it is not known to run."""
+        """Return the packets that pause a running board.
+
+        Raise RequestRefused if a pause toggles and the board is not known to run.
+        """
         return NO_PACKETS
 
     def force_pause(self) -> Packets:
-        """Pause, whatever it did before and whatever of ours is still on the way to it."""
+        """Return the packets that pause the board in any mode, even with commands in flight."""
         return NO_PACKETS
 
     def reset(self) -> Packets:
-        """Reboot; the mode is unknown until the board is heard again."""
+        """Return the packets that reboot the board; its mode is then unknown until data arrives."""
         return NO_PACKETS
 
     def stop(self) -> Packets:
-        """Stand still. Where it depends on what the robot does: as it is now."""
+        """Return the packets that stop the robot; they may depend on its present motion."""
 
     def emergency_stop(self) -> Packets:
-        """The board's own emergency stop, and nothing else."""
+        """Return only the board's own emergency stop, without a Stop after it."""
         return NO_PACKETS
 
     def switch_off(self) -> Packets:
-        """What else to switch off when the driver ends, behind Stop and what ``on_exit`` says."""
+        """Return what else to switch off at the end, after Stop and the ``on_exit`` request."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """What stops it now if this process cannot: as Stop, and as the emergency stop.
+        """Return what the guard sends if this process fails: Stop, and emergency stop with Stop.
 
-        Asked after each input and before each output, for a board where they follow its state.
+        The second one is sent while the e-stop is latched. Called after each input and before each
+        output, because what stops a board may depend on its state.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -2,8 +2,9 @@
 
 """The exceptions of the driver, all of them, in one tree.
 
-Bytes that came from a board never raise; they are counted. These are raised for what *we* or our
-users ask for and cannot have. Each message says what is wrong and what to do next.
+Bytes from a board never raise an exception; invalid ones are counted. An exception means that the
+driver or its user asked for something impossible. Each message says what is wrong and what to do
+next.
 """
 
 
@@ -12,19 +13,19 @@ class OmniBotError(Exception):
 
 
 class FrameError(OmniBotError):
-    """Bytes that are not the one whole frame they were said to be, or values no frame can hold."""
+    """Bytes that are not exactly one frame of the expected kind, or values that do not fit one."""
 
 
 class RequestRefused(OmniBotError):
-    """A request that the board's present mode, or another request under way, does not allow."""
+    """A request that the board's present mode, or another request in progress, does not allow."""
 
 
 class CommandRefused(OmniBotError):
-    """A motion command that will not be carried out. It has no effect."""
+    """A motion command that is rejected; it has no effect."""
 
 
 class LinkError(OmniBotError):
-    """The port cannot be opened, read or written just now."""
+    """A port that cannot be opened, read or written at the moment."""
 
 
 class ParameterError(OmniBotError):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Events that a session returns: values only."""
+"""The events that a session returns: values without behaviour."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from omnibot_driver.core.requests import RequestDone
 
 @dataclass(frozen=True, slots=True)
 class StateChanged:
-    """``Session.state`` or ``Session.estop_active`` is another than before: what they are now."""
+    """A change of ``Session.state`` or ``Session.estop_active``, with the new value of both."""
 
     state: str
     estop_active: bool
@@ -26,9 +26,9 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Extra:
-    """Something that this board alone measures: any value of a type that its profile publishes.
+    """A measurement that only this board makes, of any type that the board's profile can publish.
 
-    ``stamp_s``: when it was measured.
+    ``stamp_s``: time of measurement, in s of the host's steady clock.
     """
 
     value: object

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From what the board says, or what time alone makes known, to measurements and events.
+"""The inbound path: from bytes of the board, or elapsed time, to measurements and events.
 
-``hear`` gives what is to be published at once, and ``process`` what comes of the rest: checked
-displacements, a mode that has changed, answers, figures. Composes the board, what is measured, and
-what stops the robot; must not know bytes, nor what is commanded.
+``hear`` returns what must be published at once. ``process`` handles the rest: checked
+displacements, mode changes, answers and figures. This module composes the board, the measurements
+and the safety stops. It must not know bytes, nor what is commanded.
 """
 
 from omnibot_driver.core.board import Board
@@ -19,7 +19,7 @@ from omnibot_driver.core.safety import SafetyStops
 
 
 class Inbound:
-    """Feeds ``measurement`` and ``safety``; events go to ``reporter``."""
+    """The inbound path of a session: feeds ``measurement`` and ``safety``, adds to ``reporter``."""
 
     def __init__(
         self,
@@ -35,7 +35,7 @@ class Inbound:
         self._measurement, self._commanding = measurement, commanding
         self._liveness, self._reporter, self._safety = liveness, reporter, safety
         self._last: Reading | None = None
-        """Of those that were heard and not processed yet."""
+        """Last of the readings that ``hear`` has decoded and ``process`` has not handled yet."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
         """Process bytes that arrived at ``now``."""
@@ -43,11 +43,11 @@ class Inbound:
         self.process(now)
 
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
-        """``receive``, but for what can wait until these are published: ``process`` is to follow.
+        """Return what must be published at once; ``process`` must follow and handles the rest.
 
-        A command that arrives in between is handled as if it came before the bytes. That must not
-        be where they change the mode, so there nothing waits; nor does it where anything else is
-        asked for.
+        A command that arrives between both calls is handled as if it came before the bytes. This
+        would be wrong if the bytes change the mode, so this method then does everything at once and
+        returns an empty list. All other requests call ``process`` first.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -65,7 +65,7 @@ class Inbound:
         return []
 
     def process(self, now: float) -> bool:
-        """What comes of the bytes that were heard last. False: nothing to write or to tell."""
+        """Handle the bytes received last; return False if nothing is left to write or report."""
         last, self._last = self._last, None
         if (
             now < self._reporter.news_at
@@ -90,7 +90,7 @@ class Inbound:
         return True
 
     def elapse(self, now: float) -> None:
-        """What becomes known without bytes; odometry that is predicted does not count as heard."""
+        """Process what follows from time alone; predicted odometry does not prove liveness."""
         before = self._board.mode
         readings = self._board.elapse(now)
         self._reporter.events += self._measurement.hear(readings, now)
@@ -103,7 +103,7 @@ class Inbound:
             self._safety.set_out(now)
 
     def end(self, now: float) -> None:
-        """What the board has said so far is all, as the port is lost."""
+        """Process the remaining readings, as the port is lost."""
         if readings := self._board.flush(now):
             self._last = readings[-1]
         self._reporter.events += self._measurement.hear(readings, now)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a board is asked for and takes long to do, such as a record: one at a time.
+"""Long tasks of a board, such as a recording: one at a time.
 
-It ends when the board or its task says so, with a failure when its time is over, and at once when
-the robot is stopped, the e-stop is latched, or the board is lost. Knows times and sentences, not
-what is done.
+A task ends when the board or its owner reports so, and fails when its time limit has passed. It
+fails at once if the robot is stopped, the e-stop is latched, or the board is lost. This module
+knows times and sentences, not what a task does.
 """
 
 import math
@@ -14,8 +14,10 @@ from omnibot_driver.core.requests import RequestDone
 
 
 class LongTask:
-    """``answers``: those that were not taken yet; ``wake_at``: when ``tick`` has something to do,
-    infinity while none is under way.
+    """The task in progress, if any.
+
+    ``answers``: answers that the session has not taken yet. ``wake_at``: when ``tick`` must be
+    called, in s; infinity without a task.
     """
 
     def __init__(self) -> None:
@@ -27,13 +29,13 @@ class LongTask:
 
     @property
     def active(self) -> bool:
-        """Whether a task is running."""
+        """Whether a task is in progress."""
         return self.wake_at < math.inf
 
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Begin a task.
+        """Begin a task that may take ``limit_s``; ``token`` identifies it in the answer.
 
-        ``name`` reads well after "a". Raises RequestRefused while another one runs.
+        ``name`` must read well after "a". Raises RequestRefused if another task is in progress.
         """
         if self.active:
             raise RequestRefused(
@@ -43,34 +45,34 @@ class LongTask:
         self._begun_at, self.wake_at = now, now + limit_s
 
     def is_current(self, token: object) -> bool:
-        """Whether the task with this token is running."""
+        """Return whether the task with this token is in progress."""
         return self.active and self._token is token
 
     def end(self, token: object, success: bool, message: str) -> None:
-        """End the task as done or failed. No effect if it has ended before."""
+        """End the task as done or failed; no effect if it has ended before."""
         if self.is_current(token):
             self.answers.append(RequestDone(token, success, message))
             self._token, self._begun_at, self.wake_at = None, math.inf, math.inf
 
     def give_up(self, reason: str) -> None:
-        """Fail the task with a reason. No effect without a task."""
+        """Fail the task with a reason; no effect without a task."""
         if self.active:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 
     def watch(self, *, driven: bool) -> None:
-        """Note whether the robot is commanded to move now: a stop ends the task."""
+        """Note whether the robot is commanded to move; the task fails when a motion ends."""
         if self._driven and not driven:
             self.give_up("the robot was stopped meanwhile; call again")
         self._driven = driven
 
     def tick(self, now: float) -> None:
-        """Time passed."""
+        """Fail the task if its time limit has passed."""
         if now >= self.wake_at:
             limit_s = self.wake_at - self._begun_at
             self.give_up(f"the board did not complete it within {limit_s:g} s")
 
     def progress(self, now: float) -> str:
-        """The name of the running task, and its start; empty without one."""
+        """Return the task's name, elapsed time and limit as text; empty without a task."""
         if not self.active:
             return ""
         limit_s = self.wake_at - self._begun_at

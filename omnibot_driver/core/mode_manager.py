@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bringing the board into the wanted mode, and believing only what is heard afterwards.
+"""Requests for a mode of the board: start, pause and reset, repeated until its data confirms them.
 
-A letter may be lost, P toggles, and a board that boots swallows what it hears first. So a request
-is a small conversation: say it, wait for bytes that came in later and show it done, say it again
-after a while, give up by a deadline with a sentence. One request is under way at a time. This
-module knows no bytes and reads no clock.
+The single-letter commands (S, P, R) may be lost, P toggles, and a board that boots drops what it
+receives first. So each request is a short exchange. Send the command, wait for later data that
+shows the result, send it again after a while, and fail with a sentence at a deadline. One request
+is in progress at a time. This module knows no bytes and reads no clock.
 """
 
 import math
@@ -19,21 +19,23 @@ from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Longer than the second between two notices: data for this time without a notice means that P, or
-R, was lost."""
+"""Longer than the second between two notices of a paused board: data for this time without a notice
+means that P, or R, was lost."""
 FLOWING_S: Final = 0.1
-"""Data comes every 10 ms; a longer time without any does not count as data."""
+"""Longest time between two receptions that is added to the time for which data has flowed; a
+running board sends every 10 ms."""
 IN_FLIGHT_S: Final = 0.1
-"""A notice that comes sooner than this after a letter may have been sent before it was obeyed; and
-one that is followed by data within this time does not show that the board is paused."""
+"""Time for which a command or a notice may still be in flight. A notice that arrives sooner after a
+command may have been sent before the board obeyed. A notice that is followed by data within this
+time does not show that the board is paused."""
 LAST_STOPS: Final = 3
-"""Number of copies sent at once when the port is about to be closed: one may be lost."""
+"""Number of copies of Stop sent at once before the port is closed, since one may be lost."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
 
 
 class Phase(Enum):
-    """The conversation with the board; motion commands are accepted only in SETTLED."""
+    """The state of the exchange with the board; motion is accepted only in SETTLED."""
 
     CLOSED = "not connected"
     SETTLED = "settled"
@@ -43,7 +45,7 @@ class Phase(Enum):
 
 
 class Wanted(Enum):
-    """The mode that the board should be in; it outlives ports, boards and failures."""
+    """The mode that the board should be in; kept across ports, boards and failures."""
 
     ANY = "as it is"
     RUNNING = "running"
@@ -53,11 +55,16 @@ class Wanted(Enum):
 CLOSED: Final = Phase.CLOSED
 SETTLED: Final = Phase.SETTLED
 PAUSED: Final = Wanted.PAUSED
-"""For what is asked with every read: Python 3.11 looks for a member of an Enum by a function."""
+"""Constants for the checks of every read: Python 3.11 looks an Enum member up by a function
+call."""
 
 
 class ModeManager:
-    """``run``: whether the board is to run whenever it is there; otherwise it stays as it is."""
+    """The requested and the confirmed mode of a board.
+
+    ``run``: whether to start the board whenever it is connected; otherwise it stays as it is.
+    ``answers``: answers to requests that the session has not taken yet.
+    """
 
     def __init__(self, board: Board, *, run: bool) -> None:
         self.phase = Phase.CLOSED
@@ -65,7 +72,7 @@ class ModeManager:
         self._board = board
         self._wanted = Wanted.RUNNING if run else Wanted.ANY
         self.output: Packets = NO_PACKETS
-        """What to write now, before anything else; see ``take_output``."""
+        """Packets to write before any others; see ``take_output``."""
         self._said_at = self._data_at = -math.inf
         self._flowed_s = 0.0
         self._paused_with_p = self._was_running = False
@@ -75,13 +82,13 @@ class ModeManager:
         self._deadline = math.inf
 
     def take_output(self) -> Packets:
-        """The packets to write now, before anything else."""
+        """Return the packets to write before any others, and regard them as written."""
         packets, self.output = self.output, NO_PACKETS
         return packets
 
     @property
     def wake_at(self) -> float:
-        """The time at which ``tick`` has something to do."""
+        """Time at which ``tick`` must be called, in s; infinity if never."""
         if self.phase is SETTLED:
             return self._deadline
         next_at = math.inf
@@ -102,7 +109,10 @@ class ModeManager:
         self._answer(False, "the port was lost meanwhile; call again once it is back")
 
     def request(self, request: Request, token: object, now: float) -> None:
-        """Ask for something; the answer comes in ``answers``. Raises RequestRefused at once."""
+        """Begin a request; its answer appears in ``answers``. Raises RequestRefused at once.
+
+        ``token`` identifies the request in the answer.
+        """
         if self.phase is Phase.CLOSED:
             raise RequestRefused("the port is not open; connect the board, then call again")
         if self._request is not None:
@@ -130,7 +140,7 @@ class ModeManager:
             self._say(self._board.reset(), now)
 
     def heard_paused(self, now: float, *, continues: bool) -> None:
-        """Note that the board is paused; ``continues``: it has not restarted."""
+        """Note that the board is paused; ``continues``: it was before, so it has not restarted."""
         in_flight = now - self._said_at < IN_FLIGHT_S
         running_wanted = self._wanted is Wanted.RUNNING
         if self.phase is Phase.PAUSING:
@@ -138,23 +148,23 @@ class ModeManager:
         elif self.phase is Phase.RESETTING and continues and not in_flight:
             self._say(self._board.reset(), now)
         elif self.phase is Phase.RESETTING and not in_flight:
-            if self._was_running:  # also against a pause that failed
+            if self._was_running:  # even after a pause that failed
                 self._wanted = Wanted.RUNNING
             self._begin(now)
             if self._wanted is not Wanted.RUNNING:
                 self._settle("the board has restarted and is paused, as it was before")
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
-            self._begin(now)  # it has restarted, and may have slept through what was said so far
+            self._begin(now)  # it has restarted, and may have missed all commands so far
 
     def heard_reset(self, now: float, remark: str = "") -> None:
-        """Note that the board has obeyed a reset, except for ``remark``."""
+        """Note that the board has obeyed a reset; ``remark``: what is not proved, as a sentence."""
         if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
             self.output += self._board.wake()
             self._settle(remark or "the board was reset")
 
     @property
     def at_rest(self) -> bool:
-        """Data that goes on coming is nothing to react to."""
+        """Whether continuing data needs no reaction."""
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:
@@ -178,12 +188,12 @@ class ModeManager:
             self._say(self._board.reset(), now)
 
     def heard_nothing(self, now: float) -> None:
-        """Note that the board is silent: it may be rebooting, or be lost."""
+        """Note that the board is silent: it may be rebooting, or disconnected."""
         if self.phase is Phase.SETTLED and self._wanted is Wanted.RUNNING:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Repeat requests that are due, and give up overdue ones."""
+        """Repeat commands that are due, and fail the request that is overdue."""
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")
         elif now >= self._deadline:
@@ -192,7 +202,7 @@ class ModeManager:
             self._say(self._board.start(), now)
 
     def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> Packets:
-        """The last packets to the board, which stops it unless it is ``proved`` to stand."""
+        """Return the last packets to the board; they stop it unless it is ``proved`` to stand."""
         stops = 0 if proved else LAST_STOPS
         return stops * self._board.stop() + self._last_request(on_exit) + self._board.switch_off()
 
@@ -207,7 +217,7 @@ class ModeManager:
         return NO_PACKETS
 
     def _begin(self, now: float) -> None:
-        """Send the opening sequence, without S for a board that should not run."""
+        """Wake the board, and start it if it should run and can be started."""
         self.output += self._board.wake()
         self.phase = Phase.SETTLED
         if self._wanted is Wanted.RUNNING and Request.START in self._board.traits.requests:
@@ -215,7 +225,11 @@ class ModeManager:
             self._say(self._board.start(), now)
 
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
-        """``with_p``: a P may be under way, or the data a mistake; it takes more of it to say P."""
+        """Begin to pause the board.
+
+        ``with_p``: a P may be in flight, or the received data be an error. P is then sent only
+        after data has flowed for ``PAUSE_RETRY_S``, because a second P would resume the board.
+        """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf
         self._flowed_s = 0.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What boards measure, in SI units, with no trace of their bytes: values only."""
+"""Readings: what boards measure, in SI units, without a trace of their bytes."""
 
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -17,7 +17,8 @@ Vector3 = tuple[float, float, float]
 class ImuReading:
     """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
 
-    ``lost`` readings of this kind seem to be missing before it, by what was received of them.
+    ``lost``: number of ImuReadings that seem to be missing before this one, judged by those
+    received.
     """
 
     specific_force: Vector3
@@ -27,11 +28,12 @@ class ImuReading:
 
 @value(frozen=True, slots=True)
 class DisplacementReading:
-    """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
+    """Motion during the last ``duration_s``, in m and rad, in the board's earth or body frame.
 
-    ``duration_s`` is None where it is unknown: the first after a pause holds all motion since.
-    ``restarted``: the board's counters seem to begin anew here, and its earth frame with them.
-    ``measured``: not so where the board is blind, and it is taken from what was commanded.
+    * ``duration_s``: None if unknown: the first displacement after a pause holds all motion since.
+    * ``lost``: number of displacements that are missing before this one.
+    * ``restarted``: the board's counters seem to start again here, and its earth frame with them.
+    * ``measured``: False if the board cannot measure its motion, and this is the commanded one.
     """
 
     dx_m: float
@@ -45,16 +47,16 @@ class DisplacementReading:
 
 
 NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
-"""The board lives, and has told nothing of its motion."""
+"""Placeholder of a board that is alive, but has not reported its motion."""
 
 
 @value(frozen=True, slots=True)
 class PoseReading:
-    """The board's own dead reckoning, in the earth frame it has chosen for itself.
+    """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
-    ``lost`` displacements that it includes are known to be missing before it; they are not counted
-    again by the next displacement. ``restarted``: its counter begins anew, and so did the
-    displacements' some time before.
+    ``lost``: number of displacements that are missing before it although it includes them; the next
+    displacement does not report them again. ``restarted``: the counter of the poses starts again
+    here; that of the displacements did so some time before.
     """
 
     x_m: float
@@ -66,9 +68,9 @@ class PoseReading:
 
 @dataclass(frozen=True, slots=True)
 class PausedReading:
-    """The board said that it is paused (or still initialising).
+    """The board reports that it is paused (or still initialising).
 
-    ``continues``: it has said so just before, so it has not restarted meanwhile.
+    ``continues``: it reported so just before, so it has not restarted in between.
     """
 
     continues: bool = False
@@ -78,9 +80,11 @@ class PausedReading:
 class OdometryReading:
     """The board's own odometry, in a frame that begins where ``Board.reset_odometry`` was called.
 
-    Pose and covariance in that frame at ``stamp_s``, twist in the body's axes with the variances
-    of its speed and its turning. ``rolled``: what the wheels have made of the robot since the board
-    was made, as one tangent; ``rolling`` its rate, None where the board does not tell.
+    * ``pose``, ``covariance``: in that frame, at ``stamp_s``.
+    * ``twist``: in the board's body axes.
+    * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s².
+    * ``rolled``: all motion by the wheels since the board object was made, as one tangent.
+    * ``rolling``: rate of ``rolled``; None while the board does not report it.
     """
 
     stamp_s: float
@@ -103,7 +107,7 @@ class EStopButtonReading:
 class ResetReading:
     """The board shows that it has obeyed a reset.
 
-    ``remark``: what it does not show, in a sentence; empty where all is shown.
+    ``remark``: what remains unproved, as a sentence; empty if everything is proved.
     """
 
     remark: str = ""
@@ -111,9 +115,9 @@ class ResetReading:
 
 @dataclass(frozen=True, slots=True)
 class NoticeReading:
-    """A notice for the user; ``halt``: the robot is to be driven no further.
+    """A notice for the user; ``halt``: the robot must be stopped.
 
-    An empty text: the user already has this notice.
+    An empty text means that the user already has this notice.
     """
 
     text: str
@@ -122,7 +126,7 @@ class NoticeReading:
 
 @dataclass(frozen=True, slots=True)
 class ExtraReading:
-    """Anything else that a board tells: a value of a kind of its own, passed on as it is."""
+    """Any other data of a board: a value of a board-specific type, passed on unchanged."""
 
     content: object
 
@@ -142,12 +146,16 @@ Reading = (
 
 @value(frozen=True, slots=True)
 class SampleBoundary:
-    """Where a read ended among the samples.
+    """Where a read of the port ended in the stream of IMU samples, for the clock that stamps them.
 
-    The beginning of one tells when it was taken better than an end that is delivered late, and what
-    was not there yet tells too. ``ahead``: how many samples after the last ImuReading were in hand
-    (0, 1), the last of them whole or ``cut``. It was to be whole ``latest_s`` after the read, or
-    before; the next one, or the one that was cut, not before ``earliest_s`` after it.
+    The first bytes of a sample show its time better than its delayed last byte, and so does a
+    sample that has not arrived yet.
+
+    * ``ahead``: number of samples (0 or 1) received after the last ImuReading.
+    * ``cut``: that sample is incomplete; otherwise it is complete.
+    * ``latest_s``: the last sample was due to be complete within this time after the read.
+    * ``earliest_s``: the next sample, or the incomplete one, cannot be complete sooner than this
+      time after the read.
     """
 
     ahead: int

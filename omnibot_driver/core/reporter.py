@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a session has to tell: events in their order, notices when they are due, state and figures.
+"""The reports of a session: events in order, notices when they are due, state and figures.
 
-It looks at every part of a session and changes none. Must not know who listens.
+It reads every part of a session and changes none. Must not know who receives the reports.
 """
 
 import math
@@ -20,16 +20,19 @@ from omnibot_driver.core.reporting.figures import SessionFigures
 from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Notices, why_silent
 
 NEWS_EVERY_S: Final = 0.1
-"""News need not be looked for with every read."""
+"""Shortest time between two searches for news, in s; every read would be too often."""
 DISCONNECTED: Final = "disconnected"
 
 
 class Reporter:
-    """``events``: what happened since they were taken; ``news_at``: when to look for news next.
+    """The collector of events, state and figures of a session.
 
-    ``missing``: which lines are, in a sentence; ``overruns``: how often the port has lost bytes
-    since it was opened. ``shown``: the public state
-    and the e-stop as of the last ``take``, so nothing that is only passed through amid an input.
+    * ``events``: events since the last ``take``.
+    * ``news_at``: time of the next ``look_for_news``, in s.
+    * ``missing``: which lines are missing, as a sentence; empty if none.
+    * ``overruns``: how often the port has lost bytes since it was opened.
+    * ``shown``: public state and e-stop as of the last ``take``; a state that lasts only during one
+      input is never shown.
     """
 
     def __init__(
@@ -51,18 +54,18 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """What ``shown`` is made of, which is quicker to look at."""
+        """The values that ``shown`` is computed from, because comparing them is faster."""
 
     @property
     def state(self) -> str:
-        """The public name of the link's and the board's state."""
+        """Public name of the state of the link and the board."""
         if self._mode_manager.phase is CLOSED:
             return DISCONNECTED
         unknown = self.missing or self._mode_manager.phase is Phase.RESETTING
         return str((Mode.UNKNOWN if unknown else self._board.mode).value)
 
     def figures(self, now: float) -> SessionFigures:
-        """All counters and measurements."""
+        """Return all counters and measurements."""
         return SessionFigures(
             state=self.state,
             tally=replace(self._measurement.tally),
@@ -75,12 +78,12 @@ class Reporter:
         )
 
     def notify(self, sentences: Sequence[str]) -> None:
-        """Give the user notices, sentence by sentence."""
+        """Add one notice to the events for each sentence."""
         if sentences:
             self.events += map(Notice, sentences)
 
     def look_for_news(self, now: float) -> None:
-        """Give the user notices that follow from counters and observations."""
+        """Add the notices that follow from counters and observations."""
         self.news_at = now + NEWS_EVERY_S
         notices, measuring, advice = self._notices, self._measurement, self._board.advice
         news = notices.counted(
@@ -94,7 +97,10 @@ class Reporter:
         self.notify(news)
 
     def silent(self, silence_s: float, *, bytes_came: bool) -> None:
-        """No data was understood for this time, which is expected while a line is missing."""
+        """Report that no valid data arrived for ``silence_s``, unless a line is missing.
+
+        ``bytes_came``: whether bytes arrived that could not be decoded.
+        """
         if self.missing:
             return
         self.notify(
@@ -104,13 +110,13 @@ class Reporter:
             self.notify(self._notices.once(advice))
 
     def unconfirmed(self) -> None:
-        """Stop was repeated for its whole time, and nothing showed that the robot stands."""
+        """Report that Stop was repeated for its full time without proof that the robot stands."""
         measured = self._policy.proof.measured
         blind = not self._board.shows_standstill
         self.notify(self._notices.unconfirmed(self._board.mode, measured=measured, blind=blind))
 
     def take(self) -> list[Event]:
-        """Return and forget the events since the last call, in order."""
+        """Return and clear the events since the last call, in order."""
         for answers in (
             self._mode_manager.answers,
             self._calibration.answers,

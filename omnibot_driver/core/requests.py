@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What can be asked of a board besides motion, and the answer: values only."""
+"""Requests to a board besides motion, and the answer to them: values without behaviour."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +10,7 @@ OnExit = Literal["stop", "pause", "reset"]
 
 
 class Request(Enum):
-    """What can be asked of a board; the value reads well after "a"."""
+    """A request to a board; the value must read well after "a"."""
 
     START = "start"
     PAUSE = "pause"
@@ -19,7 +19,7 @@ class Request(Enum):
 
 @dataclass(frozen=True, slots=True)
 class RequestDone:
-    """The answer to a request; ``token`` is what the asker handed in."""
+    """The answer to a request; ``token`` is what the caller passed with the request."""
 
     token: object
     success: bool

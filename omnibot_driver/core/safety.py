@@ -1,12 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What stops the robot at once, whatever the source of its commands: the e-stop, and what its board
-shows.
+"""Safety stops: what stops the robot at once, whatever the source of its commands.
 
-A board that restarts, is paused or is not heard, and a stall of this process, end the command that
-is carried out. Composes what is measured, commanded and wanted of the board, where one of these has
-to follow from another. Must not know bytes, nor who commands. A command that expires is the command
-policy's, a robot that does not obey the motion monitor's.
+A stop follows from the e-stop, from a board that restarts, is paused or falls silent, and from a
+stall of this process. This module composes measurements, commands and requests where one must
+follow from another. Must not know bytes, nor who commands. Two other stops are elsewhere: the
+command policy stops the robot when a command expires, the motion monitor when it does not obey.
 """
 
 from typing import Final
@@ -36,7 +35,7 @@ BUTTON_HELD: Final = (
 
 
 class SafetyStops:
-    """Stops the robot at once when it must. Reports go to ``reporter``."""
+    """The safety stops of a session, reported to ``reporter``."""
 
     def __init__(
         self,
@@ -54,10 +53,10 @@ class SafetyStops:
         self._liveness, self._reporter = liveness, reporter
         self._task = task
         self._button_held = False
-        """By its last event, which may be from before the line was lost."""
+        """State of the e-stop button by its last event, which may be older than the connection."""
 
     def react(self, measured: list[Measured], now: float) -> None:
-        """React to these measurements, in their order."""
+        """React to the measurements, in their order."""
         notify, commanding = self._reporter.notify, self._commanding
         for reading, estimates in measured:
             self._reporter.events += estimates
@@ -71,7 +70,7 @@ class SafetyStops:
             elif isinstance(reading, PausedReading):
                 commanding.begin(now)
                 self._policy.proof.paused()
-                if self._board.mode.running:  # again, within one read
+                if self._board.mode.running:  # it paused and ran again within one read
                     self._policy.halt(now)
                 self._mode_manager.heard_paused(now, continues=reading.continues)
             elif isinstance(reading, EStopButtonReading):
@@ -89,9 +88,10 @@ class SafetyStops:
             notify(commanding.check_goal([], now))
 
     def estop(self, active: bool, now: float, *, by: str) -> str:
-        """Latch or release the e-stop; returns what is so now, in a sentence.
+        """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        Raises RequestRefused for a release while the button on the robot is held.
+        ``by``: who asked, for the notice. Raises RequestRefused for a release while the e-stop
+        button on the robot is held.
         """
         latched = self._policy.latched
         if active:
@@ -118,19 +118,19 @@ class SafetyStops:
         return "e-stop released; robot stopped until the next command"
 
     def set_out(self, now: float) -> None:
-        """Stop the robot, as the board runs again and may carry out an old command."""
+        """Stop the robot, as the board has begun to run and may carry out an old command."""
         self._policy.proof.begin()
         self._policy.halt(now)
 
     def tick(self, now: float) -> None:
-        """React to silence: a short one ends a command, a long one makes the mode unknown."""
+        """React to silence: a short one ends the command, a long one makes the mode unknown."""
         if self._policy.current and self._liveness.unheard(now):
             self._policy.halt(now)
         if not self._liveness.fell_silent(now):
             return
         self.react(self._measurement.release(), now)
         liveness = self._liveness
-        self._reporter.silent(  # a board that lost power leaves a piece of a frame
+        self._reporter.silent(  # a board that loses power leaves a partial frame
             liveness.silence_s,
             bytes_came=liveness.came_at - liveness.heard_at > liveness.silence_s / 2,
         )
@@ -142,7 +142,7 @@ class SafetyStops:
             self._mode_manager.heard_nothing(now)
 
     def stalled(self, seconds: float, now: float) -> None:
-        """This process stalled for ``seconds``: end what was under way and stop the robot."""
+        """Stop the robot and fail the task in progress, as this process stalled for ``seconds``."""
         self._liveness.stalled(now)
         self._task.give_up("the driver stalled meanwhile; call again")
         self._board.stalled()

@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One connection to one board, whole: bytes and wishes in; measurements, answers and bytes out.
+"""A session with one board: bytes and commands in; measurements, answers and packets out.
 
-The shell around it calls an input, then takes ``take_output`` to the port and ``take_events`` to
-its caller, and calls ``tick`` when ``wake_at`` has come. Not thread-safe, reads no clock, does
-not log: whatever a user should hear of is an event.
+The caller calls an input method, then passes ``take_output`` to the port and ``take_events`` to its
+own caller. It calls ``tick`` at ``wake_at``. A session is not thread-safe, reads no clock and does
+not log: everything that a user should know is an event.
 
-It puts its parts together and keeps nothing itself: ``inbound`` takes what the board says,
-``safety`` knows what stops the robot, ``interlocks`` what is refused, ``reporter`` what there is
-to tell, ``shutdown`` the end. Must not know bytes or threads.
+This module puts the parts together and holds no state of its own. ``inbound`` handles what the
+board sends, ``safety`` stops the robot, ``interlocks`` refuses commands, ``reporter`` collects the
+events, ``shutdown`` ends the connection. Must not know bytes or threads.
 """
 
 import math
@@ -39,11 +39,14 @@ from omnibot_driver.core.shutdown import Shutdown
 
 
 class Session:
-    """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
-    x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike;
-    ``control``: where the board's switch stands, which no board tells; None where it has none;
-    ``obeys``: whether the robot can be expected to follow commands, which a recorded one
-    was not.
+    """The driver's core for one board, across all its connections.
+
+    * ``run``: whether to start the board whenever it is connected.
+    * ``axis_signs``: 1 or -1 for x, y and yaw, where the board's body axes differ from REP-103;
+      applied to commands and odometry.
+    * ``control``: position of the board's control switch, which no board reports; None for a board
+      without one.
+    * ``obeys``: whether the robot can be expected to follow commands; False for a recording.
     """
 
     def __init__(
@@ -75,40 +78,40 @@ class Session:
         self.inbound = Inbound(board, modes, measurement, commanding, liveness, reporter, safety)
         self.shutdown = Shutdown(board, modes, self._commands, self._interlocks)
 
-    # What is so
+    # State
 
     @property
     def state(self) -> str:
-        """The public name of the link's and the board's state."""
+        """Public name of the state of the link and the board."""
         return self._reporter.state
 
     @property
     def estop_active(self) -> bool:
-        """The driver's own latch."""
+        """Whether the driver's own e-stop is latched."""
         return self._commands.latched
 
     @property
     def shown(self) -> tuple[str, bool]:
-        """State and e-stop as of the last ``take_events``."""
+        """Public state and e-stop as of the last ``take_events``."""
         return self._reporter.shown
 
     @property
     def refused(self) -> Refused:
-        """Readings rejected as implausible."""
+        """Counts of the readings rejected as implausible."""
         return self._measurement.refused
 
     def figures(self, now: float) -> SessionFigures:
-        """All counters and measurements."""
+        """Return all counters and measurements."""
         return self._reporter.figures(now)
 
     @property
     def gyro_bias(self) -> Vector3:
-        """The bias that is subtracted from the gyro's readings, in rad/s."""
+        """Bias that is subtracted from the gyro's readings, in rad/s."""
         return self._calibration.bias
 
     @property
     def wake_at(self) -> float:
-        """The latest time for the next ``tick``; infinity if nothing is due."""
+        """Latest time for the next ``tick``, in s; infinity if nothing is due."""
         if self._mode_manager.phase is CLOSED:
             return math.inf
         return min(
@@ -120,12 +123,12 @@ class Session:
             self._task.wake_at,
         )
 
-    # What happens
+    # Inputs of the link and of time
 
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
-        """New settings, from the next command and frame on; stricter ones end the present one.
+        """Apply new settings from the next command and frame on; stricter ones stop the robot.
 
-        ``board``: new settings of the board's own, in which the present command is said as well.
+        ``board``: new settings of the board itself; the current command is encoded again with them.
         """
         self._reporter.notify(self._commanding.configure(settings, now))
         if board is not None:
@@ -134,9 +137,10 @@ class Session:
         self._measurement.configure(settings)
 
     def opened(self, now: float, *, missing: str = "") -> None:
-        """Begin with an open port. ``missing``: a sentence on the lines that are not open.
+        """Begin with an open port; ``missing`` names the lines that are not open, as a sentence.
 
-        A robot that receives only a part of its commands is stopped, and not driven.
+        While a line is missing the robot is stopped and not driven, as it would receive only a part
+        of its commands.
         """
         self._board.connect()
         self._commanding.begin(now)
@@ -161,7 +165,7 @@ class Session:
         self._reporter.overruns = count
 
     def tick(self, now: float) -> None:
-        """Time passed."""
+        """Do what is due at this time."""
         if now >= self._board.wake_at:
             self.inbound.elapse(now)
         self._safety.tick(now)
@@ -170,32 +174,33 @@ class Session:
         self._task.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
-        """This process, or its watchdog, stalled for this time: no command is current."""
+        """Stop the robot, as this process or its watchdog stalled for ``seconds``."""
         if self._mode_manager.phase is not CLOSED:
             self._safety.stalled(seconds, now)
 
-    # What is wanted
+    # Commands and requests
 
     def command_twist(self, twist: BodyTwist, now: float, *, age_s: float = 0.0) -> None:
-        """Drive the body. Raises CommandRefused, and then nothing changes.
+        """Command a body velocity. If it raises CommandRefused, nothing changes.
 
-        ``age_s``: how long ago it was sent, by the sender's stamp.
+        ``age_s``: age of the command by its sender's stamp, in s; negative for a stamp in the
+        future.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
-        """Turn the wheels. If it raises CommandRefused, nothing changes."""
+        """Command wheel rates. If it raises CommandRefused, nothing changes."""
         self._command(self._commanding.wheels(rates_radps, now), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
-        """Drive to a pose in the odometry frame. Raises CommandRefused; then nothing changes."""
+        """Command a pose in the odometry frame. If it raises CommandRefused, nothing changes."""
         self._command(self._commanding.pose(goal), now)
 
     def request(self, request: Request, token: object, now: float) -> None:
-        """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
+        """Start, pause or reset; a RequestDone answers later. Raises RequestRefused at once."""
         if reason := self._interlocks.why_not_request():
             raise RequestRefused(reason)
-        self.inbound.process(now)  # what came before is not an answer
+        self.inbound.process(now)  # earlier data is not an answer
         self._mode_manager.request(request, token, now)
         if request is Request.START:
             self._commanding.interlock.start()
@@ -209,32 +214,32 @@ class Session:
         self._calibration.measure(token, now)
 
     def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Something that the board takes long for; answered by a RequestDone.
+        """Begin a task that takes the board long; a RequestDone answers within ``limit_s``.
 
-        ``name`` reads well after "a". Raises RequestRefused at once where it cannot be begun.
+        ``name`` must read well after "a". Raises RequestRefused at once if it cannot begin.
         """
         if reason := self._interlocks.why_not_task():
             raise RequestRefused(reason)
         self._task.begin(name, token, limit_s, now)
 
     def task_is_current(self, token: object) -> bool:
-        """Whether the task with this token still runs and was not given up."""
+        """Return whether the task with this token is in progress."""
         return self._task.is_current(token)
 
     def end_task(self, token: object, success: bool, message: str) -> None:
-        """End the task, as done or failed."""
+        """End the task as done or failed; no effect if it has ended before."""
         self._task.end(token, success, message)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
-        """Latch or release the e-stop; returns what is so now, in a sentence.
+        """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        Raises RequestRefused for a release while the button on the robot is held.
+        ``by``: who asked, for the notice. Raises RequestRefused for a release while the e-stop
+        button on the robot is held.
         """
         return self._safety.estop(active, now, by=by)
 
     def reset_odometry(self, now: float) -> None:
-        """Begin the odometry frame at the robot's present pose; a goal in the old one is
-        dropped."""
+        """Begin the odometry frame at the robot's present pose; drop a goal in the old frame."""
         self.inbound.process(now)
         self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()
@@ -242,13 +247,13 @@ class Session:
 
     @property
     def board(self) -> Board:
-        """The board, for its own profile."""
+        """Board of this session, for the ROS interfaces that only this kind of board has."""
         return self._board
 
-    # What comes of it
+    # Outputs
 
     def take_output(self, now: float) -> Packets:
-        """The packets to write now; they count as written."""
+        """Return the packets to write now, and regard them as written."""
         if self._mode_manager.phase is CLOSED:
             return NO_PACKETS
         packets = NO_PACKETS
@@ -269,7 +274,7 @@ class Session:
         return packets
 
     def take_events(self) -> list[Event]:
-        """Return and forget the events since the last call, in order."""
+        """Return and clear the events since the last call, in order."""
         return self._reporter.take()
 
     def _command(self, wish: Command, now: float) -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What may be set otherwise while a session runs: values only, the same for every board."""
+"""Settings that may change while a session runs, the same for every board."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ from omnibot_driver.core.odometry.estimator import OdometrySettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionSettings:
-    """The settings that may change while the session runs."""
+    """The settings of a session, replaced as one value."""
 
     limits: SpeedLimits
     commands: CommandSettings

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The end of a connection: stop, see the robot stand, say the last words.
+"""The shutdown of a connection: stop, wait until the robot stands, send the last packets.
 
-Must not know bytes, nor how long anybody waits.
+Must not know bytes, nor how long the caller waits.
 """
 
 from omnibot_driver.core.board import Board, Mode
@@ -14,7 +14,12 @@ from omnibot_driver.core.requests import OnExit
 
 
 class Shutdown:
-    """``begin`` it, wait for ``stands``, ``fall_silent``, wait again; then write ``sequence``."""
+    """The steps of a shutdown, in the order of their calls.
+
+    * ``begin``, then wait until ``stands``.
+    * ``fall_silent``; if it returns True, wait until ``stands`` once more.
+    * Write the packets of ``sequence``.
+    """
 
     def __init__(
         self, board: Board, mode_manager: ModeManager, policy: CommandPolicy, interlocks: Interlocks
@@ -23,25 +28,26 @@ class Shutdown:
         self._policy, self._interlocks = policy, interlocks
 
     def begin(self, now: float) -> None:
-        """Refuse everything, and repeat Stop."""
+        """Refuse all further commands and requests, and repeat Stop."""
         self._interlocks.leaving = True
         self._board.leave()
         self._policy.halt(now)
 
     @property
     def stands(self) -> bool:
-        """The board has shown that the robot stands, and no motion was commanded since."""
+        """Whether the board has shown that the robot stands, without a motion command since."""
         return self._policy.proof.proved
 
     @property
     def proof_takes_s(self) -> float:
-        """How long to wait until the robot is seen to stand, from Stop on."""
+        """Time to wait for the proof that the robot stands, counted from Stop, in s."""
         return self._policy.proof.takes_s
 
     def fall_silent(self, now: float) -> bool:
-        """Stop is not repeated any more: the last one may have been damaged, so it is proved anew.
+        """Stop repeating Stop, and demand a new proof that the robot stands.
 
-        Whether the board can show that.
+        The last Stop may have been damaged on the line, and be carried out as something else.
+        Return whether the board can give such a proof.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
             return False
@@ -51,14 +57,14 @@ class Shutdown:
         return True
 
     def sequence(self, on_exit: OnExit, now: float) -> Packets:
-        """The last packets to write before the port is closed."""
+        """Return the last packets to write before the port is closed."""
         proved = self._policy.quiet and self.stands
         packets = self._mode_manager.shutdown_sequence(on_exit, proved=proved)
         self._policy.discard(now)
         return packets + self._estop_again()
 
     def broken_off(self) -> Packets:
-        """What is to follow a write that failed half-way, before the port is closed."""
+        """Return what to write after a write that failed half-way, before the port is closed."""
         return self._board.wake() + self._estop_again()
 
     def _estop_again(self) -> Packets:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a kind of board has and can do: chosen at construction, never asked for each frame."""
+"""The capabilities of a kind of board: fixed at construction, never computed for each frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,23 +12,29 @@ from omnibot_driver.core.requests import Request
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Traits:
-    """Constant for a board while the driver runs.
+    """The capabilities of a board, constant while the driver runs.
 
-    ``channels``: names of the lines to it; one alone needs no name. ``imu_period_s``: from one
-    ImuReading to the next, one for each tick of the board's clock; None for a board without an
-    IMU, whose readings are stamped by their arrival. ``authorities``: who may command motion;
-    ``requests``: what else can be asked of it; ``wheels``: names of those that ``wheel_cmd`` turns,
-    in its order; ``unheard_s``: after this time without data a robot is not driven any further;
-    ``silence_s``: after it a board that says nothing is not known to be there; ``own_odometry``:
-    OdometryReadings say where the robot is, and displacements only whether it obeys;
-    ``stands_after_s``: a robot whose displacements show no motion for this time stands;
-    ``baudrate``: whether the speed of its line is to be set;
-    ``calibrates_gyro``: it takes the bias off itself, so its profile has ``~/calibrate_gyro``;
-    ``unproved_s``: how long Stop is repeated at most while that is not seen;
-    ``stops_within_s``: how long a board that answers a stop takes to obey it; ``slack_mps``,
-    ``slack_radps``: how far its displacements, or its wheels when they speed up, may be off what is
-    commanded on top of what any robot may; ``advice``: what to check when the robot does not move
-    as commanded, where that is more than on any board: the parameters of this one.
+    * ``channels``: names of the lines to the board; a single one needs no name.
+    * ``imu_period_s``: time from one ImuReading to the next, one for each tick of the board's
+      clock. None for a board without an IMU, whose readings are stamped by their arrival.
+    * ``authorities``: the topics that may command motion.
+    * ``requests``: the requests that the board supports.
+    * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in its order.
+    * ``unheard_s``: after this time without data the robot is not driven any further.
+    * ``silence_s``: after this time without data the mode of the board is unknown.
+    * ``own_odometry``: OdometryReadings give the robot's pose, and displacements only show whether
+      it obeys. Otherwise the driver integrates the displacements.
+    * ``stands_after_s``: a robot whose displacements show no motion for this time stands still.
+    * ``unproved_s``: longest time for which Stop is repeated while that is not shown.
+    * ``baudrate``: whether the line has a baud rate to set.
+    * ``calibrates_gyro``: the board subtracts the gyro's bias itself, so its profile offers
+      ``~/calibrate_gyro``.
+    * ``stops_within_s``: longest time that a board which acknowledges a stop takes to obey it.
+    * ``slack_mps``, ``slack_radps``: how far the measured velocity may differ from the commanded
+      one, in addition to the motion monitor's tolerance for any robot; for coarse displacements, or
+      wheels that lag while they speed up.
+    * ``advice``: what to check when the robot does not move as commanded; names the parameters of
+      this board and replaces the general advice.
     """
 
     channels: tuple[str, ...] = ("",)
@@ -50,10 +56,10 @@ class Traits:
 
     @property
     def imu(self) -> bool:
-        """Whether it sends ImuReadings."""
+        """Whether the board sends ImuReadings."""
         return self.imu_period_s is not None
 
     @property
     def to_check(self) -> str:
-        """Things to check while no valid data arrives."""
+        """What a user should check while no valid data arrives."""
         return "its power, cable and baudrate" if self.baudrate else "its power and cable"

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Values that are made by the hundred each second: immutable to the type checker alone.
+"""A dataclass decorator for values made hundreds of times a second: frozen for type checkers only.
 
-A frozen dataclass sets each field through ``object.__setattr__``, which triples the price of making
-one. All code that is given such a value is type-checked, so nothing is lost by saving that.
+A frozen dataclass sets each field through ``object.__setattr__``, which triples the time to make
+one. All code that receives such a value is type-checked, so immutability is still enforced.
 """
 
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ else:
     from dataclasses import dataclass
 
     def value(*, frozen: bool, slots: bool) -> object:
-        """A ``dataclass`` whose ``frozen`` holds for the type checker only."""
+        """Return a ``dataclass`` decorator whose ``frozen`` holds for the type checker only."""
         return dataclass(slots=slots, unsafe_hash=frozen)
 
 

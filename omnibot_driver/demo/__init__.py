@@ -1,7 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The demo: simulated board and driver as processes of their own, and a robot that drives a square.
+"""The demo: simulated board and driver as separate processes, and a robot that drives a square.
 
-It knows the driver as any ROS program does, by its topics, and the simulator by its console. It
-must not know the wire.
+Like any ROS program it uses the driver by its topics. It uses the simulator by its console. It must
+not know the bytes on the wire.
 """

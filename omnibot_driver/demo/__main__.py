@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Runs the demo: ``python -m omnibot_driver.demo``."""
+"""The demo's command line: ``python -m omnibot_driver.demo``."""
 
 import argparse
 import io
@@ -24,15 +24,15 @@ from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
 from omnibot_driver.simulator.common.options import DEFAULT_BOARD
 
 ENVIRONMENT: Final = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-"""Unless the user says otherwise: away from domain 0, where somebody's robot may be."""
+"""Defaults that keep the demo away from ROS domain 0, where a real robot may be."""
 STOPPING_S: Final = 3.0
 ROW_EVERY_S: Final = 1.0
 
 
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
-    """Drive for this time, or until asked to end.
+    """Drive for ``seconds``, or until ``asked_to_end`` returns True.
 
-    Raises ParameterError where there is no such board, DemoFailed, and ImportError without ROS.
+    Raises ParameterError for an unknown board, DemoFailed, and ImportError without ROS.
     """
     capability = capabilities.of(board)
     namespace = f"/demo_{os.getpid()}"
@@ -112,7 +112,10 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Return 0 when the time is over or SIGINT or SIGTERM came, 1 on failure, 2 on wrong usage."""
+    """Return 0 when the time is over or a signal came, 1 on failure, 2 on wrong usage.
+
+    The signals are SIGINT and SIGTERM.
+    """
     parser = argparse.ArgumentParser(
         prog="demo",
         description="Drives a square on a simulated board; no robot is needed.",
@@ -135,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"DEMO_SECONDS must be a number above 0, not {given!r}", file=sys.stderr)
         return 2
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # question marks where there is no Braille
+        sys.stdout.reconfigure(errors="replace")  # question marks where Braille cannot be encoded
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: signals.append(received))

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the demo has to know of a kind of board: asked of its profile, once, before anything starts.
+"""What the demo must know of a board, read from its profile before anything starts.
 
-Must not know any board, ROS or processes.
+This module must not know any board by name, ROS or processes.
 """
 
 from dataclasses import dataclass
@@ -16,11 +16,12 @@ from omnibot_driver.simulator.common import options
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capability:
-    """Of a board that drives by ``cmd_vel`` and has ``odom``.
+    """The abilities of a board that drives by ``cmd_vel`` and has ``odom``.
 
-    title: as in "A simulated ... drives". imu: it has ``imu/data_raw``. sideways: it moves along
-    y as well. ports: by line that the simulator prints, the driver's parameter, empty where it
-    follows from another. real: arguments that a driver needs for the real robot.
+    ``title`` is its name in "A simulated ... drives". ``imu``: whether it has ``imu/data_raw``.
+    ``sideways``: whether it can move along y as well. ``ports``: for each line that the simulator
+    prints, the driver's parameter; empty where it follows from another line. ``real``: arguments
+    that a driver needs for the real robot.
     """
 
     title: str
@@ -31,7 +32,10 @@ class Capability:
 
 
 def of(name: str) -> Capability:
-    """That of a board by its name. Raises ParameterError where it is not built, or cannot drive."""
+    """Return the abilities of the board with this name.
+
+    Raises ParameterError for an unknown board, and for one that takes no ``cmd_vel``.
+    """
     values = boards.check_all({"board": name})
     profile = boards.load(name)
     traits = profile.make(values).traits
@@ -50,6 +54,6 @@ def of(name: str) -> Capability:
 
 
 def port_arguments(name: str, ports: dict[str, str]) -> str:
-    """What follows ``--ros-args`` for this board, by the parameters that name its ports."""
+    """Return the arguments after ``--ros-args`` for this board; ``ports``: values by parameter."""
     board = {} if name == options.DEFAULT_BOARD else {"board": name}
     return " ".join(f"-p {key}:={value}" for key, value in {**board, **ports}.items())

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor in front of the demo, where there is a terminal for it. Knows processes, no ROS."""
+"""The monitor on the demo's terminal, where it can be shown. Knows processes, no ROS."""
 
 import subprocess
 import sys
@@ -11,9 +11,9 @@ from omnibot_driver.tools.monitor.screen import has_screen
 
 
 class Dashboard:
-    """``monitor`` on this terminal, where that is ``possible``, until it is quitted or closed.
+    """The tool ``monitor`` on this terminal, where ``possible``, until it is quit or closed.
 
-    It shows the driver of this namespace, as soon as there is one.
+    It shows the driver of this namespace as soon as that driver runs.
     """
 
     def __init__(self, namespace: str) -> None:
@@ -27,11 +27,11 @@ class Dashboard:
 
     @property
     def quitted(self) -> bool:
-        """Whether it was there and is no more."""
+        """Whether the monitor was started and has ended."""
         return self._process is not None and self._process.poll() is not None
 
     def close(self) -> None:
-        """Give the terminal back."""
+        """End the monitor and give the terminal back."""
         if self._process is None:
             return
         self._process.terminate()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the demo shows: rows, a picture, words. Knows terminals; must not know ROS or processes."""
+"""Output of the demo: rows, a picture, texts. Knows terminals; must not know ROS or processes."""
 
 import math
 import sys
@@ -26,7 +26,7 @@ With the real robot: wheels off the ground first (docs/commissioning.md), then
 def status_row(
     state: str, rates_hz: tuple[int | None, int], leg: int, pose: Pose, *velocities: BodyTwist
 ) -> str:
-    """One row under HEADING; the velocities are the commanded and the measured one."""
+    """Return a row under HEADING; ``velocities`` are the commanded and the measured twist."""
     imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
     for twist in velocities:
@@ -50,9 +50,9 @@ def introduce(
     exports: str,
     seconds: float,
 ) -> None:
-    """Say what is going on, and what to do with it.
+    """Print what the demo does, and what the user can do with it.
 
-    ``options``: of the simulator and of the driver.
+    ``options`` are the arguments of the simulator and of the driver.
     """
     imu = f"\n  ros2 topic hz {namespace}/imu/data_raw" * capability.imu
     turning = (
@@ -77,9 +77,9 @@ Where ROS 2 Jazzy is installed, look on and interfere from another terminal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """What was driven and received, where the robot believes to be, and where it is.
+    """The results of a drive: what was driven and received, the pose by odometry, and the true one.
 
-    ``imu_hz``: None without an IMU. ``real``: a driver's arguments for the real robot.
+    ``imu_hz`` is None without an IMU. ``real`` has a driver's arguments for the real robot.
     """
 
     seconds: float
@@ -94,7 +94,7 @@ class Drive:
 
 
 def report(drive: Drive) -> None:
-    """Say what was driven and how well it is known, on a terminal beside a picture of it."""
+    """Print the results and the error of the pose, on a terminal beside a picture of the path."""
     pose, true_pose = drive.pose, drive.true_pose
     error_mm = 1000 * math.dist((pose.x_m, pose.y_m), (true_pose.x_m, true_pose.y_m))
     error_deg = abs(_degrees(pose.yaw_rad - true_pose.yaw_rad))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A module of ours as a process of its own. Knows processes; must not know what they do."""
+"""A module of this package as a separate process. Must not know what the process does."""
 
 import ctypes
 import os
@@ -15,13 +15,13 @@ PATIENCE_S: Final = 15.0
 
 
 class DemoFailed(Exception):
-    """The demo cannot go on; the text says why."""
+    """The demo cannot continue; the text says why."""
 
 
 class Program:
-    """A module of ours as a process of its own, which never outlives this one.
+    """A module of this package as a separate process, which never outlives this one.
 
-    Signals of the terminal do not reach it: it is ended when nothing depends on it any more.
+    Signals of the terminal do not reach it; it is ended when nothing depends on it any more.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:
@@ -38,7 +38,7 @@ class Program:
         )
 
     def end(self) -> None:
-        """End it, by force if need be."""
+        """End the process, by force if necessary."""
         self._process.terminate()
         try:
             self._process.wait(3.0)
@@ -47,18 +47,18 @@ class Program:
             self._process.wait()
 
     def failure(self, what: str) -> DemoFailed:
-        """A message on what happened, with the last output of this process."""
+        """Return an exception that says what happened, with the last output of this process."""
         self._log.seek(0)
         lines = self._log.read().splitlines()[-10:] or ["(nothing)"]
         return DemoFailed("\n  ".join([f"{what}. The {self._name} said last:", *lines]))
 
     def check(self) -> None:
-        """Raises DemoFailed if it has ended."""
+        """Raise DemoFailed if the process has ended."""
         if (code := self._process.poll()) is not None:
             raise self.failure(f"the {self._name} ended with code {code}")
 
     def ask(self, question: str = "") -> str:
-        """The next line from its console, after saying this. Raises DemoFailed without one."""
+        """Send a question to the console; return its next line, or raise DemoFailed without one."""
         stdin, stdout = self._process.stdin, self._process.stdout
         if stdin is None or stdout is None:
             raise ValueError(f"the {self._name} has no console")
@@ -75,6 +75,6 @@ class Program:
 
 
 def end_with_parent() -> None:
-    """Let a new process end with its parent."""
+    """Have the kernel end this new process when its parent ends."""
     pr_set_pdeathsig = 1
     ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot as a ROS program sees it. Must not know who made it, nor what is shown of it."""
+"""The robot as a ROS program sees it. Must not know who started it, or how it is displayed."""
 
 import math
 import time
@@ -23,16 +23,16 @@ from omnibot_driver.demo.square import HALT, steer, steer_ahead
 from omnibot_driver.tools.monitor.rates import Rate
 
 REMEMBERED = 1000
-"""Poses: some laps of them."""
+"""Number of poses that are kept: those of some laps."""
 ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
-"""Less than any board sends, more than comes before a driver has settled."""
+"""Rates in Hz that each board exceeds, but a driver that has just started does not."""
 
 
 class Robot:
     """The robot as a ROS program has it: topics in, ``cmd_vel`` out.
 
-    Every other odometry message is answered with a command; unless ``driving``, with a halt.
-    ``imu``: it has one; ``sideways``: it can drive along its y axis.
+    Every other odometry message is answered with a command, which is a halt unless ``driving``.
+    ``imu``: whether it has an IMU. ``sideways``: whether it can drive along its y axis.
     """
 
     def __init__(self, namespace: str, *, imu: bool = True, sideways: bool = True) -> None:
@@ -61,16 +61,16 @@ class Robot:
         self._executor.add_node(node)
 
     def close(self) -> None:
-        """Leave ROS; an executor that outlives its context complains when Python ends."""
+        """Leave ROS; an executor that outlives its context reports errors when Python ends."""
         self._executor.shutdown(timeout_sec=0.0)
         rclpy.try_shutdown()
 
     def spin_once(self) -> None:
-        """Take the next message, if one comes soon."""
+        """Handle the next message, if one comes within 50 ms."""
         self._executor.spin_once(timeout_sec=0.05)
 
     def missing(self) -> list[str]:
-        """What a robot that can drive has and this one has not."""
+        """Return what a robot needs to drive and this one lacks: topics and the nominal state."""
         now_s = time.monotonic()
         topics = [("imu/data_raw", self.imu, ENOUGH_IMU_HZ), ("odom", self.odom, ENOUGH_ODOM_HZ)]
         missing = [
@@ -81,15 +81,15 @@ class Robot:
         return missing if self._state == "nominal" else [*missing, f"nominal state ({self._state})"]
 
     def watched(self) -> bool:
-        """Whether somebody else listens to the odometry too."""
+        """Return whether another program listens to the odometry too."""
         return self._node.count_subscribers("odom") > 1
 
     def stands(self) -> bool:
-        """Whether it has been standing still for a while since it was driving."""
+        """Return whether the last five odometry messages showed a robot at rest, not driving."""
         return self._stood_for >= 5
 
     def row(self) -> str:
-        """The row that tells how it is."""
+        """Return the row that shows its present state."""
         now_s = time.monotonic()
         imu_hz = None if self.imu is None else round(self.imu.hz(now_s))
         rates_hz = (imu_hz, round(self.odom.hz(now_s)))

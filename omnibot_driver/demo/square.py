@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How the robot is steered round the square: a pure function of where it is."""
+"""Steering of the robot around the square: a pure function of its pose."""
 
 import math
 from typing import Final
@@ -15,19 +15,20 @@ CREEP_MPS: Final = 0.05
 YAW_RATE_RADPS: Final = 0.5
 QUARTER_RAD: Final = math.pi / 2
 CORNER_M: Final = 0.01
-"""From this distance on, a corner counts as reached."""
+"""Distance from a corner, in m, at which the corner is reached."""
 GAIN_PER_S: Final = 3.0
-"""Speed per distance: to the corner ahead, and to where the robot should be."""
+"""Speed per distance, and yaw rate per angle error, in 1/s."""
 ON_COURSE_RAD: Final = 0.3
-"""A robot that is turned further from where it is to go turns on the spot."""
+"""Course error, in rad, above which a robot turns on the spot before it drives on."""
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """The leg to be on, and the velocity along it in the robot's own axes.
+    """Return the leg to be on, and the velocity along it in the robot's own axes.
 
-    Legs are counted from 0 without end: +x, +y, -x, -y in the odometry frame. On every other leg
-    the robot turns a quarter to the left, and back on the next, while it drives straight ahead.
+    Legs are counted from 0 without end: +x, +y, -x, -y in the odometry frame. On legs 0, 2, ... the
+    robot turns a quarter to the left, and on legs 1, 3, ... back, while it drives along a straight
+    line.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD
@@ -43,7 +44,7 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """The same for a robot that cannot drive sideways: it turns on the spot at each corner."""
+    """Return the same for a robot that cannot drive sideways: it turns on the spot at corners."""
     leg, along_m, aside_m = _progress(pose, leg)
     course_rad = leg % 4 * QUARTER_RAD - math.atan2(GAIN_PER_S * aside_m, 2 * SPEED_MPS)
     error_rad = math.remainder(course_rad - pose.yaw_rad, math.tau)
@@ -53,7 +54,7 @@ def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
-    """The leg to be on, how far it is driven, and how far to its left the robot is, in m."""
+    """Return the leg to be on, the distance along it, and the robot's offset to its left, in m."""
     turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
     along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
     return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)

@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every parameter that is common to boards: name, default, unit, range, meaning; and the table of
-one board, made of those that it can use and its own.
+"""Parameters: the rows that are common to boards, and the table of one board.
 
-From a table the node declares and checks, and ``make docs`` writes config/<board>.yaml and
-docs/parameters.md. A new common row goes into ``operating`` or ``robot``, one of a single board
-beside that board's profile. Knows no ROS and no board; types are plain Python's. Wrong values are
-ParameterErrors that name the parameter and what it may be.
+A row has a name, a default, a unit, a range and a meaning. A board's table consists of the common
+rows that it can use and of its own. From a table the node declares and checks its parameters, and
+``make docs`` writes config/<board>.yaml and docs/parameters.md. A new common row goes into
+``operating`` or ``robot``, one of a single board beside that board's profile. This package knows no
+ROS and no board; types are plain Python's. A wrong value raises a ParameterError that names the
+parameter and the allowed values.
 """
 
 from omnibot_driver.parameters.parameter import Parameter, Value

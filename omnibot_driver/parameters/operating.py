@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of the driver's work, whatever the board: the line, commands, frames.
+"""Common parameters of the driver's work: the line, commands, frames.
 
-Which of them a board has is in ``table``. Knows no ROS.
+``table`` decides which of them a board has. This module knows no ROS.
 """
 
 from typing import Final
@@ -16,7 +16,7 @@ BOARD: Final = Parameter(
     "The motor board at the other end of the line.",
     fixed=True,
 )
-"""Its default and only choice are the board whose table it is in."""
+"""Its default and its only choice are set by each board's table."""
 
 LINE: Final = (
     Parameter(

@@ -9,7 +9,7 @@ from typing import Any, Final
 from omnibot_driver.core.errors import ParameterError
 
 TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a string"}
-"""In the words of ROS."""
+"""Names of the types in ROS."""
 QUOTE: Final = "YAML reads on, off, yes and no as bool: put it in quotes"
 NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six")
 Item = int | float | str
@@ -20,13 +20,13 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 class Parameter:
     """One row of the table. The default's type is the parameter's type.
 
-    ``unset``: it has no value unless it is given one (the board keeps its own); the default then
-    tells the type alone.
+    ``unset``: without a given value the parameter has none, because the board keeps its own; the
+    default then only defines the type. ``low`` and ``high`` are inclusive. ``fixed``: the value is
+    given at start, and is read-only afterwards. ``calibrated``: a calibration file may hold the
+    value.
 
-    ``low`` and ``high`` are inclusive; ``fixed`` means: given at start, read-only afterwards;
-    ``calibrated``: a calibration file may hold it. The default of a list has at least one item.
-    Range and choices then hold for each item, and ``length`` is how many there are, at least and at
-    most; without it, as many as in the default.
+    The default of a list has at least one item. Range and choices apply to each item. ``length`` is
+    the least and the largest number of items; without it, a value has as many as the default.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Parameter:
 
     @property
     def initial(self) -> Value:
-        """Its value when none is given; None where it is unset."""
+        """Value when none is given; None if the parameter is unset."""
         return None if self.unset else self.default
 
     @property
@@ -53,18 +53,18 @@ class Parameter:
 
     @property
     def kind(self) -> type:
-        """The type of its value, or of each item."""
+        """Type of the value, or of each item of a list."""
         return type(self.default[0] if isinstance(self.default, list) else self.default)
 
     @property
     def lengths(self) -> tuple[int, int]:
-        """The least and the largest number of items of a list."""
+        """Least and largest number of items of a list."""
         assert isinstance(self.default, list)
         return self.length or (len(self.default),) * 2
 
     @property
     def allowed(self) -> str:
-        """The allowed values in words; empty when any value of the type will do."""
+        """Allowed values in words; empty when any value of the type is allowed."""
         if self.choices:
             choices = list(map(str, self.choices))
             return (
@@ -76,7 +76,7 @@ class Parameter:
         return ""
 
     def check(self, value: object) -> Value:
-        """The value in the parameter's own type. Raises ParameterError."""
+        """Return the value in the parameter's own type; raise ParameterError if it is wrong."""
         if value is None and self.unset:
             return None
         if isinstance(self.default, list):
@@ -110,7 +110,7 @@ class Parameter:
 
     @property
     def _shape(self) -> str:
-        """The shape of a list, in words."""
+        """Allowed shape of a list, in words."""
         things = "strings" if self.kind is str else "numbers"
         fewest, most = self.lengths
         count = NUMBERS[most] if most < len(NUMBERS) else str(most)
@@ -119,7 +119,7 @@ class Parameter:
         return f"{count} {things}" + (f", {self.allowed}" if self.allowed else "")
 
     def _may_be(self, value: Any) -> bool:
-        """Whether the value is among the choices, or in the range."""
+        """Return whether the value is among the choices, or in the range."""
         if self.choices:
             return value in self.choices
         if self.low is None or self.high is None:
@@ -132,7 +132,7 @@ class Parameter:
 
 
 def _converted(value: object, kind: type) -> object:
-    """Convert as YAML does: 1 for a double, 1.0 for an integer."""
+    """Convert numbers as YAML does: 1 to a double, 1.0 to an integer."""
     if kind is float and type(value) is int:
         return float(value)
     if kind is int and isinstance(value, float) and value.is_integer():

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of what is driven, whatever its board: the robot, its IMU, how sure they measure.
+"""Common parameters of the robot, of its IMU, and of the noise of its measurements.
 
-Which of them a board has is in ``table``. Knows no ROS.
+``table`` decides which of them a board has. This module knows no ROS.
 """
 
 from typing import Final

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From checked values to what the core is set to: each value under its meaning there.
+"""Settings of the core's session, made from checked parameter values.
 
-What a board's table lacks, means nothing to that board.
+A parameter that is missing from a board's table has no meaning for that board, and gets a default.
 """
 
 import math
@@ -24,7 +24,7 @@ NOISE: Final = OdometryNoise()
 
 
 def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSettings:
-    """The session's settings from checked values; ``wheels``: of the board's profile."""
+    """Return the session's settings; ``wheels`` are those of the board's profile."""
     return SessionSettings(
         limits=SpeedLimits(
             linear_mps=values.get("max_linear_speed", 0.0),

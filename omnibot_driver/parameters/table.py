@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of one board: those common ones that it can use, and its own. Knows no ROS.
+"""The table of one board's parameters: the common ones that it can use, and its own.
 
-Knows no board by name: a board's profile makes its table, of what the board can do and of the rows
-that it brings.
+This module knows no ROS, and no board by name. A board's profile makes its table from the board's
+traits and from the rows that it adds.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -18,7 +18,7 @@ from omnibot_driver.parameters import operating, robot
 from omnibot_driver.parameters.parameter import Parameter, Value
 
 Check = Callable[[Mapping[str, Any]], None]
-"""Of all values together; raises ParameterError."""
+"""A check of all values together, which raises ParameterError."""
 
 COMMON: Final = {
     "The line": operating.LINE,
@@ -55,7 +55,7 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""What a board must be able to do for a common parameter to mean anything."""
+"""Conditions on a board's traits under which a common parameter has a meaning, by parameter."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",
@@ -71,14 +71,14 @@ DISPENSABLE: Final = frozenset(
         "twist_angular_stddev",
     }
 )
-"""Common parameters that may mean nothing to a board; the driver reads all others on each."""
+"""Common parameters that a board may lack; all others are read on each board that they fit."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
-"""What a board may be left in when the driver ends, besides stopped: what it takes."""
+"""Values of ``on_exit`` besides stop, with the request that a board must accept for each."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Every parameter of one board by section, and what must hold between them."""
+    """All parameters of one board by section, and the checks between them."""
 
     board: str
     sections: Mapping[str, Sequence[Parameter]]
@@ -96,11 +96,11 @@ class Table:
 
     @property
     def calibrated(self) -> tuple[str, ...]:
-        """Names of those that a calibration file may hold."""
+        """Names of the parameters that a calibration file may hold."""
         return tuple(row.name for row in self.rows if row.calibrated)
 
     def check_all(self, given: Mapping[str, object]) -> dict[str, Value]:
-        """Every parameter's value, from those given and the defaults. Raises ParameterError."""
+        """Return every parameter's value, given or default. Raises ParameterError."""
         for name in given:
             if name not in self.by_name:
                 raise ParameterError(
@@ -122,12 +122,12 @@ def table(
     changed: Mapping[str, Mapping[str, Any]] | None = None,
     checks: Sequence[Check] = (),
 ) -> Table:
-    """The table of a board that can do this.
+    """Return the table of a board with these traits.
 
-    ``own``: rows of its own, by section; ``without``: those of ``DISPENSABLE`` that mean nothing to
-    it; what its traits have no use for is left out anyway;
-    ``changed``: by name, fields of common ones that differ (``{"port": {"default": "udp://"}}``);
-    ``checks``: what must hold between its values, besides what must on every board.
+    ``own``: rows of its own, by section. ``without``: those of ``DISPENSABLE`` that have no meaning
+    for it; what its traits do not need is left out anyway. ``changed``: by name, fields of common
+    rows that differ (``{"port": {"default": "udp://"}}``). ``checks``: checks between its values,
+    in addition to those of every board.
     """
     changes = {
         "on_exit": {
@@ -166,8 +166,8 @@ def table(
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """The one of these names that is most like it, however little."""
-    import difflib  # for a name that is wrong, so hardly ever
+    """Return the name that is most similar to this one, however little."""
+    import difflib  # only needed for a wrong name, so rarely
 
     return difflib.get_close_matches(name, list(names), n=1, cutoff=0.0)[0]
 
@@ -185,7 +185,7 @@ def _require_two_frames(values: Mapping[str, Any]) -> None:
 
 
 def _require_possible_speeds(values: Mapping[str, Any]) -> None:
-    """Reject speed limits above the fastest believable speed, at which odometry would stop."""
+    """Reject speed limits above the fastest believable speed, where odometry rejects motion."""
     for kind, unit in (("linear", "m/s"), ("angular", "rad/s")):
         commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
         if commanded in values and values[commanded] > values[possible]:

@@ -2,10 +2,11 @@
 
 """Motor boards in software, each written from its manual, to run the driver against.
 
-A package for each board, and ``common`` for what they share. Shares no code with the driver: a
-misread manual must not cancel out. ``python -m omnibot_driver.simulator`` runs one in real time.
+Each board has its own package; ``common`` holds what the boards share. The simulator shares no
+code with the driver, so that a misread manual does not cancel out.
+``python -m omnibot_driver.simulator`` runs one board in real time.
 
-For one release the names of ``simulator.omnibot`` are found here too.
+For one release, the names of ``simulator.omnibot`` can also be imported from here.
 """
 
 import warnings

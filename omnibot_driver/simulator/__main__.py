@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command line of the simulated boards: real time, ports for programs, a small console on stdin.
+"""Command line of the simulated boards: a board in real time, its ports, and a console on stdin.
 
-Knows arguments, signals and the console. Must not know the wire or any board's insides.
+Knows arguments, signals and the console. Must not know the byte protocol or the internals of any
+board.
 """
 
 import argparse
@@ -30,7 +31,7 @@ _HEALTH_CHECK_S = 0.5
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a simulated board until told to end; return the exit code."""
+    """Run a simulated board until SIGINT, SIGTERM or ``quit``; return the exit code."""
     chooser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     _add_board(chooser)
     name = chooser.parse_known_args(argv)[0].board
@@ -42,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def boards() -> list[str]:
-    """The boards that are simulated: the packages beside ``common``."""
+    """Return the names of the simulated boards: the packages beside ``common``."""
     return [
         module.name
         for module in pkgutil.iter_modules(simulator.__path__)
@@ -51,7 +52,7 @@ def boards() -> list[str]:
 
 
 def run(module: SimulatorModule, name: str, argv: Sequence[str] | None) -> int:
-    """The same with the board that was chosen."""
+    """Run the board of ``module`` until SIGINT, SIGTERM or ``quit``; return the exit code."""
     arguments = _parser(module).parse_args(argv)
     board, lines = options.from_arguments(arguments, module)
     links = getattr(arguments, "link", None) or []
@@ -124,7 +125,7 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
 
 @contextmanager
 def _signals_as_readable() -> Iterator[int]:
-    """Yield a descriptor that becomes readable on SIGINT or SIGTERM, which then do nothing else."""
+    """Yield a descriptor that becomes readable on SIGINT or SIGTERM; they have no other effect."""
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     old_writer = signal.set_wakeup_fd(writer)
@@ -141,7 +142,7 @@ def _signals_as_readable() -> Iterator[int]:
 
 
 def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
-    """Answer the console until a signal or `quit`."""
+    """Answer the console until a signal or ``quit``."""
     console = sys.stdin.fileno() if sys.stdin else None
     held = b""
     while True:
@@ -161,7 +162,7 @@ def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
 
 
 def _answer(command: str, served: ServedBoard[SimulatedBoard]) -> bool:
-    """Do one console command; False ends the program."""
+    """Execute one console command; return False if it ends the program."""
     if command == "truth":
         with served.lock:
             facts = served.facts

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What carries packets to a board and back: serial ports, datagrams, several lines at once.
+"""Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
-Knows descriptors and bytes; no threads and no board. Every failure is a LinkError whose sentence
-says what to do.
+They know descriptors and bytes, but no threads and no board. Every failure is a LinkError whose
+text says what to do.
 """
 
 from collections.abc import Mapping
@@ -12,29 +12,29 @@ from typing import Final, Protocol
 from omnibot_driver.core.packets import Packet, Packets
 
 READ_TIMEOUT_S: Final = 0.2
-"""How soon a transport that cannot be interrupted returns to look whether it is still wanted."""
+"""Longest wait of a ``read``, in s, after which a reader without ``interrupt`` can end."""
 WRITE_TIMEOUT_S: Final = 0.2
 NONE_MISSING: Final[Mapping[int, str]] = {}
-"""Of a transport that is open as a whole or not at all."""
+"""Value of ``missing`` for a transport that is open completely or not at all."""
 
 
 class LinesChanged(Exception):
-    """One of several lines is lost or is there again; ``missing`` says which are not there now."""
+    """One of several lines is lost or is back; ``missing`` has the lines that are missing now."""
 
 
 class Transport(Protocol):
-    """Open from its construction, which raises LinkError, until ``close``."""
+    """A connection to a board, open from construction (which raises LinkError) to ``close``."""
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """By channel: what another process may inherit to write the same bytes.
+        """Descriptors by channel, which another process may inherit to write the same bytes.
 
-        None where it can't, and in the place of a line that is missing.
+        None where it cannot, and None in the place of a missing line.
         """
 
     @property
     def missing(self) -> Mapping[int, str]:
-        """Of several lines, those that are not there, by channel: why, and what to do."""
+        """Missing lines of several, by channel: the reason, and what to do."""
 
     @property
     def ends_with_us(self) -> bool:
@@ -42,26 +42,26 @@ class Transport(Protocol):
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel has lost bytes since the opening; None without a counter."""
+        """Number of times the kernel has lost bytes since the opening; None without a counter."""
 
     def read(self) -> Packet:
-        """What has come in, waiting for it; no bytes after a while without any.
+        """Wait for a packet and return it; after a while without any, return one without bytes.
 
         Raises LinkError when the line is lost, and LinesChanged when one of several is lost or is
-        there again.
+        back.
         """
 
     def write(self, packets: Packets) -> None:
-        """All of them, or LinkError; then nothing that was written and is still here is sent.
+        """Write all packets. On LinkError, what was written but not yet sent is discarded.
 
-        What goes to one of several lines that is missing is dropped.
+        Packets for a missing one of several lines are discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write what is accepted at once, perhaps nothing; returns the number of bytes."""
+        """Write what is accepted at once, perhaps nothing; return the number of bytes."""
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where it can be ended."""
 
     def close(self) -> None:
-        """Give the lines back; harmless to repeat."""
+        """Close the lines. A second call does nothing."""

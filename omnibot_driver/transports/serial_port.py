@@ -32,19 +32,19 @@ PEER_OPTIONS: Final = {
     socket.TCP_KEEPINTVL: 1,
     socket.TCP_USER_TIMEOUT: 5000,
 }
-"""A network peer that acknowledges nothing for five seconds is gone; one that is sent nothing is
-asked every second."""
+"""Socket options: a network peer that acknowledges nothing for five seconds is lost; an idle one is
+probed every second."""
 PSEUDO_TERMINALS: Final = range(136, 144)
-"""Linux's major device numbers of them."""
+"""Major device numbers of pseudo-terminals in Linux."""
 
 
 class SerialPort:
-    """A ``Transport`` of one channel of bytes: an open port, exclusively ours.
+    """A ``Transport`` of one channel of bytes: an open port, used by this process alone.
 
-    ``parameter``: where a user says which port.
+    ``parameter`` is the parameter that names the port, for error messages.
 
-    Linux raises DTR and RTS when the first program opens a port. Closing leaves them raised, so
-    that a board that is wired to them restarts once after plugging in at the most.
+    Linux raises DTR and RTS when the first program opens a port. Closing leaves them raised, so a
+    board that is wired to them restarts at most once after it is plugged in.
     """
 
     ends_with_us = False
@@ -67,7 +67,7 @@ class SerialPort:
             )
         except LinkError:
             raise
-        except Exception as error:  # its URL handlers raise whatever they stumble over
+        except Exception as error:  # its URL handlers can raise any exception
             raise LinkError(_explain(url, parameter, error)) from error
         try:
             self._settle_in()
@@ -77,17 +77,17 @@ class SerialPort:
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
-        """The port's descriptor, if it has one."""
+        """Descriptor of the port; None if it does not have one."""
         return None if self._descriptor is None else (self._descriptor,)
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel has lost bytes since the opening; None without a counter."""
+        """Number of times the kernel has lost bytes since the opening; None without a counter."""
         count = None if self._descriptor is None else overruns(self._descriptor)
         return None if count is None else count - self._overruns_before
 
     def read(self) -> Packet:
-        """All that has come in, waiting for the first byte."""
+        """Return all received bytes, after waiting for the first one."""
         return 0, self._read()
 
     def _read(self) -> bytes:
@@ -101,7 +101,7 @@ class SerialPort:
         except OSError as error:
             if not data:
                 raise LinkError(f"lost {self._url} while reading: {error}") from error
-        return data  # what came before the loss; the next call finds it again
+        return data  # bytes from before a loss; the next call detects it again
 
     def write(self, packets: Packets) -> None:
         """Write all bytes at once."""
@@ -116,14 +116,14 @@ class SerialPort:
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write what is accepted at once."""
+        """Write what is accepted at once; return the number of bytes."""
         if self._descriptor is not None:
             with contextlib.suppress(OSError):
                 return os.write(self._descriptor, joined(packets))
         return 0
 
     def drop_output(self) -> None:
-        """Drop the written bytes that are not sent yet."""
+        """Discard the written bytes that are not sent yet."""
         with contextlib.suppress(OSError, termios.error):
             self._serial.reset_output_buffer()
 
@@ -134,7 +134,7 @@ class SerialPort:
             cancel()
 
     def close(self) -> None:
-        """Give the port back; harmless to repeat."""
+        """Close the port. A second call does nothing."""
         if self._is_terminal:
             with contextlib.suppress(OSError):
                 fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
@@ -149,7 +149,7 @@ class SerialPort:
         descriptor = self._descriptor
         self._overruns_before = overruns(descriptor) or 0 if descriptor is not None else 0
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
-        if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read
+        if type(self._serial) is serial.Serial:  # handlers of URLs may process each read
             self._arrivals = select.poll()
             self._arrivals.register(self._serial.fileno(), select.POLLIN)
             self._arrivals.register(self._serial.pipe_abort_read_r or -1, select.POLLIN)
@@ -169,7 +169,7 @@ class SerialPort:
 
 
 def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
-    """All there is, in two system calls where pyserial needs five."""
+    """Read all available bytes, in two system calls where pyserial needs five."""
     for ready, _ in arrivals.poll(1e3 * READ_TIMEOUT_S):
         if ready != port.fd:
             os.read(ready, 1000)  # pyserial's ``cancel_read``
@@ -185,7 +185,7 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Write all bytes. Unlike pyserial's, it sleeps while there is no room."""
+    """Write all bytes. Unlike pyserial, sleep until there is room. Raises TimeoutError."""
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:
         try:
@@ -202,11 +202,11 @@ def _write_whole(descriptor: int, data: bytes) -> None:
 
 
 def _explain(url: str, parameter: str, error: Exception) -> str:
-    """Explain the trouble with this port, with a remedy."""
+    """Return what is wrong with this port, and what to do."""
     code = error.errno if isinstance(error, OSError) else None
     if isinstance(error, ValueError) and "baud rate" in str(error):
         return f"{url} cannot be set to this speed: {error}; check the parameter `baudrate`"
-    # pyserial words some errors anew without their number; where it stumbled is in the context.
+    # pyserial replaces some errors by its own, without their number; the context has the original.
     misread = TypeError | ValueError | LookupError | re.error
     if isinstance(error, misread) or isinstance(error.__context__, misread):
         return (
@@ -234,7 +234,7 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
             f"{url} is in use by another program{_owner(url)}, perhaps a second driver; end it"
             f" first (`fuser {url}` names it; the guard of a killed driver leaves by itself)"
         )
-    # Those of its texts that are made of another error name the port twice.
+    # A text that pyserial makes of another error names the port twice.
     source = error.__context__ if isinstance(error.__context__, OSError) else error
     reason = getattr(source, "strerror", None) or source
     if isinstance(source, ConnectionRefusedError):
@@ -246,7 +246,7 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
 
 
 def _owner(path: str) -> str:
-    """The owner of the lock on this file, in brackets; empty if unknown."""
+    """Return the process that holds the lock on this file, in brackets; empty if unknown."""
     with contextlib.suppress(OSError):
         status = os.stat(path)
         device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Several lines of bytes as one transport: the channels of each follow those of the one before it.
+"""Several lines of bytes as one transport, with the channels of one line after those of another.
 
-A line that is missing or blocked keeps none of the others from being read or written. It is
-opened again by itself, while the others stay open. Each time that the lines that are there have
-changed, ``read`` says so.
+A line that is missing or blocked does not keep the others from being read or written. It is opened
+again by itself, while the others stay open. When the set of present lines has changed, ``read``
+raises LinesChanged.
 """
 
 import select
@@ -20,28 +20,28 @@ from omnibot_driver.transports.wake_up import WakeUp
 
 FULL: Final = f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
 RETRY_S: Final = 0.5
-"""A missing line is tried so often: that disturbs none of the others."""
+"""Time between two attempts to open a missing line, in s; they do not disturb the other lines."""
 
 
 class ByteLine(Transport, Protocol):
     """A ``Transport`` of one channel of bytes."""
 
     def drop_output(self) -> None:
-        """Drop the written bytes that are not sent yet."""
+        """Discard the written bytes that are not sent yet."""
 
 
 Opener = Callable[[], ByteLine]
 
 
 class Several:
-    """A ``Transport`` of lines of one channel each that can be waited for together."""
+    """A ``Transport`` of lines with one channel each, which are polled together."""
 
     def __init__(self, openers: Sequence[Opener], retry_s: float = RETRY_S) -> None:
-        """Raises LinkError where not one of them can be opened, or one may never be."""
+        """Open the lines. Raises LinkError if none can be opened, or one cannot be polled."""
         self._retry_s = retry_s
         self._lines = [Line(opener) for opener in openers]
         self._writing = threading.Lock()
-        """Guards what is still to be written, and which lines are there."""
+        """Lock for the bytes still to be written, and for the set of present lines."""
         self._ready: list[tuple[int, int]] = []
         self._arrivals = select.poll()
         self._channels: dict[int, int] = {}
@@ -61,30 +61,32 @@ class Several:
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Of all lines; None in the place of one that is missing, even if it is still open: a
-        copy of its descriptor in another process would keep it from being opened again."""
+        """Descriptors of all lines; None in the place of a missing one, even if it is still open.
+
+        A copy of its descriptor in another process would keep it from being opened again.
+        """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
     @property
     def missing(self) -> Mapping[int, str]:
-        """Reasons by channel."""
+        """Reasons why lines are missing, by channel."""
         return {channel: line.trouble for channel, line in enumerate(self._lines) if line.trouble}
 
     @property
     def ends_with_us(self) -> bool:
-        """Whether all lines do."""
+        """Whether nothing outside this process receives what is written to any open line."""
         return all(port.ends_with_us for port in self._ports)
 
     @property
     def overruns(self) -> int | None:
-        """The sum of the lines' counts, if each present line has one."""
+        """Sum of the counts of the open lines; None if one of them does not have a count."""
         counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
-        """What has come in on one of them; each in its turn.
+        """Return what has come in on one of the lines; the lines take turns.
 
-        Raises LinesChanged when one is lost, or is there again, and LinkError when none is left.
+        Raises LinesChanged when a line is lost or is back, and LinkError when all are missing.
         """
         if not self._ready:
             self._open_missing()
@@ -112,7 +114,7 @@ class Several:
             return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """Write its part to each line; what is not accepted at once follows later."""
+        """Write to each line its packets; what is not accepted at once follows later."""
         now = time.monotonic()
         with self._writing:
             for line, data in self._shared_out(packets):
@@ -123,7 +125,7 @@ class Several:
             self._wake_up.ring()
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write to each line what it accepts of its part."""
+        """Write to each line what it accepts of its packets at once; return the number of bytes."""
         with self._writing:
             return sum(
                 line.port.write_if_room(((0, data),))
@@ -146,13 +148,13 @@ class Several:
         return [line.port for line in self._lines if line.port is not None]
 
     def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
-        """Split the packets by line, in the order of the first write."""
+        """Yield each line with its bytes, in the order of the lines' first packets."""
         for channel in dict.fromkeys(channel for channel, _ in packets):
             own = tuple(packet for packet in packets if packet[0] == channel)
             yield self._lines[channel], joined(own)
 
     def _open_missing(self) -> None:
-        """Open the missing lines whose time has come. One that accepted no data is closed first."""
+        """Open the missing lines whose retry is due. One that accepted no data is closed first."""
         now = time.monotonic()
         for channel, line in enumerate(self._lines):
             if not line.trouble or now < line.retry_at:
@@ -178,8 +180,10 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write, and see where there is room again; a line that has none for too long is
-        missing."""
+        """Write waiting bytes where there is room, and watch for room where bytes remain.
+
+        A line without room for ``WRITE_TIMEOUT_S`` is regarded as missing.
+        """
         with self._writing:
             for line in self._lines:
                 if line.descriptor is None or not (line.waits or line.watched):
@@ -208,17 +212,21 @@ class Several:
     def _close(self, line: "Line") -> None:
         with self._writing:
             port = line.end()
-        if port is not None:  # what the kernel still has may take it a while
+        if port is not None:  # it may wait for output that the kernel still has
             port.close()
 
     def _require_one(self) -> None:
-        """Raises LinkError where all are missing, with what is wrong with the first."""
+        """Raise LinkError, with the reason of the first line, if all lines are missing."""
         if len(self.missing) == len(self._lines):
             raise LinkError(self._lines[0].trouble)
 
 
 class Line:
-    """One of several. ``trouble``: why it is missing; ``waits``: bytes that it has not taken."""
+    """One of several lines.
+
+    ``trouble`` is the reason why it is missing, or empty. ``waits`` are the bytes that it has not
+    accepted yet.
+    """
 
     def __init__(self, opener: Opener) -> None:
         self.opener = opener
@@ -228,17 +236,20 @@ class Line:
         self.retry_at = 0.0
         self.waits = b""
         self.watched = False
-        """Whether ``poll`` looks for room."""
+        """Whether ``poll`` watches for room to write."""
         self._full_since = 0.0
 
     def begin(self, port: ByteLine) -> None:
-        """Add a line that is present."""
+        """Use this port, which has just been opened."""
         assert port.descriptors is not None
         self.port, (self.descriptor,) = port, port.descriptors
         self.trouble, self.waits, self.watched = "", b"", False
 
     def write(self, data: bytes, now: float) -> bool:
-        """Behind what waits: see ``flush``. One that hangs gets what it has room for."""
+        """Write data after the bytes that wait; return as ``flush`` does.
+
+        A missing line that is still open gets what it has room for.
+        """
         if self.port is None:
             return True
         if self.trouble:
@@ -250,7 +261,10 @@ class Line:
         return self.flush(now)
 
     def flush(self, now: float) -> bool:
-        """Write what waits. False when it was in vain for too long; then nothing of it is sent."""
+        """Write waiting bytes; return False if some remain after ``WRITE_TIMEOUT_S``.
+
+        These bytes, and written ones that are not sent yet, are then discarded.
+        """
         assert self.port is not None
         if self.waits and not self.trouble:
             taken = self.port.write_if_room(((0, self.waits),))
@@ -262,6 +276,6 @@ class Line:
         return True
 
     def end(self) -> ByteLine | None:
-        """The line is lost; returns what is to be closed."""
+        """Mark the line as lost and return the port that is to be closed, if any."""
         port, self.port, self.descriptor, self.waits = self.port, None, None, b""
         return port

@@ -2,9 +2,9 @@
 
 """``sim://``: a simulated board inside this process, as a transport.
 
-Options come after a question mark: ``sim://?seed=1&lose=0.001``. The board begins when the
-transport is opened, and ends with it. Knows the package of the simulated board by its name, and no
-bytes.
+Options follow a question mark: ``sim://?seed=1&lose=0.001``. The board starts when the transport is
+opened, and ends with it. This module knows the package of the simulated board by its name, and not
+the meaning of its bytes.
 """
 
 import threading
@@ -21,23 +21,24 @@ from omnibot_driver.simulator.common.wired import Line
 from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S
 
 UNREAD_DATAGRAMS: Final = 256
-"""About what a socket of Linux holds of small ones."""
+"""Largest number of unread datagrams: about as many small ones as a Linux socket holds."""
 
 
 class SimulatedTransport:
-    """A board in real time at the end of channels that are memory.
+    """A board in real time whose channels are in memory.
 
-    ``simulator``: full name of the package of the simulated board. Raises LinkError where the URL
-    is wrong. ``read`` and ``close`` raise RuntimeError when the board's thread has died: a defect.
+    ``simulator`` is the full name of the package of the simulated board. Raises LinkError if the
+    URL is wrong. ``read`` and ``close`` raise RuntimeError if the board's thread has died, which
+    only a defect can cause.
     """
 
     missing = NONE_MISSING
     overruns: int | None = None
-    """Memory does not overrun."""
+    """None, because memory does not overrun."""
     ends_with_us: bool = True
-    """Nothing outside this process hears what is written."""
+    """Always True: nothing outside this process receives what is written."""
     descriptors: tuple[int, ...] | None = None
-    """Another process could not inherit it."""
+    """None, because another process could not inherit the memory."""
 
     def __init__(self, url: str, simulator: str) -> None:
         self._url = url
@@ -54,7 +55,7 @@ class SimulatedTransport:
         self._board.start()
 
     def read(self) -> Packet:
-        """What has come on one channel, waiting for it; ``(0, b"")`` after a while without.
+        """Wait for data on one channel and return it; ``(0, b"")`` after a while without data.
 
         Raises LinkError after ``close``.
         """
@@ -70,7 +71,7 @@ class SimulatedTransport:
             self._board.write(packet)
 
     def write_if_room(self, packets: Iterable[Packet]) -> int:
-        """Write all packets, as there is always room."""
+        """Write all packets, as there is always room; return the number of bytes."""
         packets = tuple(packets)
         self.write(packets)
         return sum(len(data) for _, data in packets)
@@ -89,7 +90,7 @@ class SimulatedTransport:
 
 
 class InProcessBoard(RunningBoard[SimulatedBoard]):
-    """A board whose channels are memory."""
+    """A running simulated board whose channels are in memory."""
 
     def __init__(self, board: SimulatedBoard, lines: Sequence[Line] = ()) -> None:
         super().__init__(board, lines)
@@ -99,18 +100,18 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
         self._cancelled = False
 
     def unread(self, channel: int = 0) -> int:
-        """The number of unread bytes of a serial channel, or of unread datagrams."""
+        """Return the number of unread bytes of a serial channel, or of unread datagrams."""
         waiting = [data for number, data in self._outbox if number == channel]
         return len(waiting) if self._has_datagrams(channel) else sum(map(len, waiting))
 
     def write(self, packet: Packet) -> None:
-        """Write a packet for the board, which reads it by its next tick."""
+        """Queue a packet for the board, which reads it by its next tick."""
         self._inbox.put(packet)
 
     def read(self, timeout_s: float | None) -> Packet:
-        """The oldest that was not read: a datagram, or bytes that nothing came between.
+        """Return the oldest unread datagram, or the oldest unread bytes of one channel in a row.
 
-        ``(0, b"")`` when the time is over, or after ``cancel``.
+        ``(0, b"")`` after ``timeout_s``, or after ``cancel``.
         """
         with self._came:
             self._came.wait_for(lambda: self._outbox or self._cancelled or self._error, timeout_s)
@@ -122,7 +123,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
             return channel, bytes(data)
 
     def cancel(self) -> None:
-        """Have the ``read`` that waits, or else the next one, return at once."""
+        """End the ``read`` that waits, or else the next one."""
         with self._came:
             self._cancelled = True
             self._came.notify_all()

@@ -2,9 +2,9 @@
 
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
-A packet is one datagram. Only what comes from the address that is written to is heard. A host that
-is away, or where nothing listens, is silent like a board without power: it may be back with the
-next datagram, so the sockets stay open.
+A packet is one datagram. Only datagrams from the address that is written to are received. A host
+that is absent, or on which nothing listens, is silent like a board without power. It may be back
+with the next datagram, so the sockets stay open.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ UNREACHABLE: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH,
 
 
 class UdpPorts:
-    """A ``Transport`` of as many channels as ``channels`` says."""
+    """A ``Transport`` with ``channels`` connected sockets, one for each channel."""
 
     ends_with_us = False
     missing = NONE_MISSING
@@ -57,11 +57,11 @@ class UdpPorts:
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
-        """Descriptors of connected sockets: each write is a datagram."""
+        """Descriptors of the connected sockets; each write is one datagram."""
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
-        """Read one datagram; the channels take turns."""
+        """Return one datagram, or none after a while; the channels take turns."""
         if not self._ready:
             self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
         if not self._ready:
@@ -92,7 +92,7 @@ class UdpPorts:
             raise failed
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write the datagrams that are accepted at once."""
+        """Write the datagrams that are accepted at once; return the number of bytes."""
         taken = 0
         for channel, data in packets:
             with contextlib.suppress(OSError):
@@ -112,7 +112,7 @@ class UdpPorts:
         self._wake_up.close()
 
     def _connect(self, channels: int) -> None:
-        """Connect all sockets to one address of the name."""
+        """Connect all sockets to one address of the host name."""
         family, kind, protocol, _, (address, _, *rest) = socket.getaddrinfo(
             self._host, self._port, type=socket.SOCK_DGRAM
         )[0]
@@ -138,7 +138,7 @@ class UdpPorts:
             except OSError as error:
                 if not (may_be_stale and _is_silence(error)):
                     raise
-                may_be_stale = False  # of a datagram before; this one was not sent
+                may_be_stale = False  # it is of an earlier datagram, and this one was not sent
             else:
                 return
 
@@ -149,7 +149,7 @@ class UdpPorts:
 
 
 def _is_silence(error: OSError) -> bool:
-    """Whether the error means that the other side is absent, as while a controller restarts."""
+    """Return whether the error means that the other side is absent, as while it restarts."""
     return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
 
 

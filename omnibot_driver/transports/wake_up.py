@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What ends a wait for arrivals: a pipe that another thread writes into.
+"""A pipe that ends a thread's wait for arrivals when another thread writes into it.
 
-Knows one pair of descriptors; not what is waited for.
+This module knows one pair of descriptors, and not what is waited for.
 """
 
 import contextlib
@@ -10,23 +10,23 @@ import os
 
 
 class WakeUp:
-    """``descriptor`` is to be waited for beside the others. Raises OSError where none is left."""
+    """A pipe whose ``descriptor`` is polled with the others. Raises OSError if none is left."""
 
     def __init__(self) -> None:
         self.descriptor, self._far = os.pipe()
         os.set_blocking(self._far, False)
 
     def ring(self) -> None:
-        """Wake who waits, or else who waits next; from any thread."""
-        with contextlib.suppress(OSError):  # full: it rings already; or closed
+        """Wake the thread that waits, or else the next one that does; any thread may call this."""
+        with contextlib.suppress(OSError):  # full, so a wake-up is pending; or closed
             os.write(self._far, b"\0")
 
     def answer(self) -> None:
-        """Note that the wake-up was received."""
+        """Consume the wake-up, so that the next wait does not end at once."""
         os.read(self.descriptor, 1000)
 
     def close(self) -> None:
-        """Close it. A second call does nothing."""
+        """Close the pipe. A second call does nothing."""
         for descriptor in (self.descriptor, self._far):
             if descriptor >= 0:
                 os.close(descriptor)

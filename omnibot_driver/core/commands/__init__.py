@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From a command to what goes out, and when."""
+"""Motion commands: from a received command to the packets that carry it out, and their times."""

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a board is made to carry out what is wanted: the seam between policy and bytes.
+"""The interface between the command policy and a board's encoding of motion.
 
-The policy decides what is wanted and for how long. An actuator says it: as set-points that are
-repeated (`set_point_stream.py`), or as a conversation of the board's own. It tells the stop proof
-what went out. It reads no clock and never refuses what the policy wants.
+The policy decides what the robot should do and for how long. An actuator makes the packets for it:
+set-points that are repeated (`set_point_stream.py`), or an exchange specific to the board. It
+reports what it sends to the stop proof. It reads no clock and never refuses what the policy wants.
 """
 
 from typing import Protocol
@@ -15,29 +15,32 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import Packets
 
 Wanted = Setpoint | Stop | EmergencyStop | None
-"""What the robot is to do; None: the line is quiet."""
+"""What the robot should do; None: send nothing."""
 
 
 class Actuator(Protocol):
-    """``rate_hz``: how often a set-point is repeated, where the board needs that."""
+    """The part of a board that carries out motion orders.
+
+    ``rate_hz``: rate at which a set-point is repeated, if the board needs repetition.
+    """
 
     rate_hz: float
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """The body velocity that was said last, in the board's axes, as rounded there.
+        """Body velocity of the last command that was sent, in the board's axes, as rounded there.
 
-        None where any motion is possible.
+        None if any motion is possible.
         """
 
     @property
     def wake_at(self) -> float:
-        """The time at which ``due`` must be called again; infinity while nothing is due."""
+        """Time at which ``due`` must be called again, in s; infinity if nothing is due."""
 
     def is_zero(self, order: Order) -> bool:
-        """Whether the command is a standstill for the board.
+        """Return whether the board stands still under this order.
 
-        Raises CommandRefused if it cannot be encoded.
+        Raises CommandRefused if the order cannot be encoded.
         """
 
     def connect(self) -> None:
@@ -50,4 +53,4 @@ class Actuator(Protocol):
         """Note that a request to the board was sent."""
 
     def due(self, now: float) -> Packets:
-        """The packets to write now, possibly none. They count as written."""
+        """Return the packets to write now, possibly none, and regard them as written."""

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the robot may be driven, or its gyro calibrated, now: if not, why, and what to do.
+"""Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each answer is a sentence, empty when nothing is in the way. Knows modes and phases.
+Each method returns the reason why not, with a remedy, as a sentence; empty if it is possible. Knows
+modes and phases.
 """
 
 from omnibot_driver.core.board import Board, Mode
@@ -15,8 +16,10 @@ from omnibot_driver.core.requests import Request
 
 
 class Interlocks:
-    """``leaving``: the driver is shutting down, and obeys nothing any more. ``missing``: which of
-    several lines are not there, in a sentence.
+    """The conditions under which the driver refuses commands and requests.
+
+    ``leaving``: the driver is shutting down, and refuses everything. ``missing``: which of several
+    lines are not open, as a sentence.
     """
 
     def __init__(
@@ -34,13 +37,13 @@ class Interlocks:
         self.missing = ""
 
     def why_not_request(self) -> str:
-        """The reason why no request is possible now; empty if one is."""
+        """Return the reason why no request is possible now; empty if one is."""
         return "the driver is shutting down" if self.leaving else self.missing
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
-        """The reason why this motion is refused.
+        """Return the reason why this motion is refused; empty if it is allowed.
 
-        Call it once per command, as the motion monitor counts.
+        Call it once per command, because the motion interlock records each arrival.
         """
         if self.leaving or self.missing:
             return self.why_not_request()
@@ -63,7 +66,7 @@ class Interlocks:
         return tripped
 
     def why_not_task(self) -> str:
-        """The reason why no long task can begin; empty if one can."""
+        """Return the reason why a long task cannot begin; empty if it can."""
         if self.leaving:
             return self.why_not_request()
         if self._mode_manager.phase is Phase.CLOSED:
@@ -75,7 +78,7 @@ class Interlocks:
         return ""
 
     def why_not_calibrate(self) -> str:
-        """The reason why the gyro's bias cannot be measured; empty if it can."""
+        """Return the reason why the gyro's bias cannot be measured; empty if it can."""
         phase, mode, current = self._mode_manager.phase, self._board.mode, self._policy.current
         if self.missing:
             return self.missing

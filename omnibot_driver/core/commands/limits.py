@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How fast is allowed; every limit keeps the direction.
+"""Speed limits for commands; every limit keeps the direction of motion.
 
-Pure arithmetic on finite numbers; ``require_finite`` is where others are turned away.
+Pure arithmetic on finite numbers; ``require_finite`` rejects all others.
 """
 
 import math
@@ -15,9 +15,13 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLimits:
-    """The fastest that is commanded: m/s as a vector, rad/s of yaw, rad/s of the fastest wheel.
+    """The largest speeds and accelerations that are commanded.
 
-    ``linear_mps2``, ``angular_radps2``: how fast a base velocity is changed; 0 is at once.
+    * ``linear_mps``: length of the linear velocity, in m/s.
+    * ``angular_radps``: yaw rate, in rad/s.
+    * ``wheel_radps``: rate of the fastest wheel, in rad/s.
+    * ``linear_mps2``, ``angular_radps2``: rate of change of a body velocity, in m/s² and rad/s²; 0:
+      unlimited.
     """
 
     linear_mps: float = 0.5
@@ -27,7 +31,7 @@ class SpeedLimits:
     angular_radps2: float = 0.0
 
     def stricter_than(self, other: "SpeedLimits") -> bool:
-        """Whether any of these limits is lower than the other's."""
+        """Return whether any of these speed limits is lower than that of ``other``."""
         return (
             self.linear_mps < other.linear_mps
             or self.angular_radps < other.angular_radps
@@ -35,7 +39,7 @@ class SpeedLimits:
         )
 
     def allow(self, twist: BodyTwist) -> bool:
-        """Whether the value is within the limits; NaN and infinity never are."""
+        """Return whether the twist is below the speed limits; NaN and infinity never are."""
         return (
             twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
             < self.linear_mps * self.linear_mps
@@ -43,13 +47,16 @@ class SpeedLimits:
         )
 
     def twist(self, wanted: BodyTwist) -> BodyTwist:
-        """The linear velocity shortened in its own direction, the yaw rate clamped."""
+        """Return the twist with its linear velocity shortened and its yaw rate clamped."""
         vx, vy = shorten((wanted.vx_mps, wanted.vy_mps), self.linear_mps)
         yaw_rate = max(-self.angular_radps, min(self.angular_radps, wanted.yaw_rate_radps))
         return BodyTwist(vx, vy, yaw_rate)
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
-        """The velocity after ``duration_s`` on the straight way to what is wanted."""
+        """Return the velocity after ``duration_s`` of the limited acceleration from ``now``.
+
+        ``now`` is the present twist. The velocity changes along a straight line to ``wanted``.
+        """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),
             (wanted.vx_mps, wanted.vy_mps),
@@ -63,12 +70,12 @@ class SpeedLimits:
         return BodyTwist(vx, vy, yaw_rate)
 
     def wheels(self, wanted_radps: Sequence[float]) -> tuple[float, ...]:
-        """All wheels slowed alike until the fastest is within its limit."""
+        """Return the rates, all scaled alike until the fastest wheel is within its limit."""
         return slow(wanted_radps, self.wheel_radps)
 
 
 def require_finite(what: str, values: Sequence[float]) -> None:
-    """Raises CommandRefused, naming ``what``, when a value is NaN or infinite."""
+    """Raise CommandRefused, naming ``what``, if a value is NaN or infinite."""
     if not all(map(math.isfinite, values)):
         numbers = ", ".join(f"{value:g}" for value in values)
         raise CommandRefused(
@@ -78,7 +85,7 @@ def require_finite(what: str, values: Sequence[float]) -> None:
 
 
 def require_timely(what: str, age_s: float, longest_s: float) -> None:
-    """Raises CommandRefused for what was sent too long ago, or as far in the future."""
+    """Raise CommandRefused if ``age_s`` is more than ``longest_s`` in the past or the future."""
     if abs(age_s) <= longest_s:
         return
     if age_s > 0.0:
@@ -94,7 +101,7 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
 
 
 def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
-    """The vector with a Euclidean length of at most ``limit``, however large it is."""
+    """Return the vector with a Euclidean length of at most ``limit``, without overflow."""
     largest = max(map(abs, vector))
     if largest == 0.0:
         return tuple(vector)
@@ -103,13 +110,13 @@ def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
 
 
 def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
-    """The values scaled together until the largest magnitude is at most ``limit``."""
+    """Return the values, scaled together until the largest magnitude is at most ``limit``."""
     largest = max(map(abs, values))
     return tuple(values) if largest <= limit else _scale(values, limit / largest)
 
 
 def _step(now: Sequence[float], wanted: Sequence[float], longest: float) -> tuple[float, ...]:
-    """Move one vector towards another, by at most ``longest``."""
+    """Return the vector ``now`` moved towards ``wanted`` by at most ``longest``."""
     way = tuple(there - here for here, there in zip(now, wanted, strict=True))
     if math.hypot(*way) <= longest:
         return tuple(wanted)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a robot that did not move as commanded has to wait for until it may move again.
+"""The motion interlock: refuses motion after the motion monitor has stopped the robot.
 
-Knows when commands arrive and when the motion monitor tripped; not why it did, nor what is
-commanded. Time is an argument.
+Knows when commands arrive and when the monitor tripped; not why it did, nor what is commanded. Time
+is an argument.
 """
 
 import math
@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Who trips the motion monitor twice within this time has not found the cause."""
+"""Time, in s, within which a second trip shows that the cause of the first was not found."""
 
 
 class Until(Enum):
@@ -27,7 +27,11 @@ class Until(Enum):
 
 
 class MotionInterlock:
-    """``until``: what motion is refused until; ``starts``: whether there is a ~/start."""
+    """The state of the interlock.
+
+    ``until``: what ends the refusal of motion. ``trips``: number of trips. ``starts``: whether the
+    board supports ~/start.
+    """
 
     def __init__(self, *, starts: bool = True) -> None:
         self._for_good = Until.START if starts else Until.ESTOP
@@ -36,7 +40,7 @@ class MotionInterlock:
         self._tripped_at = self._commanded_at = -math.inf
 
     def trip(self, now: float) -> None:
-        """Note that the robot was stopped, as it did not move as commanded."""
+        """Refuse motion, as the robot did not move as commanded and was stopped."""
         again = now - self._tripped_at <= AGAIN_S or self.until is self._for_good
         self.until = self._for_good if again else Until.RELEASE
         self.trips += 1
@@ -52,9 +56,11 @@ class MotionInterlock:
             self.start()
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
-        """A motion command arrived, or one to stand still: why it is refused; empty if it is not.
+        """Note a command, and return the reason why it is refused; empty if it is allowed.
 
-        A refused command is a sign that its sender goes on, so silence is counted from there.
+        ``stands``: whether it is a command to stand still, which is always allowed. The pause of
+        ``timeout_s`` that ends a refusal begins after the last motion command, refused or not,
+        because a refused command shows that its sender is still active.
         """
         silent = now - self._commanded_at >= timeout_s
         if not stands:
@@ -64,7 +70,7 @@ class MotionInterlock:
         return "" if stands or self.until is Until.NOTHING else self.reason(timeout_s)
 
     def reason(self, timeout_s: float) -> str:
-        """The reason why motion is refused, with a remedy; empty if it is allowed."""
+        """Return the reason why motion is refused, with a remedy; empty if it is allowed."""
         if self.until is Until.RELEASE:
             return (
                 "the motion monitor has stopped the robot; send a zero command, or none for"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a board is ordered to do, in SI units and the board's own axes; values only.
+"""Motion orders to a board, in SI units and the board's own axes; values without behaviour.
 
 An order has passed every check and limit. The actuator of a board encodes it.
 """
@@ -14,12 +14,12 @@ from omnibot_driver.core.values import value
 
 @value(frozen=True, slots=True)
 class Stop:
-    """Encode an order to stand still."""
+    """Stand still."""
 
 
 @value(frozen=True, slots=True)
 class EmergencyStop:
-    """Stand still, by the board's emergency stop too where it has one."""
+    """Stand still, also by the board's emergency stop if it has one."""
 
 
 @value(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class TurnWheels:
 
 @value(frozen=True, slots=True)
 class GoTo:
-    """Drive to this pose in the board's earth frame, and stay."""
+    """Drive to this pose in the board's earth frame, and stay there."""
 
     place: Pose
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion commands, from a wish to what comes of it: when each expires, and whether the robot obeys.
+"""The command pipeline: from a motion command to its set-point, expiry and supervision.
 
 Composes shaping, policy, the actuator and the motion monitor with its interlock. Knows no modes and
-no requests: whether a robot may be driven now is decided elsewhere.
+no requests: ``interlocks.py`` decides whether a robot may be driven now.
 """
 
 import math
@@ -32,13 +32,17 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.settings import SessionSettings
 
 Command = tuple[Setpoint, float]
-"""A motion that may be commanded, and when it expires."""
+"""A motion that has passed the checks, and the time when it expires, in s."""
 NEVER: Final = math.inf
 
 
 class CommandPipeline:
-    """``policy`` is what is wanted; ``obeys``: whether the robot can be expected to do it;
-    ``interlock`` refuses motion after it did not; ``monitored``: whether that is looked after.
+    """The path of motion commands in one session.
+
+    * ``policy``: the command in effect, its expiry and the e-stop latch.
+    * ``interlock``: refuses motion after the motion monitor has stopped the robot.
+    * ``monitored``: whether the motion monitor is enabled.
+    * ``obeys``: whether the robot can be expected to follow commands; False for a recording.
     """
 
     def __init__(
@@ -68,9 +72,9 @@ class CommandPipeline:
         self.monitored = settings.motion_monitor
 
     def configure(self, settings: SessionSettings, now: float) -> list[str]:
-        """New settings, from the next command and frame on; sentences for the user.
+        """Apply new settings from the next command and frame on; return notices for the user.
 
-        What was commanded under looser ones ends.
+        A motion in progress ends if a limit or the timeout has become stricter.
         """
         if settings.motion_monitor is not self.monitored:
             self.monitored = settings.motion_monitor
@@ -89,7 +93,10 @@ class CommandPipeline:
         return ["robot stopped because a limit was lowered; send a new command"]
 
     def check_anew(self, now: float) -> list[str]:
-        """The board's settings have changed: the command that is repeated is said in them."""
+        """Encode the current command with the board's new settings; return notices for the user.
+
+        The robot is stopped if they cannot encode it.
+        """
         if self.policy.current is None:
             return []
         try:
@@ -100,7 +107,7 @@ class CommandPipeline:
         return []
 
     def figures(self, now: float) -> CommandFigures:
-        """Return the current authority and its counters."""
+        """Return the current authority and the counters of commands."""
         current = self.policy.current
         return CommandFigures(
             source=current.authority.value if current else None,
@@ -118,13 +125,16 @@ class CommandPipeline:
         self._monitor.begin()
 
     def release(self, now: float) -> None:
-        """End the e-stop."""
+        """Release the e-stop."""
         self.policy.release(now)
         self.interlock.release()
         self._monitor.release()
 
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
-        """Drive the body. Raises CommandRefused, as all commands do."""
+        """Return the command for a body velocity. Raises CommandRefused, as all commands do.
+
+        ``age_s``: age of the command by its sender's stamp, in s, by which it expires sooner.
+        """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
         if age_s:
@@ -134,11 +144,11 @@ class CommandPipeline:
         return motion, expires_at
 
     def wheels(self, rates_radps: Sequence[float], now: float) -> Command:
-        """Turn the wheels, in the board's order."""
+        """Return the command for wheel rates in rad/s, in the board's order of wheels."""
         return self._shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
-        """Drive to a pose in the odometry frame."""
+        """Return the command to drive to a pose in the odometry frame; it never expires."""
         return self._shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
@@ -146,27 +156,27 @@ class CommandPipeline:
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Note that the wanted set-point was sent: the robot is expected to follow it."""
+        """Note that the current set-point was sent: the robot is expected to follow it."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
     def look(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> list[str]:
-        """Compare what the robot did with what was commanded; sentences for the user."""
+        """Compare the robot's motion with the commands; return notices for the user."""
         self.policy.proof.look(reading, now)
         fault = self._check(reading, estimates, now) if self.monitored and self._obeys else None
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """``count``: displacements so far that no robot can have made; sentences for the user."""
+        """Note that ``count`` displacements so far were impossible; return notices for the user."""
         fault = self._monitor.count_refused(count, now) if self.monitored and self._obeys else None
         return self._react_to(fault, now)
 
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Check the newest estimate, or the bare displacement without one."""
+        """Return the fault that the newest estimate, or else the displacement, shows."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()
@@ -182,7 +192,7 @@ class CommandPipeline:
         return self._monitor.check(motion, seconds, now, heading_known=known)
 
     def _react_to(self, fault: Fault | None, now: float) -> list[str]:
-        """Stop a robot that moves otherwise than commanded; say what is wrong."""
+        """Stop a robot that does not move as commanded; return notices for the user."""
         if fault is None:
             return []
         advice = self._advice.get(fault, "")
@@ -203,7 +213,7 @@ class CommandPipeline:
         return [said] if self._monitor.is_news(fault) else []
 
     def _seen(self) -> str:
-        """Describe the commanded and the measured twist, in REP-103's axes."""
+        """Return the commanded and the measured twist as text, in REP-103's axes."""
         x, y, yaw = self._axis_signs
         commanded, measured = (
             f"{x * twist.vx_mps:.2f}, {y * twist.vy_mps:.2f} m/s, {yaw * twist.yaw_rate_radps:.2f}"
@@ -213,7 +223,7 @@ class CommandPipeline:
         return f" (commanded {commanded}; measured {measured})"
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
-        """Drop a goal that is another place by now, or that the robot drives away from."""
+        """Drop a goal whose frame has changed, or from which the robot drives away."""
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):
             return []

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is wanted of the robot: one authority at a time, expiry, the e-stop latch, proved stops.
+"""The command policy: one authority at a time, expiry, the e-stop latch, proved stops.
 
-No board stops by itself. So when a command expires, Stop is wanted until the robot is seen to
-stand. How it is said is the actuator's business; time is an argument.
+No board stops by itself. So when a command expires, Stop is repeated until displacements show that
+the robot stands. The actuator encodes it; time is an argument.
 """
 
 import math
@@ -17,23 +17,29 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import Packets
 
 STOPPING_S: Final = 1.0
-"""The least time for which Stop is wanted..."""
+"""Shortest time for which Stop is repeated, in s."""
 UNPROVED_S: Final = 5.0
-"""... and the longest, while nothing shows that the robot stands."""
+"""Longest time for which Stop is repeated while nothing shows that the robot stands, in s."""
 ROUNDING_S: Final = 1e-6
-"""After this margin it is over for certain, however the times are rounded."""
+"""Margin after which a time has passed for certain, however it is rounded, in s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandSettings:
-    """``timeout_s``: age at which a command expires; ``rate_hz``: how often it is repeated."""
+    """The settings of the policy.
+
+    ``timeout_s``: age at which a command expires; ``rate_hz``: rate of its repetition.
+    """
 
     timeout_s: float = 0.5
     rate_hz: float = 20.0
 
 
 class CommandPolicy:
-    """``proof``: what the actuator tells of stops and motions, and displacements of the robot."""
+    """The command in effect: what the robot should do now.
+
+    ``proof``: proof that the robot stands, fed with displacements and with what the actuator sends.
+    """
 
     def __init__(
         self,
@@ -48,12 +54,12 @@ class CommandPolicy:
         self.configure(settings)
         self.latched = False
         self.current: Setpoint | None = None
-        """The command that is being carried out."""
+        """Command in effect, or None."""
         self.commanded_at = -math.inf
         self.quiet = False
-        """It has fallen silent, and nothing was commanded since."""
+        """Whether ``fall_silent`` was called, without a ``halt`` since."""
         self.unconfirmed = False
-        """Stop was wanted for ``unproved_s`` and a robot that was driven is not seen to stand."""
+        """Whether Stop was repeated for ``unproved_s`` without proof that a driven robot stands."""
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
 
@@ -63,7 +69,7 @@ class CommandPolicy:
         self._actuator.rate_hz = settings.rate_hz
 
     def command(self, setpoint: Setpoint, now: float, *, expires_at: float) -> None:
-        """Replace the current command; a latched e-stop refuses it."""
+        """Replace the current command; no effect while the e-stop is latched."""
         if self.latched:
             return
         self.current = setpoint
@@ -72,7 +78,7 @@ class CommandPolicy:
         self._actuator.apply(setpoint, now)
 
     def discard(self, now: float) -> None:
-        """No command is current and the line goes quiet; a latched e-stop stays."""
+        """Drop the current command and send nothing more; a latched e-stop stays."""
         self.current = self._stopping_since = None
         if not self.latched:
             self._actuator.apply(None, now)
@@ -86,34 +92,37 @@ class CommandPolicy:
             self._actuator.apply(EMERGENCY_STOP, now)
 
     def halt(self, now: float) -> None:
-        """Discard the command, stop at once, and go on until the robot is seen to stand."""
+        """Drop the current command, and repeat Stop until the robot is seen to stand.
+
+        While the e-stop is latched, the emergency stop is repeated instead.
+        """
         self.current = None
         self.quiet = False
         self._stopping_since = None if self.latched else now
         self._actuator.apply(EMERGENCY_STOP if self.latched else STOP, now)
 
     def fall_silent(self, now: float) -> None:
-        """Send nothing more, and prove the last Stop again."""
+        """Send nothing more, and prove the last Stop anew."""
         self.discard(now)
         self.quiet = True
         self.proof.begin()
         self.proof.stopped(now)
 
     def latch(self, now: float) -> None:
-        """Latch the emergency stop until the release."""
+        """Latch the e-stop until its release."""
         if not self.latched:
             self.current = self._stopping_since = None
             self.latched = True
             self._actuator.apply(EMERGENCY_STOP, now)
 
     def release(self, now: float) -> None:
-        """End the e-stop; the robot stays stopped until the next command."""
+        """Release the e-stop; the robot stays stopped until the next command."""
         if self.latched:
             self.latched = False
             self.halt(now)
 
     def due(self, now: float) -> Packets:
-        """The packets to write now, possibly none. They count as written."""
+        """Return the packets to write now, possibly none, and regard them as written."""
         if self.current is not None and now >= self._expires_at:
             self.halt(now)
         if self._stopping_since is not None and now - self._stopping_since >= self._stopping_s:
@@ -124,7 +133,7 @@ class CommandPolicy:
 
     @property
     def wake_at(self) -> float:
-        """The time at which ``due`` must be called again; infinity while the line is quiet."""
+        """Time at which ``due`` must be called again, in s; infinity if nothing is to be sent."""
         if self.current is not None:
             return min(self._actuator.wake_at, self._expires_at)
         if self._stopping_since is not None:
@@ -134,5 +143,5 @@ class CommandPolicy:
 
     @property
     def _stopping_s(self) -> float:
-        """The time for which Stop is wanted."""
+        """Time for which Stop is repeated, in s."""
         return STOPPING_S if self.proof.proved else self._unproved_s

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An actuator for boards that obey set-points: which frame goes out when, paced and repeated.
+"""An actuator for boards that follow set-points: when to send which frame, and repetition.
 
-Nothing acknowledges a frame, so each is repeated. This module does not know what is in a frame;
-time is an argument.
+Boards do not acknowledge these frames, so each is repeated. This module does not know what is in a
+frame; time is an argument.
 """
 
 import math
@@ -18,33 +18,35 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 PACE_S: Final = 0.01
-"""Frames closer together than this would only fill a board's buffer."""
+"""Shortest time between frames, in s; closer ones would only fill the board's buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Between two set-points. More of them would raise the share of time that a lost byte can take
-(docs/internals/integrity.md); commands at 50 Hz are not slowed."""
+"""Shortest time between two set-points, in s. More of them would raise the share of time that a
+lost byte can affect (docs/internals/integrity.md); commands at 50 Hz are not slowed."""
 STOP_RATE_HZ: Final = 20.0
-"""Stop and the emergency stop are repeated at least so often."""
+"""Lowest repetition rate of Stop and the emergency stop."""
 
 
 class Encoder(Protocol):
-    """A board's frames, as its settings are now."""
+    """The encoding of a board's frames with its present settings."""
 
     def stop(self) -> Packets:
-        """Encode an order to stand still."""
+        """Return the packets that make the robot stand still."""
 
     def emergency_stop(self) -> Packets:
-        """The board's own emergency stop, and nothing else."""
+        """Return only the board's own emergency stop, without a Stop after it."""
 
     def encode(self, order: Order) -> Packets:
-        """The frames that say it. Raises CommandRefused where none can."""
+        """Return the packets that encode this order. Raises CommandRefused if none can."""
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """The body velocity that these frames command, in the board's axes, as rounded."""
+        """Return the body velocity that these packets command, as rounded, in the board's axes."""
 
 
 class SetpointStream:
-    """``proof`` hears of each stop and each motion that goes out; ``heard``, if there is one, of
-    all packets, those of requests among them.
+    """An actuator that repeats the set-point in effect.
+
+    ``proof`` is notified of each stop and motion that is sent. ``heard``, if given, is called with
+    all packets that are written, including those of requests, and the time.
     """
 
     def __init__(
@@ -62,18 +64,18 @@ class SetpointStream:
         self.connect()
 
     def is_zero(self, order: Order) -> bool:
-        """Whether its frames are Stop; rounding may make them so."""
+        """Return whether the order is encoded as Stop, possibly by rounding."""
         return self._encoder.encode(order) == self._encoder.stop()
 
     def connect(self) -> None:
-        """Start anew: nothing has been sent on this connection."""
+        """Begin a new connection, on which nothing has been sent."""
         self._motion: Setpoint | None = None
         self._standing: Stop | EmergencyStop | None = None
         self._fresh = self._urgent = self._switching = False
         self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the wanted set-point; that of another authority is stopped first."""
+        """Replace the order in effect; if the authority changes, Stop is sent first."""
         rested = now - self._stop_at >= PACE_S
         if wanted is None or isinstance(wanted, Stop | EmergencyStop):
             begins = wanted is not self._standing
@@ -90,7 +92,11 @@ class SetpointStream:
             self._fresh_at = self._stop_at
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Some begin with Stop. What others left of a motion frame is completed: say it again."""
+        """Note that a request was written, and adapt what to send next.
+
+        Packets that begin with Stop on every channel count as a Stop. Any others may have completed
+        a damaged motion frame on the line, so the set-point is repeated at once.
+        """
         if self._heard is not None:
             self._heard(packets, now)
         first = dict(reversed(packets))
@@ -102,7 +108,7 @@ class SetpointStream:
             self._said_at = -math.inf
 
     def due(self, now: float) -> Packets:
-        """The frames to write now."""
+        """Return the frames to write now, and regard them as written."""
         if now < self.wake_at:
             return NO_PACKETS
         motion = self._motion
@@ -121,7 +127,7 @@ class SetpointStream:
 
     @property
     def wake_at(self) -> float:
-        """The time at which the next frame is due."""
+        """Time at which the next frame is due, in s; infinity if none is."""
         motion = self._motion
         if self._urgent:
             return -math.inf

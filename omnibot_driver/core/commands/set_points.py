@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is commanded, as the order that it is at each moment.
+"""Set-points: a motion command, and the order that it means at each moment.
 
-A ``Setpoint`` is one command. The actuator asks it for its order whenever a frame goes out, so a
-set-point that nears its target by an acceleration limit needs no timer of its own. Whether it may
-be commanded, and when a frame goes out, is others' business.
+The actuator asks a ``Setpoint`` for its order whenever a frame is sent, so a set-point under an
+acceleration limit needs no timer of its own. Other modules decide whether it may be commanded, and
+when a frame is sent.
 """
 
 import math
@@ -18,16 +18,17 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 LONGEST_STEP_S: Final = 0.05
-"""A frame that goes out late does not make up for more time than this."""
+"""Longest time that one ramp step makes up for, in s, even if its frame is sent later."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""No controller that drives to a goal overshoots by this much."""
+"""Increase of the distance and of the angle to a goal, beyond the overshoot of any controller, that
+shows that the robot drives away."""
 
 
 class Authority(Enum):
-    """The topic that commands the robot; the value is its name. One at a time, the newest."""
+    """The topic that commands the robot; the value is its name. The newest one is in effect."""
 
     BASE = "cmd_vel"
     WHEELS = "wheel_cmd"
@@ -39,27 +40,29 @@ class Setpoint(Protocol):
 
     @property
     def authority(self) -> Authority:
-        """The topic that gave the command."""
+        """Topic that gave the command."""
 
     @property
     def is_zero(self) -> bool:
-        """Whether it commands standstill, which never waits and is never ramped."""
+        """Whether it commands standstill, which is sent at once and never ramped."""
 
     @property
     def settled(self) -> bool:
-        """Whether the next order is the same as this one."""
+        """Whether all later orders are the same as the present one."""
 
     def order(self, now: float) -> Order:
-        """The order at this time."""
+        """Return the order for this time."""
 
     def check_anew(self) -> None:
-        """Check the order with new settings. Raises CommandRefused if they cannot encode it."""
+        """Check the order against new settings. Raises CommandRefused if they cannot encode it."""
 
 
 class BaseSetpoint:
-    """A body velocity, approached by the acceleration limits from what was commanded before.
+    """A body velocity, approached from the previous one within the acceleration limits.
 
-    ``is_zero`` is the actuator's. Raises CommandRefused.
+    ``is_zero``: the actuator's method, which may raise CommandRefused. ``before``: the previous
+    set-point; a ramp starts at its velocity if it is a BaseSetpoint too, otherwise at rest.
+    ``since``: earliest time from which the first ramp step is counted, in s.
     """
 
     authority: Final = Authority.BASE
@@ -78,7 +81,7 @@ class BaseSetpoint:
         self.is_zero = is_zero(self._order)
         self._setpoint, self._reached_at = wanted, since
         self.settled = self.is_zero or not (limits.linear_mps2 or limits.angular_radps2)
-        """Whether the set-point has arrived."""
+        """Whether the ramp has reached the commanded velocity."""
         if not self.settled:
             self._setpoint = AT_REST
             if isinstance(before, BaseSetpoint):
@@ -86,7 +89,7 @@ class BaseSetpoint:
                 self._reached_at = max(before._reached_at, since)
 
     def order(self, now: float) -> Order:
-        """The set-point of this time; asking moves it."""
+        """Return the order for this time, and advance the ramp to it."""
         if not self.settled:
             duration_s = min(now - self._reached_at, LONGEST_STEP_S)
             self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)
@@ -96,7 +99,7 @@ class BaseSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Continue a ramp with new settings."""
+        """Update ``is_zero`` with new settings; a ramp to what is now a standstill ends."""
         self.is_zero = self._is_zero(Drive(self._wanted))
         if self.is_zero:
             self._setpoint, self.settled = self._wanted, True
@@ -104,7 +107,10 @@ class BaseSetpoint:
 
 
 class SteadySetpoint:
-    """A command whose order does not change. Raises CommandRefused."""
+    """A command whose order does not change.
+
+    ``is_zero``: the actuator's method, which may raise CommandRefused.
+    """
 
     settled: Final = True
 
@@ -116,19 +122,23 @@ class SteadySetpoint:
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
-        """The order, which does not change."""
+        """Return the order, which does not change."""
         return self._order
 
     def check_anew(self) -> None:
-        """Update whether the order is a standstill with the present settings."""
+        """Update ``is_zero`` with new settings."""
         self.is_zero = self._is_zero(self._order)
 
 
 class GoalSetpoint:
-    """A pose to drive to: ``goal`` in the odometry frame, as that lay at this ``alignment``.
+    """A pose to drive to.
 
-    ``place`` is the same in the board's frame; ``direct``: the board drives straight at it, and
-    nowhere else first. Raises CommandRefused.
+    * ``goal``: in the odometry frame.
+    * ``place``: the same pose in the board's earth frame.
+    * ``alignment``: ``Odometry.alignments`` at the time of the command; identifies how the two
+      frames lie.
+    * ``check``: the actuator's method, which raises CommandRefused if the order cannot be encoded.
+    * ``direct``: whether the board drives straight to the goal.
     """
 
     authority: Final = Authority.POSE
@@ -151,15 +161,15 @@ class GoalSetpoint:
         self.check_anew()
 
     def order(self, now: float) -> Order:
-        """The order, which does not change."""
+        """Return the order, which does not change."""
         return self._order
 
     def check_anew(self) -> None:
-        """Check that the order can still be encoded."""
+        """Check that the order can still be encoded. Raises CommandRefused if not."""
         self._check(self._order)
 
     def is_left_by(self, pose: Pose) -> bool:
-        """Whether the robot has been clearly nearer to the goal before."""
+        """Return whether the robot drives away: it was clearly nearer to the goal before."""
         if not self._direct:
             return False
         way = pose.way_to(self._goal)

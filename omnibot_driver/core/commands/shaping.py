@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From wishes to set-points: checked, limited, in the board's own axes and frame.
+"""Command shaping: from what a caller wants to set-points in the board's axes and frame.
 
-Knows what may be wished for and where the board's switch stands; not what mode the board is in, nor
-when anything is sent.
+Commands are checked and limited here. Knows the limits and the position of the board's control
+switch; not when anything is sent.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,11 @@ ControlMethod = Literal["velocity", "position"]
 
 
 class CommandShaper:
-    """``limits`` may be replaced at any time. Every method raises CommandRefused."""
+    """The checks and limits of motion commands. Every method raises CommandRefused.
+
+    ``limits`` may be replaced at any time. ``control``: position of the board's control switch, or
+    None for a board without one.
+    """
 
     def __init__(
         self,
@@ -44,10 +48,10 @@ class CommandShaper:
         self._board, self._actuator, self._odometry = board, actuator, odometry
         self._axis_signs, self._control = axis_signs, control
         self.limited = 0
-        """Wishes that went beyond the limits."""
+        """Number of commands that exceeded the limits."""
 
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
-        """Drive the body; a ramp starts at the set-point ``before``."""
+        """Return the set-point for a body velocity; a ramp starts at the set-point ``before``."""
         if self._control == "position":
             raise self._at_odds(Authority.BASE)
         limited = twist
@@ -65,7 +69,7 @@ class CommandShaper:
         )
 
     def wheels(self, rates_radps: Sequence[float]) -> Setpoint:
-        """Turn the wheels, in the board's order."""
+        """Return the set-point for wheel rates in rad/s, in the board's order of wheels."""
         if self._control == "position":
             raise self._at_odds(Authority.WHEELS)
         wheels = self._board.traits.wheels
@@ -80,7 +84,7 @@ class CommandShaper:
         return SteadySetpoint(Authority.WHEELS, TurnWheels(limited), self._actuator.is_zero)
 
     def pose(self, goal: Pose) -> Setpoint:
-        """Drive to a pose in the odometry frame and stay there."""
+        """Return the set-point to drive to a pose in the odometry frame and stay there."""
         if self._control == "velocity":
             raise self._at_odds(Authority.POSE)
         require_finite("cmd_pose", (goal.x_m, goal.y_m, goal.yaw_rad))

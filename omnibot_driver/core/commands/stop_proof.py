@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the robot is known to stand still since it was last told to.
+"""The stop proof: whether displacements show that the robot stands since the last Stop.
 
-A stop is not acknowledged, but displacements show it. Knows displacements and when Stop and motion
-went out; not what is done while the proof is missing. Time is an argument.
+Boards do not acknowledge a stop, but displacements show it. Knows displacements and when Stop and
+motion were sent; not what happens while the proof is missing. Time is an argument.
 """
 
 import math
@@ -13,27 +13,31 @@ from omnibot_driver.core.readings import DisplacementReading
 
 STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
-"""Above two encoder counts of a wheel in 40 ms, below the slowest linear command (0.014 m/s)."""
+"""Largest speeds of a robot that stands: above two encoder counts of a wheel in 40 ms, below the
+slowest linear command (0.014 m/s)."""
 STILL_S: Final = 0.1
-"""Three displacements of 40 ms."""
+"""Default duration of standstill for a proof, in s: three displacements of 40 ms, rounded down."""
 SLACK_S: Final = 1e-6
-"""Three times 0.2 s are a little less than 0.6 s in floating point."""
+"""Tolerance for rounding, in s: three times 0.2 s are a little less than 0.6 s in floating
+point."""
 AT_LEAST: Final = 2
-"""Displacements, where one is as long: one alone may be damaged, or be from before the wheels
-turned."""
+"""Fewest displacements of a proof, even if one is long enough: one alone may be damaged, or be from
+before the wheels turned."""
 PROOFS: Final = 2.0
-"""Factor on the time in which a standstill has to be seen."""
+"""Factor on the duration of standstill; the product is the time to wait for the proof."""
 RAREST_S: Final = 1.0
-"""A longer displacement is that of a gap."""
+"""Longest period of displacements, in s; a longer displacement is that of a gap."""
 UNDER_WAY_S: Final = 0.05
-"""A displacement that arrives so soon after Stop went out may have ended before Stop arrived."""
+"""Time after Stop in which displacements are ignored, in s: they may have ended before Stop
+arrived."""
 
 
 class StopProof:
-    """``proved``: Stop went out, no motion since, and the robot has stood for ``still_s``.
+    """The proof that the robot stands.
 
-    ``owed``: motion went out, and since then nothing has proved that the robot stands.
-    ``measured``: a displacement has come since Stop went out.
+    * ``proved``: Stop was sent, no motion since, and the robot has stood for ``still_s``.
+    * ``owed``: motion was sent, and nothing has proved since then that the robot stands.
+    * ``measured``: a measured displacement has arrived since Stop was sent.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:
@@ -43,7 +47,7 @@ class StopProof:
         self.begin()
 
     def begin(self) -> None:
-        """Start a proof: nothing is known of the robot's motion yet."""
+        """Begin a proof: the robot's motion is unknown."""
         self.proved = self.measured = False
         self._stopped_at = math.inf
         self._still_s, self._still = 0.0, 0
@@ -54,20 +58,20 @@ class StopProof:
         self.owed = True
 
     def stopped(self, now: float) -> None:
-        """Stop went out."""
+        """Note that Stop was sent."""
         self._stopped_at = min(self._stopped_at, now)
 
     def paused(self) -> None:
-        """Note that the board is paused: its motors are off."""
+        """Note that the board is paused, which proves the standstill: its motors are off."""
         self.proved, self.owed = True, False
 
     @property
     def takes_s(self) -> float:
-        """The time to wait for a proof, given the period of the displacements."""
+        """Time to wait for a proof, given the period of the displacements, in s."""
         return max(PROOFS * self._needed_s, UNDER_WAY_S + (AT_LEAST + 1) * self._period_s)
 
     def look(self, reading: DisplacementReading, now: float) -> None:
-        """Look at a displacement."""
+        """Update the proof with a displacement that arrived at ``now``."""
         self._period_s = min(reading.duration_s or 0.0, RAREST_S)
         if not reading.duration_s or not reading.measured or now < self._stopped_at + UNDER_WAY_S:
             return

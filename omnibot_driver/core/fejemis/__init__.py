@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis sweeping robot: two Teensys, lines of text. Bytes and times, nothing else."""
+"""The Fejemis sweeping robot: two Teensy boards that send and obey lines of text.
+
+The package works on bytes and times only, without ports, clocks or ROS.
+"""
 
 from omnibot_driver.core.fejemis.decoder import FejemisDecoder
 from omnibot_driver.core.fejemis.readings import (

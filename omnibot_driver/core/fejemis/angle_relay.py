@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of the front wheel as a line for the drive board, in digits that damage cannot change.
+"""The front wheel's angle as a line for the drive board, in digits chosen against damage.
 
-Two lost characters whose codes add up to 99 change no sum, wherever they stand. So an angle is sent
-in digits without such a pair, and rounded for that by half a degree at most; what is rounded off is
-sent with the next angles, so the mean is right. To the right some angles have a ``6`` that no
-rounding avoids: their minus sign and that ``6`` can be lost unseen, which leaves less than 10° to
-the left.
+Two lost characters whose codes add up to 99 do not change the sum, wherever they are. So an angle
+is sent in digits without such a pair, and rounded for that by half a degree at most. The rounding
+error is added to the next angles, so the mean is right. Some angles to the right contain a ``6``
+that rounding cannot avoid: their minus sign and that ``6`` can be lost undetected, which leaves an
+angle of less than 10° to the left.
 
-Without sums any character can be lost unseen. Then whole degrees are sent, of which any loss leaves
-a smaller number: beyond 90° the board would compute an inner wheel faster than the outer one.
-Knows no sums but their modulus.
+Without sums, the loss of any character is undetected. Then whole degrees are sent, in which any
+loss leaves a smaller number: beyond 90° the board would compute an inner wheel faster than the
+outer one. Of the sums the module knows only the modulus.
 """
 
 import math
@@ -24,22 +24,22 @@ from omnibot_driver.core.fejemis.outbound import robust
 from omnibot_driver.core.fejemis.sums import MODULUS
 
 ROUNDED: Final = 5
-"""Tenths of a degree by which an angle may be moved."""
+"""Largest rounding of an angle, in tenths of a degree."""
 MOST_OWED: Final = 0.5
-"""Degrees."""
+"""Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Degrees to the left, below which an angle to the right may be heard as if it were there."""
+"""Limit in degrees to the left: below it, a damaged angle to the right may arrive as this angle."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
 class AngleRelay:
-    """Remembers what was rounded off."""
+    """Turns angles into lines, and carries the rounding error over to the next angle."""
 
     def __init__(self) -> None:
         self._owed_deg = 0.0
 
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
-        """The line, without its sum."""
+        """Return the ``fwl`` line for the angle, without its sum; ``sums``: one is added."""
         angle_deg = math.degrees(angle_rad)
         wanted_deg = angle_deg + self._owed_deg
         text = _with_sum(round(10 * wanted_deg)) if sums else b"%d" % round(wanted_deg)
@@ -48,7 +48,7 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """What a number says without any two of its characters that change no sum; 0 where none."""
+    """Yield each value left if two characters are lost and the sum still fits; 0 if unreadable."""
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
             found = _NUMBER.match(text[:i] + text[i + 1 : j] + text[j + 1 :])
@@ -72,7 +72,7 @@ def _with_sum(tenths: int) -> bytes:
 
 
 def _written(tenths: int) -> list[str]:
-    """With and without the zeros that change nothing, shortest first."""
+    """Return the notations of an angle with and without redundant zeros, shortest first."""
     whole, tenth = divmod(abs(tenths), 10)
     heads = [str(whole), f"0{whole}"] if whole else ["0", ""]
     tails = [f".{tenth}", f".{tenth}0"] if tenth else ["", ".", ".0", ".00"]

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A Fejemis as a board of the driver: two Teensys as one robot.
+"""The Fejemis as a ``Board`` of the driver: two Teensy boards as one robot.
 
-Composes the parts, and says requests. Which half is where is in ``ports.py``, what follows from a
-message in ``inbound.py``, what it is worth in ``translation.py``, how an order is said in
-``encoder.py``, what stops the robot in ``watch.py``, whether it obeys in ``obedience.py``, what
-keeps both boards talking in ``upkeep.py``, and what else a user may ask in ``services.py``.
+This module composes the parts and encodes requests. ``ports.py`` finds which board (half) is at
+which port, ``inbound.py`` handles messages, ``translation.py`` converts them to readings,
+``encoder.py`` encodes orders, ``watch.py`` stops the robot on timeouts, ``obedience.py`` checks
+whether the drive board obeys, ``upkeep.py`` keeps both boards sending and configured, and
+``services.py`` serves all other requests of the user.
 """
 
 import math
@@ -33,13 +34,13 @@ from omnibot_driver.core.readings import Reading
 from omnibot_driver.core.traits import Traits
 
 STOPS_WITHIN_S: Final = 0.5
-"""How long after Stop a configuration is loaded."""
+"""Time after Stop before a configuration is loaded, in s."""
 
 
 class FejemisBoard(Board):
     """One robot. ``settings`` may be replaced at any time.
 
-    ``services``: what only this board has.
+    ``services``: the functions that only this board has.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -59,16 +60,16 @@ class FejemisBoard(Board):
         self.clock = self._translation.stamped
         self._now = -math.inf
 
-    # What is so
+    # State
 
     @property
     def traits(self) -> Traits:  # type: ignore[override]
-        """The channels are named by what is at them."""
+        """The board's traits, with the channels named after the boards found at them."""
         return self._ports.traits
 
     @property
     def settings(self) -> FejemisSettings:
-        """What the wire does not tell."""
+        """The settings that the boards do not report."""
         return self._settings
 
     @settings.setter
@@ -80,17 +81,17 @@ class FejemisBoard(Board):
 
     @property
     def mode(self) -> Mode:
-        """Nominal while both halves talk and the drive board obeys."""
+        """The mode: nominal while both halves send data and the drive board obeys."""
         return self._inbound.mode
 
     @property
     def geometry(self) -> Geometry:
-        """B and F, as the drive board computes with them where that is known."""
+        """Track B and wheelbase F as the drive board uses them, or as set while that is unknown."""
         return self._upkeep.geometry
 
     @property
     def front_angle_rad(self) -> float | None:
-        """Where the front wheel stands; None where that is not known well enough to drive."""
+        """Angle of the front wheel in rad, limited to ±90°; None if missing, old or faulty."""
         front = self._translation.front
         return front.drives_by_rad if front.known(self._now) else None
 
@@ -106,7 +107,7 @@ class FejemisBoard(Board):
 
     @property
     def refusal(self) -> str:
-        """Why the robot is not to be driven."""
+        """The reason why the robot must not be driven; empty if it may be."""
         if self._upkeep.jobs.powering_off:
             return "power is about to be cut"
         if job := self._upkeep.jobs.at_rest:
@@ -120,12 +121,12 @@ class FejemisBoard(Board):
 
     @property
     def advice(self) -> str | None:
-        """What a user should look at; None while all is well."""
+        """Advice on what the user should check; None if nothing is wrong."""
         return self._upkeep.advice
 
     @property
     def figures(self) -> BoardFigures:
-        """Over all connections."""
+        """Counters and figures for diagnostics, over all connections."""
         halves = self._ports.halves
         return BoardFigures(
             rates_hz={"IMU": 100.0, "Odometry": 50.0},
@@ -138,7 +139,7 @@ class FejemisBoard(Board):
     # Inbound
 
     def connect(self) -> None:
-        """The lines are new: brush and lift are off, and both boards are configured again."""
+        """Begin new connections: brush and lift are off, and both boards are configured again."""
         self._now = -math.inf
         self._ports.begin(self._settings)
         self._translation.connect()
@@ -148,14 +149,14 @@ class FejemisBoard(Board):
         self._obedience.begin()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """The readings that these bytes complete."""
+        """Return the readings that these bytes complete."""
         self._open(now)
         self._inbound.receive(data, now, channel)
         self._look(now)
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """The lines are closed: half a line is dropped, and a job is answered."""
+        """Discard incomplete lines, and fail the running job: the ports are closed."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -163,19 +164,19 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def silence(self) -> None:
-        """Neither half was heard."""
+        """Forget the mode and switch brush and lift off: neither half sends data."""
         self._inbound.mode = Mode.UNKNOWN
         for half in self._ports.halves:
             half.subscribe_again()
         self._upkeep.machine.off()
 
     def stalled(self) -> None:
-        """The guard has switched brush and lift off; neither comes back by itself."""
+        """Keep brush and lift off after a stall: the guard has switched them off."""
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 
     def elapse(self, now: float) -> list[Reading]:
-        """What becomes known as nothing comes."""
+        """Return the readings that follow from elapsed time."""
         self._open(now)
         self._look(now)
         return self._taken(now)
@@ -205,17 +206,17 @@ class FejemisBoard(Board):
         self._told.remark(text)
 
     def reset_odometry(self) -> None:
-        """The origin is the driver's own: on the board ``enc0`` would look like a restart."""
+        """Do nothing: the driver keeps the origin itself, as ``enc0`` would look like a restart."""
 
     # Outbound
 
     def actuator(self, proof: StopProof) -> PairStream:
-        """Set-points for both halves."""
+        """Create the set-point stream for both halves."""
         self._actuator = PairStream(self._encoder, proof, self)
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Whether what is wanted from now on is an emergency stop."""
+        """Latch or release the emergency stop, as ``estop`` says of the order now in force."""
         if not estop:
             self._obedience.release(self._now)
         elif not self._obedience.estopped:
@@ -224,31 +225,37 @@ class FejemisBoard(Board):
             self._upkeep.jobs.interrupt("the e-stop was latched meanwhile; release it, call again")
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """These lines to the two boards."""
+        """Return these lines as packets for the two boards."""
         return self._ports.line("drive", drive) + self._ports.line("front", front)
 
     def stop(self) -> Packets:
-        """``rc 2 0 0`` to both."""
+        """Return ``rc 2 0 0`` to both boards."""
         return self._ports.both(STOP)
 
     def emergency_stop(self) -> Packets:
-        """``stop`` to drive; the front board has none, so what turns there is switched off."""
+        """Return ``stop`` for the drive board, and brush and lift off for the front board.
+
+        The front board does not have a ``stop`` command.
+        """
         return self._ports.line("drive", b"stop") + self._all_off()
 
     def _all_off(self) -> Packets:
-        """Lift and brush."""
+        """Return the lines that switch lift and brush off."""
         return self._ports.line("front", *OFF)
 
     def switch_off(self) -> Packets:
-        """Lift and brush off, lights as they were."""
+        """Return the lines that switch lift and brush off and restore the lights."""
         return self._ports.line("front", *self._upkeep.machine.switch_off())
 
     def wake(self) -> Packets:
-        """Stop, and what else may turn."""
+        """Return Stop for both boards, with lift and brush off."""
         return self.stop() + self._all_off()
 
     def start(self) -> Packets:
-        """What was commanded before may hold again, so that is zero first; not in an e-stop."""
+        """Return ``start``, behind a Stop; nothing during an emergency stop.
+
+        Stop comes first because the board may obey the last command again.
+        """
         if self._obedience.estopped:
             return NO_PACKETS
         self._obedience.pause_said = False
@@ -256,23 +263,23 @@ class FejemisBoard(Board):
         return self.stop() + self._ports.line("drive", *self._upkeep.jobs.keep_power(), b"start")
 
     def pause(self) -> Packets:
-        """Stop, ``stop``, and what else turns."""
+        """Stop the motion, send ``stop`` and switch off brush and lift."""
         self._obedience.pause()
         self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
         self._upkeep.machine.off()
         return self.stop() + self.emergency_stop()
 
     def force_pause(self) -> Packets:
-        """The same."""
+        """Pause, as ``pause`` does."""
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """With brush and lift."""
+        """Return Stop and the emergency stop, each with brush and lift off."""
         return self.wake(), self.emergency_stop() + self.stop()
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` or ``elapse`` have something."""
+        """Time at which ``due`` or ``elapse`` has work, in s."""
         if self._inbound.relay_rad is not None or self._told.notices or self._upkeep.jobs.done:
             return -math.inf
         wake_at = min(self._upkeep.wake_at, self._obedience.start_at)
@@ -281,7 +288,7 @@ class FejemisBoard(Board):
         return min(wake_at, self._inbound.watch.wake_at) if self.mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:
-        """The relayed angle first, then what keeps both talking."""
+        """Return the relayed front angle, ``start`` if due, and what keeps both boards sending."""
         packets = NO_PACKETS
         if (angle_rad := self._inbound.take_relay()) is not None:
             text = self._relay.text(angle_rad, sums=self.with_sums)

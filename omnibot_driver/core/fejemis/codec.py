@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From the text of one line to its message: keyword, numbers, ranges.
+"""Parser of one line of text: keyword, numbers and their ranges.
 
-A number outside of its range is damage: no board measures it. Fields that are too many are left
-alone, as newer firmware adds some; too few are damage. Knows no sums, and no other line.
+A number outside its range is damage, as the boards cannot measure it. Extra fields are ignored,
+because newer firmware adds some; missing fields are damage. Sums and other lines are not looked at.
 """
 
 import math
@@ -41,23 +41,23 @@ LONGEST_TIME_S: Final = 1e7
 FARTHEST_M: Final = 1e5
 Range = tuple[float, float]
 TURN: Final[Range] = (-180.0, 180.0)
-"""Degrees."""
+"""Range of an angle, in degrees."""
 SPEED: Final[Range] = (-10.0, 10.0)
-"""m/s of a rim."""
+"""Range of a rim's speed, in m/s."""
 RATE: Final[Range] = (-4000.0, 4000.0)
-"""Degrees a second; no gyro of this kind tells more."""
+"""Range of a turn rate, in degrees per second; a gyro of this kind does not measure more."""
 FORCE: Final[Range] = (-320.0, 320.0)
-"""32 g in m/s²."""
+"""Range of the specific force, in m/s²: 32 g."""
 FIELD: Final[Range] = (-5000.0, 5000.0)
-"""µT."""
+"""Range of the magnetic field, in µT."""
 ANGLE: Final[Range] = (-7.0, 7.0)
-"""Rad, however it is wrapped."""
+"""Range of an attitude angle, in rad, whatever its wrapping."""
 HEADING: Final[Range] = (-1e4, 1e4)
-"""Rad; the heading of a pose need not be wrapped."""
+"""Range of a pose's heading, in rad; it need not be wrapped."""
 VOLTS: Final[Range] = (-1.0, 60.0)
 AMPS: Final[Range] = (-100.0, 100.0)
 NEAR: Final[Range] = (-1.0, 100.0)
-"""m of a distance sensor; negative is invalid."""
+"""Range of a distance sensor, in m; a negative value is invalid."""
 TIME: Final[Range] = (0.0, LONGEST_TIME_S)
 PLACE: Final[Range] = (-FARTHEST_M, FARTHEST_M)
 ANY: Final[Range] = (-1e10, 1e10)
@@ -67,7 +67,7 @@ Parse = Callable[[list[str]], Message | None]
 
 
 def parse(text: str) -> Message | None:
-    """The message that this text is; None where it is damaged, or of no kind that is known."""
+    """Return the message in this text; None if it is damaged or its keyword is unknown."""
     if text.startswith("#") or text.startswith("--"):
         return Comment(text)
     words = text.split()  # any white space, as the firmware does
@@ -79,18 +79,18 @@ def parse(text: str) -> Message | None:
 
 
 def is_known(keyword: str) -> bool:
-    """Whether a line may begin with it."""
+    """Return whether ``keyword`` can begin a valid line."""
     return keyword in _PARSERS
 
 
 def decimals_of(field: str) -> int:
-    """Characters after the point; -1 without one."""
+    """Return the count of characters after the point; -1 without a point."""
     _, point, after = field.partition(".")
     return len(after) if point else -1
 
 
 def numbers(fields: list[str], *ranges: Range) -> list[float] | None:
-    """The first of these fields, as many as there are ranges; None if one is not within its own."""
+    """Parse one field per range, ignoring extra ones; None if one is missing or out of range."""
     if len(fields) < len(ranges):
         return None
     found = []
@@ -213,7 +213,7 @@ STATUS: Final = {
     "cpsteer": 1, "gyroo": 3, "acco": 3, "magw": 3, "mago": 3, "enc": 1, "mot": 1, "svp": 1,
     "svjt": 1, "tof1": 1, "gyroc": 1, "acccal2": 1, "brush": 1,
 }  # fmt: skip
-"""Keywords that only diagnostics show or that answer a request, with the fewest numbers of each."""
+"""Keywords of status numbers and requested answers, with the fewest numbers of each."""
 WORDS: Final = ("id", "ver", "log", "confirm")
 _PARSERS: Final[dict[str, Parse]] = {
     "hbt": _heartbeat,

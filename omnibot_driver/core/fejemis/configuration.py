@@ -1,11 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the boards keep: read from them, and written only where the user has set it.
+"""The configuration that a board stores: read always, written only where the user has set it.
 
-What was written is read back; it is written again until it is there, and after each restart. A
-number is believed that was read twice alike, one reading after the other: one in 99 damaged answers
-passes its sum, and the geometry is computed with what is read. Knows which line asks for what, and
-which numbers answer.
+What was written is read back, and written again until it agrees, and after each restart. A number
+is accepted only when two readings in a row agree: one in 99 damaged answers passes its sum, and the
+driver computes the geometry with these numbers. The module knows which line requests which numbers.
 """
 
 import math
@@ -28,7 +27,7 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
     "drive": (b"confsi", b"confi", b"gyrooi", b"accoi", b"magoi", b"cpdrivei"),
     "front": (b"confsi", b"fwoi", b"cpsteeri", b"iri"),
 }
-"""What asks for the configuration."""
+"""Requests for the configuration, by board."""
 ON: Final[Mapping[Role, tuple[Written, ...]]] = {
     "drive": (Written.WHEELS, Written.STEERING, Written.MAGNETOMETER, Written.ACCELEROMETER),
     "front": (Written.STEERING, Written.FRONT_WHEEL, Written.INFRARED, Written.STEERING_GAINS),
@@ -36,58 +35,59 @@ ON: Final[Mapping[Role, tuple[Written, ...]]] = {
 EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
-"""Part of a number by which it may be read back otherwise, as it is printed with few digits."""
+"""Relative difference allowed when a number is read back, as it is printed with few digits."""
 DIGIT: Final = 6e-4
 
 
 class Configuration:
-    """Of one board. ``told``: its numbers as they were read twice, by what they are."""
+    """Configuration of one board; ``told``: its confirmed numbers, by the keyword of their line."""
 
     def __init__(self, role: Role, written: Mapping[Written, tuple[float, ...]]) -> None:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """The last reading of each."""
+        """The last reading of each keyword."""
         self.turned = False
-        """``confs`` is sent in the order in which it is written, not in that of the help text."""
+        """Whether ``confs`` is reported track first, as it is written; the help text has it
+        last."""
         self.written = written
         self.begin()
 
     def begin(self) -> None:
-        """The board is new, or has loaded another configuration: read all, write what is set."""
+        """Read all numbers and write the settings again: the board is new or has loaded others."""
         self.told.clear()
         self._once.clear()
         self._next_at = -math.inf
         self._tries = 0
         self._new = True
         self.failed: list[Written] = []
-        """What could not be read back."""
+        """Settings that could not be read back."""
 
     def configure(self, written: Mapping[Written, tuple[float, ...]]) -> None:
-        """Other values, from now on."""
+        """Replace the settings that are written to the board."""
         if written != self.written:
             self.written, self._new = written, False
             self._next_at, self._tries, self.failed = -math.inf, 0, []
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something."""
+        """Time at which ``due`` has work, in s."""
         return self._next_at
 
     @property
     def known(self) -> bool:
-        """Whether all was read, and what was written is there."""
+        """Whether every number was read, and every setting read back."""
         return not self._missing() and not self._unwritten()
 
     @property
     def pending(self) -> bool:
-        """Whether a new board may still lack what the user has set: it is not to be driven."""
+        """Whether a new board may still lack the user's settings, so that it must not be driven."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new
 
     def due(self, now: float, *, stands: bool) -> list[bytes]:
-        """Lines to write now: while the robot moves, nothing is written."""
+        """Return the lines to send now; settings are written only while the robot is at rest."""
         if now < self._next_at:
             return []
         missing, unwritten = self._missing(), self._unwritten()
@@ -108,7 +108,7 @@ class Configuration:
         return [*texts, *dict.fromkeys([*missing, *asked])]
 
     def hear(self, message: Message) -> None:
-        """What the board tells of it."""
+        """Take a message that may report part of the configuration."""
         match message:
             case WheelConfiguration():
                 key, numbers = "conf", message.numbers
@@ -126,13 +126,13 @@ class Configuration:
         if numbers != before:
             return
         self.told[key] = numbers
-        if "conf" in self.told and "confs" in self.told:  # which also tells the track
+        if "conf" in self.told and "confs" in self.told:  # conf reports the track too
             track_m, told = self.told["conf"][4], self.told["confs"]
             self.turned = abs(told[0] - track_m) < DIGIT < abs(told[1] - track_m)
 
     @property
     def geometry(self) -> Geometry | None:
-        """B and F as the board computes with them; None where it has not told."""
+        """Track B and wheelbase F in m: as set by the user, else as reported, else None."""
         if Written.STEERING in self.written:
             return Geometry(*self.written[Written.STEERING])
         if "confs" not in self.told:
@@ -166,7 +166,7 @@ class Configuration:
 
 
 def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
-    """The line that writes it."""
+    """Return the line that writes the setting."""
     words = " ".join(f"{number:.6g}" for number in numbers)
     return f"{setting.command} {words}".encode("ascii")
 
@@ -174,7 +174,7 @@ def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
 _KEY: Final[Mapping[bytes, str]] = {
     text: text.decode("ascii")[:-1] for texts in ASKED.values() for text in texts
 }
-"""By the line that asks: the keyword of its answer."""
+"""Keyword of the answer, by the line that requests it."""
 _ASKS: Final[Mapping[Written, bytes]] = {
     Written.WHEELS: b"confi",
     Written.STEERING: b"confsi",

@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From the bytes of one line to messages: cut at line ends, sums checked, damage counted.
+"""Decoder of one board's bytes: splits lines, checks sums, counts damage.
 
-The manual shows lines without sums, the public hosts lines with them. ``auto`` takes both until the
-heartbeats have told which it is, and from then on only these. A line without sum is all the more
-looked at: the boards print each number with a fixed count of decimals, so a line whose decimals are
-not those of the lines before it has lost some (``forms``).
+The manual shows lines without sums, the public host programs send lines with them. ``auto`` accepts
+both until heartbeats show which form the board uses; from then on only that form is accepted. Lines
+without a sum get a further check: the boards print each number with a fixed count of decimals, so a
+line whose decimals differ from those before it is damaged (``forms``).
 
-Reads no clock, never raises on input, holds less than ``LONGEST_LINE`` bytes between calls, and
-looks at each byte a bounded number of times.
+The decoder does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
+bytes between calls, and looks at each byte a bounded number of times.
 """
 
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from omnibot_driver.core.fejemis.settings import LineSums
 from omnibot_driver.core.fejemis.sums import without_sum
 
 LONGEST_LINE: Final = 200
-"""Characters, as the boards' own buffers hold."""
+"""Longest line in characters, as the boards' own buffers hold."""
 CHANGED_AFTER: Final = 2
-"""Heartbeats in a row that must have, or lack, a sum: one alone may be damaged."""
+"""Heartbeats in a row that must have, or lack, a sum; a single one may be damaged."""
 
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counts since they were made. ``faults``: lines that were damaged or of no known kind."""
+    """Counts since construction; ``faults``: lines that were damaged or of unknown kind."""
 
     lines: int = 0
     faults: int = 0
@@ -37,11 +37,11 @@ class DecoderStatistics:
 
 
 class FejemisDecoder:
-    """One board's line. ``sums``: whether its lines have sums; None while that is not known.
+    """Decoder of one board's lines; ``sums``: whether they have sums, None while unknown.
 
-    ``changed``: they began or ceased to, since it was set to False last. ``doubtful``: the last
-    line was of the other form, so lines to the board go without a sum. ``contradicted``: it was of
-    another form than was set.
+    ``changed``: the lines began or ceased to have sums; the owner resets it. ``doubtful``: the last
+    line had the other form, so lines to the board are sent without a sum. ``contradicted``: the
+    last line contradicts the setting.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:
@@ -49,13 +49,13 @@ class FejemisDecoder:
         self.changed = self.doubtful = self.contradicted = False
         self._held = b""
         self._cut = False
-        """The line in hand is too long already."""
+        """Whether the incomplete line is too long already."""
         self._forms = Forms()
         self.line_sums = line_sums
 
     @property
     def line_sums(self) -> LineSums:
-        """As it was set."""
+        """The setting: with sums, without, or to be learnt."""
         return self._line_sums
 
     @line_sums.setter
@@ -65,7 +65,7 @@ class FejemisDecoder:
         self._otherwise = 0
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """The messages that these bytes complete, in their order."""
+        """Return the messages that these bytes complete, in their order."""
         *lines, rest = (self._held + data).split(b"\n")
         found = []
         for line in lines:
@@ -82,7 +82,7 @@ class FejemisDecoder:
         return found
 
     def flush(self, now: float) -> list[Message]:
-        """The line is closed: a line without its end is none."""
+        """Discard an incomplete line: the port is closed."""
         if self._held or self._cut:
             self._damaged(len(self._held))
         self._held, self._cut = b"", False
@@ -112,7 +112,7 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """By heartbeats alone: each board sends them unasked."""
+        """Learn from heartbeats whether lines have sums: each board sends them unrequested."""
         if self._line_sums != "auto" or with_sum is self.sums:
             self._otherwise = 0
             return

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An order as the lines to both boards, by where the front wheel stands.
+"""Encoder of an order as lines for both boards, given the front wheel's angle.
 
-What goes out last is what counts: ``meaning`` is asked of it, and only then is it known that the
-front wheel is to turn, and whether the drive board is held back. Knows geometry and lines; not when
-they are sent.
+Only the packets that are sent last determine the state: after ``meaning`` was called with them, the
+encoder knows the angle that the front wheel must reach, and whether the drive board is limited. The
+module knows geometry and lines, not when they are sent.
 """
 
 from typing import Protocol
@@ -34,38 +34,38 @@ REVERSE = (
 
 
 class Pair(Protocol):
-    """What the encoder asks of the two boards."""
+    """The two boards, as the encoder uses them."""
 
     @property
     def geometry(self) -> Geometry:
-        """B and F."""
+        """Track B and wheelbase F, in m."""
 
     @property
     def front_angle_rad(self) -> float | None:
-        """Of the front wheel, if it is known."""
+        """Angle of the front wheel in rad, or None while it is unknown."""
 
     def stop(self) -> Packets:
-        """Stand still."""
+        """Return the packets that stop the motion."""
 
     def emergency_stop(self) -> Packets:
-        """What a board has of its own."""
+        """Return the packets of the boards' own emergency stop."""
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """These lines."""
+        """Return these lines as packets for the two boards."""
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both have sums."""
+        """Whether lines to both boards have sums."""
 
     def remark(self, text: str) -> None:
         """Queue a notice that the user gets only once."""
 
 
 class Encoder:
-    """``held``: the drive board gets less than commanded until the front wheel stands right.
+    """Encodes orders, with limited speed while the front wheel is off its angle (``held``).
 
-    ``restless``: the lines are worth saying again with each angle: while it is held, or where no
-    sum protects them, so that a damaged one is obeyed for 15 ms instead of a whole repetition.
+    ``restless``: whether to send the lines again with each angle: while the speed is limited, or
+    without sums, so that a damaged line is obeyed for 15 ms only, not for a repetition period.
     """
 
     def __init__(self, pair: Pair, settings: FejemisSettings) -> None:
@@ -75,26 +75,26 @@ class Encoder:
         self.begin()
 
     def begin(self) -> None:
-        """Nothing is commanded."""
+        """Forget the last order: motion is not commanded."""
         self.held = self._turning = False
         self._encoded: tuple[Packets, Steered] | None = None
         self.follower.begin()
 
     @property
     def restless(self) -> bool:
-        """Whether to say it again with the next angle."""
+        """Whether to send the lines again with the next angle."""
         return self.held or not self._pair.with_sums
 
     def stop(self) -> Packets:
-        """To both."""
+        """Return the packets that stop both boards."""
         return self._pair.stop()
 
     def emergency_stop(self) -> Packets:
-        """To both."""
+        """Return the packets of the boards' own emergency stop."""
         return self._pair.emergency_stop()
 
     def encode(self, order: Order) -> Packets:
-        """The lines that say it. Raises CommandRefused for what this robot cannot do."""
+        """Return the lines of the order. Raises CommandRefused for what this robot cannot do."""
         match order:
             case Drive(twist):
                 return self._drive(twist)
@@ -105,7 +105,7 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """The body velocity that these lines command, with the front wheel as it stands."""
+        """Return the body twist that these packets command at the present front angle."""
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:
             self.held = self._turning = False

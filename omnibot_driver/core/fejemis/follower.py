@@ -1,21 +1,21 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the front wheel goes where it is commanded, and when it is tried again if it does not.
+"""Check that the front wheel follows its commanded angle, and when to retry if it does not.
 
-A sender that goes on would otherwise move the robot for a second, again and again. So motion is
-refused until the wheel has moved, and after a second fault within a minute until ~/start. Knows
-angles and times; not what is commanded besides.
+Otherwise a sender that continues would move the robot for a second, again and again. So motion is
+refused until the wheel has moved, and after a second fault within a minute until ~/start. The
+module knows only angles and times.
 """
 
 import math
 from typing import Final
 
 FOLLOWS_WITHIN_S: Final = 1.0
-"""A front wheel that gets no nearer to its angle within this time does not follow."""
+"""Time in s within which the front wheel must get nearer to its angle; else it does not follow."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
 MOVED_RAD: Final = math.radians(3.0)
-"""A wheel that has moved by this angle is tried again."""
+"""Rotation in rad of a stuck wheel after which motion is allowed again."""
 AGAIN_WITHIN_S: Final = 60.0
 UNTIL_IT_MOVES: Final = (
     "the front wheel did not go where it was commanded; check the servo and its power. Motion is"
@@ -28,7 +28,7 @@ UNTIL_START: Final = (
 
 
 class Follower:
-    """``refusal``: why the robot is not to be driven; empty while the wheel follows."""
+    """The check; ``refusal``: why the robot must not be driven, empty while the wheel follows."""
 
     def __init__(self) -> None:
         self.refusal = ""
@@ -37,20 +37,20 @@ class Follower:
         self.begin()
 
     def begin(self) -> None:
-        """Nothing is commanded."""
+        """Forget the commanded angle."""
         self._angle_rad: float | None = None
         self._since, self._from_rad = math.inf, math.nan
 
     def start(self) -> None:
-        """The user has called ~/start."""
+        """Forget all faults, as the user has called ~/start."""
         self.refusal, self._fault_at = "", -math.inf
 
     def aim(self, angle_rad: float) -> None:
-        """It is to stand here."""
+        """Set the angle that the wheel must reach, in rad."""
         self._angle_rad = angle_rad
 
     def look(self, angle_rad: float, now: float) -> bool:
-        """It stands there. Whether this shows, for the first time, that it does not follow."""
+        """Take the measured angle, in rad; return whether it shows a new fault to follow."""
         if self.refusal == UNTIL_IT_MOVES and abs(angle_rad - self._stuck_rad) > MOVED_RAD:
             self.refusal = ""
         if self._angle_rad is None or self.refusal:

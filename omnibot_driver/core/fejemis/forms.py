@@ -2,9 +2,9 @@
 
 """The form of each kind of line: how many fields, and how many decimals each number has.
 
-A board prints a kind of line always alike, so one of another form has lost or gained characters.
-The form is learnt: what came three times in a row is the new one. A kind whose form keeps changing
-is not looked at. Knows no meaning.
+A board prints a kind of line always in the same form, so a line in another form has lost or gained
+characters. The form is learnt: another form that came three times in a row replaces it. A kind
+whose form keeps changing is not checked. The meaning of a line does not matter here.
 """
 
 from typing import Final
@@ -12,21 +12,22 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Lines of another form than expected, of ``OF``, after which the kind varies. Where a sum is right
-damage is rare, so fewer of them tell."""
+"""Lines among ``OF`` with a deviating form after which their kind is not checked any more.
+
+Lines with a right sum are rarely damaged, so fewer deviations are enough."""
 OF: Final = 24
 
 Form = tuple[int, ...]
 
 
 class Forms:
-    """One for each line."""
+    """The learnt forms, by keyword."""
 
     def __init__(self) -> None:
         self._kinds: dict[bytes, _Kind] = {}
 
     def admit(self, text: bytes, *, summed: bool) -> bool:
-        """Whether the line looks like those of its kind before it; ``summed``: its sum is right."""
+        """Return whether the line has the form of its kind; ``summed``: it has a correct sum."""
         keyword, *fields = text.split()
         form = tuple(map(_shape, fields))
         kind = self._kinds.get(keyword)
@@ -36,7 +37,7 @@ class Forms:
 
 
 class _Kind:
-    """Of one keyword."""
+    """The learnt form of one keyword."""
 
     def __init__(self, form: Form) -> None:
         self._form = self._other = form
@@ -63,7 +64,7 @@ class _Kind:
 
 
 def _shape(field: bytes) -> int:
-    """Count of decimals; -1 of a whole number, -2 of anything else."""
+    """Return the count of decimals; -1 for a whole number, -2 for anything else."""
     whole, point, after = field.partition(b".")
     if not point:
         return -1 if whole.lstrip(b"+-").isdigit() else -2

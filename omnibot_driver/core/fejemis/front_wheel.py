@@ -2,7 +2,7 @@
 
 """The angle of the front wheel: whether it is known, and whether its sensor works.
 
-Knows angles, the sensor's bits and times; not what is commanded.
+The module knows angles, the sensor's status bits and times, not what is commanded.
 """
 
 import math
@@ -11,15 +11,15 @@ from typing import Final
 from omnibot_driver.core.fejemis.messages import FrontAngle
 
 OLDEST_S: Final = 0.06
-"""An angle of more than four lines ago stops the robot."""
+"""Age of an angle in s, four lines, after which the robot is stopped."""
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
-"""Without the counter of frames."""
+"""Mask of the diagnosis bits that are checked: all but the frame counter."""
 SICK_LINES: Final = 3
-"""In a row: two may be damaged."""
+"""Faulty lines in a row that prove a fault; two may be damaged."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""No servo turns the wheel further between two lines."""
+"""Jump in degrees, beyond what the fastest servo explains, that is still accepted."""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -33,52 +33,55 @@ BITS: Final = (
     (1, True, "magneto core loops not finished"),
     (0, False, "supply in 5 V mode"),
 )
-"""Bit, what it should be, and what it says otherwise (manual, fwl)."""
+"""Bit number, expected value, and the meaning of the other value (manual, fwl)."""
 
 
 class FrontWheel:
-    """``angle_rad``: the last accepted angle, NaN before the first. ``heard_at``: its time."""
+    """State of the front wheel; ``angle_rad``: last accepted angle, NaN before the first.
+
+    ``heard_at``: when that angle came, in s.
+    """
 
     def __init__(self) -> None:
         self.refused = 0
-        """Angles that the wheel cannot have reached."""
+        """Count of rejected angles, which the wheel cannot have reached."""
         self.begin()
 
     def begin(self) -> None:
-        """Nothing is known of it."""
+        """Forget the angle and the sensor's faults."""
         self.angle_rad = math.nan
         self.heard_at = -math.inf
         self.fault = ""
-        """What is wrong with the sensor, in words; empty while it works."""
+        """The sensor's faults, as text; empty while it works."""
         self._sick = 0
         self._doubted_deg: float | None = None
 
     @property
     def trouble(self) -> str:
-        """What is wrong with the sensor, in a sentence; empty while it works."""
+        """The sensor's faults, as a sentence with advice; empty while it works."""
         if not self.fault:
             return ""
         return f"the angle sensor of the front wheel reports: {self.fault}; check sensor and magnet"
 
     @property
     def stale_at(self) -> float:
-        """When the angle is too old, unless another comes."""
+        """Time at which the angle is too old unless another one comes, in s."""
         return self.heard_at + OLDEST_S + 1e-6
 
     @property
     def drives_by_rad(self) -> float:
-        """What the drive board is to compute with: it allows 90° to either side.
+        """Angle that the drive board gets, in rad: limited to ±90°, as it allows.
 
-        Beyond, by the manual's equations, its inner wheel would be faster than the outer one.
+        Beyond that, by the manual's equations, its inner wheel would be faster than the outer one.
         """
         return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
 
     def known(self, now: float) -> bool:
-        """Whether the angle is known, and new enough to drive by."""
+        """Return whether the angle is known, and recent enough to drive."""
         return not self.fault and now - self.heard_at <= OLDEST_S
 
     def hear(self, told: FrontAngle, now: float) -> bool:
-        """Take an angle from the front board. Returns whether it may be relayed."""
+        """Take an angle from the front board; return whether it may be relayed."""
         words = complaints(told)
         self._sick = self._sick + 1 if words else 0
         if words:
@@ -93,7 +96,7 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Whether the wheel can have this angle, or the refused angle before it confirms it."""
+        """Return whether the wheel can have this angle, or the rejected one before confirms it."""
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (
@@ -107,7 +110,7 @@ class FrontWheel:
 
 
 def complaints(told: FrontAngle) -> list[str]:
-    """What the sensor says of itself; nothing while it works."""
+    """Return the faults that the sensor reports; empty while it works."""
     words = [f"error flags 0x{told.error:x}"] if told.error else []
     if told.diagnosis & LOOKED_AT != HEALTHY:
         words += [

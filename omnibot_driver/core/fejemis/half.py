@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One of the two Teensys, as it is heard at one port: which it is, whether it talks, what of.
+"""One of the two Teensy boards (a half), at one port: its identity, its streams, its silence.
 
-What it is to send is subscribed, and subscribed again when it does not come: a line may be lost,
-and a board that restarts forgets all. Knows lines and times; not what a message is used for.
+Its streams are subscribed, and subscribed again when they do not come: a line may be lost, and a
+board that restarts forgets all subscriptions. The module knows lines and times, not what a message
+is used for.
 """
 
 import math
@@ -24,7 +25,7 @@ from omnibot_driver.core.fejemis.teensy_clock import TeensyClock
 
 Role = Literal["drive", "front"]
 ROLES: Final[Mapping[int, Role]] = {90: "drive", 91: "front"}
-"""By the identity in the heartbeat (manual, Meta info)."""
+"""Role of a board, by the identity in its heartbeat (manual, Meta info)."""
 STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
     "drive": {
         "hbt": 400, "pose": 20, "vel": 20, "gyro": 10, "acc": 10, "imupose": 20, "mag": 100,
@@ -32,36 +33,39 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
     },
     "front": {"hbt": 400, "fwl": 15, "ir": 100},
 }  # fmt: skip
-"""What is subscribed, and its period in ms."""
+"""Subscribed streams of each board, with their periods in ms."""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
-"""Without this stream the robot is not driven."""
+"""The stream of each board without which the robot must not be driven."""
 TOGETHER: Final = ("gyro", "acc")
-"""Subscribed in one packet, so that both are sent in the same cycle."""
+"""Streams subscribed in one packet, so that the board sends both in the same cycle."""
 AGAIN_S: Final = 0.5
 MANY: Final = 30
-"""Lines in a second that are not understood, of some hundred."""
+"""Lines per second, of some hundred, that may be damaged or unknown before the user is notified."""
 SILENT_S: Final = 1.5
-"""A board that is silent for this time is taken to be gone."""
+"""Silence in s after which a board is regarded as gone."""
 _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
 class Half:
-    """``identity``: as the heartbeats say, None before. ``restarted``, ``news``: to be taken."""
+    """State of one board; ``identity``: from its heartbeats, None before the first.
+
+    ``restarted``: the board has restarted; the reader resets it.
+    """
 
     def __init__(self, line_sums: LineSums) -> None:
         self.statistics = DecoderStatistics()
         self.clock = TeensyClock()
         self.unknown_words: dict[str, None] = {}
-        """Lines of ours that the firmware does not know."""
+        """Lines of the driver that the firmware does not know."""
         self.rejected = 0
-        """Lines of ours that came damaged."""
+        """Count of the driver's lines that arrived damaged."""
         self.identity: int | None = None
         self.role: Role | None = None
-        """Which one it is; None while that is not known, or where it is neither."""
+        """Role of the board; None while unknown, or if its identity is neither of the two."""
         self.begin(line_sums)
 
     def begin(self, line_sums: LineSums) -> None:
-        """The line is new. Which board it is, is believed until a heartbeat says otherwise."""
+        """Begin a new connection; the role is kept until a heartbeat contradicts it."""
         self.decoder = FejemisDecoder(line_sums)
         self.decoder.statistics = self.statistics
         self.unknown_words.clear()
@@ -69,7 +73,7 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Its needed stream flows."""
+        """Whether the stream that it needs to drive arrives."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -79,23 +83,26 @@ class Half:
 
     @property
     def sums(self) -> bool:
-        """Whether lines to it have a sum."""
+        """Whether lines to the board have a sum."""
         return bool(self.decoder.sums) and not self.decoder.doubtful
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """What these bytes tell, without what cannot be true of this board's time."""
+        """Return the messages in these bytes, without those whose time cannot be the board's."""
         return [message for message in self.decoder.feed(data, now) if self._admit(message, now)]
 
     @property
     def unknown_streams(self) -> list[str]:
-        """What it was asked to send and does not know."""
+        """Subscribed streams that the firmware does not know."""
         if self.role is None:
             return []
         streams = STREAMS[self.role]
         return [key for key in streams if f"sub {key} {streams[key]}" in self.unknown_words]
 
     def not_understood(self, now: float) -> bool:
-        """Whether many of its lines are not; asked with each read, True once for each second."""
+        """Return whether many lines were damaged or unknown; True at most once a second.
+
+        Call it after each read.
+        """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults
         if self.statistics.faults - self._counted <= MANY:
@@ -104,26 +111,26 @@ class Half:
         return True
 
     def came_at(self, keyword: str) -> float:
-        """When a line of this kind came last."""
+        """Return the time of the last line of this kind, in s; -infinity before the first."""
         return self._at.get(keyword, -math.inf)
 
     def note(self, keyword: str, now: float) -> None:
-        """A line of this kind came."""
+        """Note that a line of this kind came."""
         self._at[keyword] = now
 
     def subscribe_again(self) -> None:
-        """It may have forgotten what it is to send."""
+        """Subscribe all streams again: the board may have forgotten them."""
         self._at = {key: at for key, at in self._at.items() if key == "hbt"}
         self._next_at = -math.inf
         self.ready = False
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something to look at."""
+        """Time at which ``due`` has work, in s."""
         return self._next_at
 
     def due(self, now: float) -> list[bytes]:
-        """Lines that make it talk."""
+        """Return the lines to send now: a request for the heartbeat, or missing subscriptions."""
         if now < self._next_at:
             return []
         self._next_at = now + AGAIN_S
@@ -139,7 +146,7 @@ class Half:
             wanted |= {key: STREAMS["drive"][key] for key in TOGETHER}
         texts = [f"sub {key} {period}".encode("ascii") for key, period in wanted.items()]
         if not self._left:
-            self._left = True  # subscriptions of another program would only fill the line
+            self._left = True  # subscriptions of another program would use up the bandwidth
             every = (f"sub {key} {period}" for key, period in STREAMS[self.role].items())
             return [b"leave", *(text.encode("ascii") for text in every)]
         return texts
@@ -168,7 +175,7 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """At once with the first heartbeat of a line; after it two must agree."""
+        """Accept the first heartbeat's identity at once; later, two heartbeats must agree."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self.identity:
@@ -195,7 +202,7 @@ class Half:
 
 
 def keyword_of(message: Message) -> str:
-    """Of a stream that is subscribed; empty for other messages."""
+    """Return the keyword of a subscribed stream's message; empty for others and heartbeats."""
     if isinstance(message, Distance):
         return message.keyword
     return _KEYWORDS.get(type(message).__name__, "")

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Gyro and acceleration lines, which carry no time, as readings of one IMU with a time.
+"""Pairs gyro and acceleration lines, which carry no time, into IMU samples with a time.
 
 The board measures both each ``PERIOD_S`` of its own clock, and sends them together. So samples are
-counted, and a sample's time is a whole count of periods from one phase. The arrivals tell that
-phase and the count: no sample comes before its time; one that comes after a pose in the stream is
-not older than it.
+counted, and a sample's time is a phase plus a whole count of periods. Phase and count come from the
+arrivals: a sample does not arrive before its time, and one that comes after a pose in the stream is
+not older than that pose.
 """
 
 import math
@@ -19,20 +19,23 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 PERIOD_S: Final = 0.01
 STANDARD_GRAVITY: Final = 9.80665
 PAIR_WITHIN_S: Final = 0.005
-"""Half a period: the two lines of one sample leave the board in one cycle, unless one of them was
-subscribed later than the other."""
+"""Largest delay between the two lines of one sample, in s: half a period.
+
+Both lines leave the board in one cycle, unless one of them was subscribed later."""
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Two samples in a row that are late by a period and come apart: one was lost before them. After a
-stall of the host they come at once."""
+"""Shortest interval of arrivals, in periods, at which a late sample proves a loss.
+
+If two samples in a row are late by a period and come apart, one was lost before them. After a stall
+of the host, samples arrive at once."""
 CYCLE_S: Final = 0.0015
-"""What is sent in one control cycle of the board may be in any order."""
+"""Time in s within which lines may come in any order, as one control cycle sends them."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 
 
 class ImuPairing:
-    """``unit`` of the acceleration."""
+    """Pairs the lines into samples; ``unit``: that of the acceleration lines."""
 
     def __init__(self, unit: AccelerationUnit) -> None:
         self.unit: AccelerationUnit = unit
@@ -41,12 +44,12 @@ class ImuPairing:
         self.begin()
 
     def begin(self) -> None:
-        """The board subscribes anew: the phase is another one."""
+        """Forget all samples and the phase, as the board's streams start again."""
         self._gyro: tuple[Gyro, float] | None = None
         self._acceleration: tuple[Acceleration, float] | None = None
         self._count = 0
         self._skipped = 0
-        """Samples of which one half came: they are not told, but they count."""
+        """Samples of which only one half came: not reported, but counted."""
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
         self._floor_s: deque[float] = deque(maxlen=PHASE_BLOCKS)
@@ -54,13 +57,13 @@ class ImuPairing:
         self._delay_s = 0.0
 
     def gyro(self, gyro: Gyro, now: float) -> ImuReading | None:
-        """One half of a sample; the sample where the other half has just come."""
+        """Take the gyro's half of a sample; return the sample if it is complete."""
         self._skipped += self._gyro is not None
         self._gyro = gyro, now
         return self._whole(now)
 
     def acceleration(self, acceleration: Acceleration, now: float) -> ImuReading | None:
-        """The other half."""
+        """Take the accelerometer's half of a sample; return the sample if it is complete."""
         self._skipped += self._acceleration is not None
         self._acceleration = acceleration, now
         return self._whole(now)
@@ -78,9 +81,10 @@ class ImuPairing:
         return ImuReading(self.forces, self.rates)
 
     def sampled_s(self, arrived_s: float, not_before_s: float) -> float:
-        """The board's time of the sample that has just come, given the board's time of its arrival.
+        """Return the board's time of the sample that has just come, in s.
 
-        ``not_before_s``: of the pose that came before it.
+        ``arrived_s``: its arrival in the board's time. ``not_before_s``: the board's time of the
+        pose that came before it.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -104,7 +108,7 @@ class ImuPairing:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """The phase is as late as the arrivals of the last while allow."""
+        """Make the phase as late as the arrivals of the last three blocks allow."""
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)
         if self._block_s < self._phase_s:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What follows from each message: which board sent it, what it stops, whether the robot obeys.
+"""Handles each message: finds the board that sent it, what it stops, and whether the robot obeys.
 
-Hands a message to the part that it concerns, and keeps the mode. Knows no bytes, and nothing of how
-anything is said to the boards.
+It hands a message to the part that uses it, and keeps the mode. It does not know bytes, nor how
+lines to the boards are written.
 """
 
 from collections.abc import Callable
@@ -24,9 +24,10 @@ AngleTold = Callable[[float, float], bool]
 
 
 class Inbound:
-    """``mode``: nominal while both halves talk and the drive board obeys.
+    """Handler of all messages; ``mode``: nominal while both halves send and the drive board obeys.
 
-    ``relay_rad``: an angle of the front wheel that the drive board has not got yet; to be taken.
+    ``relay_rad``: an angle of the front wheel, in rad, that the drive board has not received yet;
+    see ``take_relay``.
     """
 
     def __init__(
@@ -44,18 +45,18 @@ class Inbound:
         self.begin()
 
     def begin(self) -> None:
-        """The lines are new."""
+        """Begin new connections."""
         self.mode = Mode.UNKNOWN
         self.relay_rad: float | None = None
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """The angle that the drive board is to get; once."""
+        """Return the angle to relay to the drive board, in rad, and forget it; None without one."""
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
-        """Bytes of one port."""
+        """Decode bytes of one port, and act on their messages."""
         half = self._ports.halves[channel]
         for message in half.feed(data, now):
             if half.restarted:
@@ -74,7 +75,7 @@ class Inbound:
             self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
 
     def look(self, now: float, *, driving: bool) -> None:
-        """What the time shows. ``driving``: a motion is commanded."""
+        """Act on elapsed time, and update the mode; ``driving``: a motion is commanded."""
         machine = self._upkeep.machine
         if self.watch.look(now, driving=driving):
             machine.off()

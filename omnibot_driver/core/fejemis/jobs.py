@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is asked of the boards besides motion, one job at a time, and what shows that it is done.
+"""Requests to the boards besides motion, one job at a time, and how their success is proved.
 
-No board acknowledges anything. A calibration shows in the offsets that are read back, twice alike,
-as one in 99 damaged answers passes its sum. A loaded configuration is one that was read after the
-request. That a configuration is saved shows nowhere, so there the boards must have been heard
-afterwards without a complaint. Time is an argument.
+The boards do not acknowledge requests. A calibration is proved by new offsets, read back twice with
+the same result, as one in 99 damaged answers passes its sum. A loaded configuration is proved by a
+reading after the request. A saved configuration cannot be seen, so heartbeats of both boards must
+come after the request. Time is an argument.
 """
 
 import math
@@ -18,26 +18,26 @@ from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, Whe
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
-"""Digits whose codes together are 99, so that a sum does not see their loss."""
+"""Pairs of digits whose codes add up to 99, so that a sum does not detect the loss of both."""
 WITHIN_S: Final = 8.0
 CALIBRATION_S: Final = 1.2
-"""A calibration averages for about a second."""
+"""Duration of a calibration, which averages for about a second, in s."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""How often a request is sent that may be repeated."""
+"""Times that a repeatable request is sent."""
 UNCHANGED_S: Final = 4.0
-"""Offsets that have not changed by then were right before."""
+"""Time in s after which unchanged offsets prove that they were right before."""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
     Job.CALIBRATE_GYRO: (b"gyroc", b"gyrooi", "gyroo"),
     Job.CALIBRATE_ACCELEROMETER: (b"acccal2", b"accoi", "acco"),
 }
-"""What begins it, what asks for the result, and the keyword of the answer."""
+"""For each calibration: its command, the request of its result, the keyword of the answer."""
 
 
 def whole_seconds(delay_s: float) -> int:
-    """The next number of seconds that cannot lose two digits unseen (`numerals.py`)."""
+    """Return the delay, rounded, or the next whole number without a pair of ``UNSEEN`` digits."""
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
         seconds += 1
@@ -45,9 +45,10 @@ def whole_seconds(delay_s: float) -> int:
 
 
 class Jobs:
-    """``done``: what came of them, to be taken. ``powering_off``: power ends soon.
+    """The running job; ``done``: results for the caller to take.
 
-    ``reload``: the configuration was loaded, and is to be read again; to be taken.
+    ``powering_off``: power ends soon. ``reload``: a configuration was loaded, so it must be read
+    again; the caller resets it.
     """
 
     def __init__(self) -> None:
@@ -68,12 +69,12 @@ class Jobs:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something."""
+        """Time at which ``due`` has work, in s."""
         return min(self._next_at, self._until)
 
     @property
     def at_rest(self) -> str:
-        """Why the robot has to stand now, in words; empty if it need not."""
+        """The reason why the robot must be at rest now; empty if it need not be."""
         job = self.job
         if job is not None and (job in OFFSETS or job is Job.LOAD):
             return f"a {job.value} is under way; wait for its answer"
@@ -82,7 +83,10 @@ class Jobs:
     def ask(
         self, job: Job, token: object, now: float, *, delay_s: float = 0.0, wait_s: float = 0.0
     ) -> None:
-        """Begin, in ``wait_s``. Raises RequestRefused."""
+        """Begin a job after ``wait_s``. Raises RequestRefused while another one runs.
+
+        ``delay_s``: time until a power off cuts the power.
+        """
         if self.job is not None:
             raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
         self.job, self._token = job, token
@@ -93,21 +97,21 @@ class Jobs:
             self.powering_off = True
 
     def cancel(self, why: str) -> None:
-        """Something else has ended it."""
+        """Fail the running job for the reason ``why``."""
         if self.job is not None:
             self._finish(False, f"{self.job.value} failed: {why}")
 
     def interrupt(self, why: str) -> None:
-        """The robot was stopped: what needs it at rest for a while has failed."""
+        """Fail a job that needs the robot at rest, as its conditions were disturbed."""
         if self.at_rest:
             self.cancel(why)
 
     def drive_restarted(self) -> None:
-        """The board that would cut the power has forgotten it."""
+        """Forget a requested power off, as the restarted board has forgotten it too."""
         self.powering_off = False
 
     def keep_power(self) -> list[bytes]:
-        """What calls a power off back; nothing where none is due."""
+        """Return the line that cancels a power off; empty if none was requested."""
         lines = [b"on"] if self.powering_off else []
         if self.job is Job.POWER_OFF:
             self.cancel("it was called back")
@@ -115,12 +119,12 @@ class Jobs:
         return lines
 
     def begin(self) -> None:
-        """The line is new."""
+        """Fail the running job and forget a power off: the connection is new."""
         self.powering_off = False
         self.cancel("the port was lost meanwhile; call again")
 
     def due(self, now: float) -> Lines:
-        """Lines to write now, to each board."""
+        """Return the lines to send now, by board."""
         if self.job is None or now < self.wake_at:
             return {}
         if now >= self._until:
@@ -146,7 +150,7 @@ class Jobs:
                 return {"drive": [ask] if now - self._begun_at > CALIBRATION_S else []}
 
     def hear(self, role: Role, message: Message, now: float) -> None:
-        """What may show that it is done."""
+        """Take a message that may prove the running job's success."""
         job = self.job
         if job is None or not self._said:
             return

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Brush, lift and lights of the front board: what is switched on, and how it is said.
+"""Brush, lift and lights of the front board: what is switched on, and the lines for it.
 
-What turns is never switched on by anything but a call, and never for longer than asked: the lift
-runs for the time that goes with its voltage, and whatever ends a drive for good (e-stop, pause, a
-lost board) switches both off. Nothing is acknowledged, so each line is said several times.
+Moving parts are switched on only by a call, and never for longer than requested: the lift runs for
+the time that is sent with its voltage. Whatever ends a drive for good (e-stop, pause, a lost board)
+switches both off. The board does not acknowledge lines, so each is sent several times.
 """
 
 import math
@@ -18,39 +18,42 @@ OFF: Final = (b"motv 0 0", b"brush 0")
 TIMES: Final = 3
 BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
-"""How often ``brush 1`` is repeated while it turns: a line may be lost."""
+"""Period in s at which ``brush 1`` is repeated while it is on, as a line may be lost."""
 PACE_S: Final = 0.05
-"""A flood of voltages or colours is thinned to one each in this time, the newest."""
+"""Shortest time between two voltages, or two colours, in s; only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Of a voltage; among the numerals from there on is one whose loss can be detected."""
+"""Smallest part of a wanted voltage; from it on, one exists whose damage is detected."""
 LEAST_TIME_S: Final = 0.04
 
 
 class Machine:
-    """``brush``: whether it was switched on; ``volts``: of the lift, 0 once its time is over."""
+    """State of brush, lift and lights; ``brush``: whether it is on.
+
+    ``volts``: voltage of the lift in V, 0 once its time is over.
+    """
 
     def __init__(self) -> None:
         self.brush = False
         self.volts = 0.0
         self.colour: tuple[int, int, int] | None = None
         self._lift_line = b""
-        """Not sent yet."""
+        """The lift's line, not sent yet."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """When it is sent, when the next one may be, and when the lift stops."""
+        """Times in s: when it is sent, when the next one may be, and when the lift stops."""
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf
 
     @property
     def active(self) -> bool:
-        """Whether anything turns."""
+        """Whether brush or lift runs."""
         return self.brush or self.volts != 0.0
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something."""
+        """Time at which ``due`` has work, in s."""
         return min(
             self._next_at,
             self._led_at,
@@ -59,13 +62,16 @@ class Machine:
         )
 
     def set_brush(self, on: bool) -> None:
-        """Until it is switched off."""
+        """Switch the brush on or off."""
         self.brush = on
         self._brush_left = TIMES
         self._next_at = -math.inf
 
     def lift(self, volts: float, now: float, longest_s: float) -> None:
-        """Positive lifts the wheel; 0 stops, at once. Raises CommandRefused for NaN, infinity."""
+        """Move the lift at ``volts`` (positive raises the wheel) for ``longest_s`` at most.
+
+        0 V stops it at once. Raises CommandRefused for NaN or infinity.
+        """
         if not math.isfinite(volts):
             raise CommandRefused("lift_cmd rejected: contains NaN or infinity; fix the sender")
         volts = max(-MOST_VOLTS, min(MOST_VOLTS, volts))
@@ -75,32 +81,32 @@ class Machine:
         self._lift_until = self._lift_at + seconds
 
     def set_colour(self, red: int, green: int, blue: int, now: float) -> None:
-        """Of the band."""
+        """Set the colour of the LED band, 0..255 each."""
         self.colour = red, green, blue
         self._led_left = TIMES
         self._led_at = max(now, self._led_again_at)
 
     def begin(self) -> None:
-        """The front board is new: nothing of it turns, and its lights are its own."""
+        """Switch brush and lift off and send the colour again: the front board is new."""
         self.off()
         self._led_left = TIMES if self.colour else 0
         self._led_at = -math.inf if self.colour else math.inf
 
     def off(self) -> None:
-        """Brush and lift."""
+        """Switch brush and lift off."""
         self.brush, self.volts = False, 0.0
         self._lift_line = b""
         self._off_left, self._brush_left = TIMES, 0
         self._next_at = -math.inf
 
     def switch_off(self) -> list[bytes]:
-        """What ends all that was switched on, lights included."""
+        """Switch brush and lift off and restore the lights; return the lines for it."""
         self.off()
         lights = [b"ledon 1", b"leds"] if self.colour else []
         return [*TIMES * OFF, *lights]
 
     def due(self, now: float) -> list[bytes]:
-        """Lines to write now."""
+        """Return the lines to send now."""
         return [*self._lift_due(now), *self._off_due(now), *self._led_due(now)]
 
     def _lift_due(self, now: float) -> list[bytes]:
@@ -137,7 +143,7 @@ class Machine:
 
 
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
-    """``motv`` with digits of which no two can be lost unseen, and the time that it sends."""
+    """Return a ``motv`` line whose damage its sum detects, and the time in s that it sends."""
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)

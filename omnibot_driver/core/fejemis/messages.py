@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every message of the two help lists that tells something, as a value; numbers as they are sent.
+"""The messages of both boards' help lists that report something, with numbers as they are sent.
 
-Units are the board's: degrees, m/s², µT, V, A, m, s. What only diagnostics show is a ``Status`` or
-a ``Words``. Knows neither characters nor what is made of a message.
+Units are the board's: degrees, m/s², µT, V, A, m, s. Messages that are only shown in diagnostics
+are a ``Status`` or ``Words``. The module knows neither the characters of a message nor its use.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,10 @@ from omnibot_driver.core.values import value
 
 @value(frozen=True, slots=True)
 class Heartbeat:
-    """``hbt``. ``state``: on the drive board ``rcSource``, -1 while it is stopped."""
+    """``hbt``: the heartbeat.
+
+    ``state``: on the drive board ``rcSource``, -1 while it is stopped.
+    """
 
     time_s: float
     identity: int
@@ -24,7 +27,7 @@ class Heartbeat:
 
 @value(frozen=True, slots=True)
 class FrontAngle:
-    """``fwl``: angle of the front wheel in degrees, positive to the left, and how sure it is."""
+    """``fwl``: angle of the front wheel in degrees, positive to the left, and sensor flags."""
 
     angle_deg: float
     error: int
@@ -33,7 +36,7 @@ class FrontAngle:
 
 @value(frozen=True, slots=True)
 class BoardPose:
-    """``pose``: the board's dead reckoning; ``decimals`` of x and y as they were sent."""
+    """``pose``: the board's dead reckoning; ``decimals``: those of x and y as sent."""
 
     time_s: float
     x_m: float
@@ -44,7 +47,7 @@ class BoardPose:
 
 @value(frozen=True, slots=True)
 class WheelSpeeds:
-    """``vel``, of the rims; ``time_s`` where the firmware sends it."""
+    """``vel``: speeds of the rims; ``time_s``: the board's time, where the firmware sends it."""
 
     left_mps: float
     right_mps: float
@@ -53,7 +56,7 @@ class WheelSpeeds:
 
 @value(frozen=True, slots=True)
 class Gyro:
-    """``gyro`` in degrees a second."""
+    """``gyro``: angular velocity in degrees per second."""
 
     x: float
     y: float
@@ -62,7 +65,7 @@ class Gyro:
 
 @value(frozen=True, slots=True)
 class Acceleration:
-    """``acc`` in m/s², or in g on some firmware."""
+    """``acc``: specific force in m/s², or in g on some firmware."""
 
     x: float
     y: float
@@ -71,7 +74,7 @@ class Acceleration:
 
 @value(frozen=True, slots=True)
 class Magnetic:
-    """``mag`` in µT."""
+    """``mag``: magnetic field in µT."""
 
     x: float
     y: float
@@ -89,7 +92,7 @@ class Attitude:
 
 @value(frozen=True, slots=True)
 class Battery:
-    """``bat``."""
+    """``bat``: voltage in V, current in A, and the count of cells."""
 
     volts: float
     amps: float
@@ -98,7 +101,7 @@ class Battery:
 
 @value(frozen=True, slots=True)
 class Distance:
-    """``tofd``, ``sr04`` in m."""
+    """``tofd`` or ``sr04``: distance in m."""
 
     keyword: str
     distance_m: float
@@ -106,7 +109,7 @@ class Distance:
 
 @value(frozen=True, slots=True)
 class Infrared:
-    """``ir``: both sensors in m, and the calibration where it is sent."""
+    """``ir``: distances of both sensors in m, and the calibration where it is sent."""
 
     distances_m: tuple[float, float]
     calibration: tuple[float, ...] = ()
@@ -125,7 +128,7 @@ class WheelConfiguration:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Without the period, which cannot be written."""
+        """The numbers without the period, which cannot be written."""
         return (
             self.left_radius_m,
             self.right_radius_m,
@@ -145,7 +148,7 @@ class SteeringConfiguration:
 
 @value(frozen=True, slots=True)
 class FrontWheelOffset:
-    """``fwo``."""
+    """``fwo``: offset of the front wheel's angle in degrees, and whether the angle is inverted."""
 
     offset_deg: float
     inverted: bool
@@ -153,7 +156,7 @@ class FrontWheelOffset:
 
 @value(frozen=True, slots=True)
 class Status:
-    """Numbers that only diagnostics show, or that answer one request."""
+    """Numbers that are only shown in diagnostics, or that answer one request."""
 
     keyword: str
     numbers: tuple[float, ...]
@@ -169,7 +172,7 @@ class Words:
 
 @dataclass(frozen=True, slots=True)
 class Comment:
-    """A line that begins with ``#``, or the text of ``help``."""
+    """A line that begins with ``#`` or ``--``, as the text of ``help``."""
 
     text: str
 

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``rc`` for each board, in digits of which no two can be lost unseen.
+"""``rc`` lines for each board, in digits of which any two lost ones are detected.
 
-The numbers that can be written so have gaps (`numerals.py`), but neither board needs both: the
-front board takes the angle from the ratio of speed and turn rate, the drive board the speed of the
-outer wheel from the root of the sum of their squares and the sign of the speed. So each line is one
-that says that exactly enough; among these the nearest to what is commanded, with a sum that stands
-for no character of a number (`outbound.py`).
+The numbers that can be written so have gaps (`numerals.py`), but a board does not need both numbers
+of a line exactly. The front board takes the angle from the ratio of speed and turn rate. The drive
+board takes the speed of the outer wheel from the root of the sum of their squares, with the sign of
+the speed. So each line is exact enough in that quantity, and the nearest such line to the command.
+Its sum is chosen so that it does not hide a lost character of a number (`outbound.py`).
 """
 
 import math
@@ -18,24 +18,27 @@ from omnibot_driver.core.fejemis.outbound import robust
 
 STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
-"""A slower wheel is commanded to stand."""
+"""Speed of the outer wheel in m/s below which it is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""No slower speed has numbers around it."""
+"""Smallest speed in m/s that has writable numbers around it."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
-"""Part of a speed by which a line may be off."""
+"""Relative speed error of a line that is tolerated."""
 ANGLE_WITHIN_RAD: Final = 0.003
 SLOWEST: Final = 30.0
-"""A line to the drive board has at least such a part of the outer wheel's speed."""
+"""Largest ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
 SCALES: Final = 4.0
-"""Numbers for the front board are at most four times those commanded, at least a quarter."""
+"""Largest factor between a number for the front board and the commanded one."""
 Candidate = tuple[float, str, str]
-"""Cost, speed in m/s, turn rate in degrees a second; without signs."""
+"""Cost, speed in m/s, turn rate in degrees per second; without signs."""
 
 
 @lru_cache(maxsize=512)
 def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes:
-    """Says atan2(wheelbase · turn, speed); the sizes of both together mean nothing."""
+    """Return the front board's line, whose angle is atan2(wheelbase · turn, speed).
+
+    The magnitudes of speed and turn rate do not matter, only their ratio.
+    """
     speed, turn_deg = abs(speed_mps), math.degrees(abs(turn_radps))
     negative = speed_mps < 0.0 or turn_radps < 0.0
     signs = "-" if speed_mps < 0.0 else "", "-" if turn_radps < 0.0 else ""
@@ -60,7 +63,7 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 
 @lru_cache(maxsize=512)
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Says the root of speed² + turn² with the sign of the speed."""
+    """Return the drive line: its outer speed is sqrt(speed² + turn²) with the speed's sign."""
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
         return STOP
@@ -82,7 +85,7 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """The cheapest line whose sum is robust; there is always one, or else the cheapest."""
+    """Return the cheapest line whose sum is robust, or the cheapest if none has a robust sum."""
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)
     return next(filter(robust, lines), _line(signs, *found[0][1:]))

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Numbers that can be written without any two digits whose loss a sum does not see.
+"""Numbers that can be written without two digits whose joint loss a sum does not detect.
 
-With the source ``2`` in the line a number has no ``1``; of ``0`` and ``3`` it has no ``3``; with a
-point no ``5``; with a minus sign no ``6``. So there are gaps, of which the largest is from 1 to 2.
+The source ``2`` is in each line, so its numbers do not contain ``1``. Of ``0`` and ``3`` they do
+not contain ``3``; with a point, they do not contain ``5``; with a minus sign, ``6``. So there are
+gaps, of which the largest is from 1 to 2.
 """
 
 from bisect import bisect_left, bisect_right
@@ -13,12 +14,15 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""Powers of ten."""
+"""Powers of ten of the first digit: from ``SMALLEST`` to below ``LARGEST``."""
 
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """All of them from 0.0001 to 10000, in order. ``negative``: a minus sign is in the line."""
+    """Return these numbers from 0.0001 to 10000 in order, and their texts.
+
+    ``negative``: the line has a minus sign.
+    """
     digits = "024789" if negative else "0246789"
     mantissas = [
         first + second + third for first in digits[1:] for second in digits for third in digits
@@ -33,7 +37,10 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 
 
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
-    """The nearest one to a positive number; with ``down`` none above it, where there is one."""
+    """Return the nearest one to a positive number, with its text.
+
+    ``down``: the nearest one that is not above the number, where one exists.
+    """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
     if at == len(numbers) or (at > 0 and (down or number - numbers[at - 1] < numbers[at] - number)):
@@ -42,14 +49,14 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
 
 
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Those in this range."""
+    """Return those from ``least`` to ``most``, with their texts."""
     numbers, texts = numerals(negative=negative)
     part = slice(bisect_left(numbers, least), bisect_right(numbers, most))
     return list(zip(numbers[part], texts[part], strict=True))
 
 
 def _written(mantissa: str, power: int) -> str:
-    """Three digits, the first of which has this power of ten."""
+    """Return the text of three digits of which the first has this power of ten."""
     if power >= SIGNIFICANT - 1:
         return mantissa + "0" * (power - SIGNIFICANT + 1)
     if power >= 0:

@@ -1,14 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From poses and wheel speeds of the drive board to displacements.
+"""Odometry from poses and wheel speeds of the drive board: displacements.
 
-A pose tells where the robot is, with few digits: a millimetre in 20 ms is 0.05 m/s. The speeds of
-the wheels tell how it moves. So a displacement is what the speeds make of the time between two
-poses, drawn to where the pose is; and the whole way to the pose where both differ by more than
-rounding: lines were lost, or a wheel was turned quickly. The displacements add up to the pose.
+A pose is absolute, but has few digits: a millimetre in 20 ms is 0.05 m/s. The wheel speeds show the
+motion more finely. So a displacement is the integral of the speeds between two poses, corrected
+towards the pose. It is the complete difference of the poses if that and the integral differ by more
+than rounding: then lines were lost, or a wheel was turned quickly. The displacements add up to the
+pose.
 
-A pose that no robot of such speeds can have reached waits for the next one. If that agrees with it,
-either the pose before both was false, or the board's frame is another one (``enc0``).
+A pose that such a robot cannot have reached is not used until the next one. If the two agree,
+either the pose before both was wrong, or the board has a new frame (``enc0``).
 """
 
 import math
@@ -19,32 +20,34 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Part of a difference within rounding that one displacement makes up for."""
+"""Part of a difference within rounding that one displacement corrects."""
 ROUNDINGS: Final = 1.5
-"""Two poses are rounded by half a digit each, and the heading turns one into the other."""
+"""Difference in digits within rounding: each pose is off by half a digit.
+
+The heading turns the error of one axis into the other."""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""What a pose may be beside the way that the speeds explain."""
+"""Distance in m and angle in rad that a pose may deviate from the motion by the speeds."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
 FRESH_S: Final = 0.1
-"""Speeds that are older tell nothing."""
+"""Age in s up to which speeds are used."""
 LEAST_S: Final = 0.001
 STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""Poses in a row that agree with each other, and with nothing before, are of a new frame."""
+"""Poses in a row that agree with each other, but not with earlier ones, and prove a new frame."""
 
 
 class PoseOdometry:
-    """``track_m``: as the board is configured."""
+    """Turns poses and speeds into displacements; ``track_m``: as the board is configured, in m."""
 
     def __init__(self, track_m: float) -> None:
         self.track_m = track_m
         self.refused = 0
-        """Poses that were not believed."""
+        """Count of rejected poses."""
         self._pose: BoardPose | None = None
         self._told = Pose()
         self._restarted = False
@@ -52,10 +55,10 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """The line is new; the frame may be as it was."""
+        """Begin a new connection; the board's frame may be unchanged."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
-        """How often doubted poses have agreed, one after the other."""
+        """Count of rejected poses in a row that agreed with the one before."""
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf
@@ -67,19 +70,20 @@ class PoseOdometry:
         return speeds is not None and max(map(abs, (speeds.left_mps, speeds.right_mps))) > STILL_MPS
 
     def forget(self) -> None:
-        """The board has restarted: its frame begins anew, somewhere on the way."""
+        """Forget the frame: the restarted board has begun a new one."""
         self._restarted |= self._pose is not None
         self._settled_s = -math.inf
         self._pose = None
         self.begin()
 
     def speeds(self, speeds: WheelSpeeds, now: float) -> None:
-        """Of both wheels."""
+        """Take the speeds of both wheels."""
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
 
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
-        """The displacement up to here, and now and then where it has led: a displacement that is
-        refused afterwards is made up for by that.
+        """Return the displacement up to this pose, and every 0.2 s the sum of all as a pose.
+
+        The sum makes up for a displacement that is rejected afterwards.
         """
         displacement = self.pose(pose, now)
         if displacement is None:
@@ -91,7 +95,7 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
-        """The displacement up to here; None for the first pose, and for one that is doubted."""
+        """Return the displacement up to this pose; None for the first and for a rejected one."""
         before = self._pose
         if before is None:
             self._begin_at(pose)
@@ -136,7 +140,7 @@ class PoseOdometry:
         )
 
     def _rolled(self, seconds: float, now: float) -> Pose | None:
-        """What the speeds make of this time; None where they are not known for it."""
+        """Return the motion by the speeds in ``seconds``; None if they are unknown then."""
         speeds = self._speeds
         if speeds is None or now - self._speeds_at > FRESH_S or seconds > FRESH_S:
             return None
@@ -179,7 +183,7 @@ def _place(pose: BoardPose) -> Pose:
 
 
 def _possible(way: Pose, seconds: float) -> bool:
-    """Whether a robot can go so far in this time at all."""
+    """Return whether a robot can move this far in this time."""
     return (
         way.way_m <= FASTEST_MPS * seconds + SLACK_M
         and abs(way.yaw_rad) <= FASTEST_RADPS * seconds + SLACK_RAD

@@ -1,17 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to the boards, such that damage on the way makes no other command of a command.
+"""Lines to the boards, written so that damage cannot turn one command into another.
 
-A sum mod 99 does not see two lost characters whose codes add up to 99 or 198 (`0` and `3`, `1` and
-`2`, `.` and `5`, `-` and `6`): a motion line must not have both of a pair, see `motion_lines.py`.
-Two more kinds of damage depend on the sum, so the digits of a motion line are chosen by that too:
+A sum modulo 99 does not detect two lost characters whose codes add up to 99 or 198 (`0` and `3`,
+`1` and `2`, `.` and `5`, `-` and `6`). A motion line must not have both of a pair, see
+`motion_lines.py`. Two more kinds of damage depend on the sum, so the digits of a motion line are
+chosen by that too:
 
-* A lost line end makes one line of two. It passes if the sum of the second, with its prefix, equals
-  what else was lost: so no such sum may be the code of a character of a number. Other lines with
-  such a sum begin with an empty one, which no board obeys.
-* A lost digit of the sum leaves one that fits the rest only if the right character is lost too.
+* A lost line end joins two lines. The result passes if the sum of the second line, with its prefix,
+  equals the code of a character that was lost as well. So that sum must not be the code of a
+  character of a number. Other lines with such a sum follow an empty line, which the boards ignore.
+* A lost digit of the sum leaves a sum that fits only if a certain character is lost as well.
 
-Nothing is ever added to a line itself: a board may compare ``stop`` with all of the line.
+Characters are never added to a line itself: a board may compare the complete line with ``stop``.
 """
 
 from functools import lru_cache
@@ -30,7 +31,7 @@ _COMPLEMENTS: Final = tuple(
 
 @lru_cache(maxsize=1024)
 def line(text: bytes, *, sums: bool) -> bytes:
-    """The characters of one line, to its end."""
+    """Return the bytes of one line, with its sum if ``sums`` and its line end."""
     if not sums:
         return text + b"\n"
     before = b"" if robust(text) else b"\n"
@@ -38,12 +39,12 @@ def line(text: bytes, *, sums: bool) -> bytes:
 
 
 def lines(*texts: bytes, sums: bool) -> bytes:
-    """Several, one after the other."""
+    """Return the bytes of several lines, in order."""
     return b"".join([line(text, sums=sums) for text in texts])
 
 
 def harmless(text: str) -> bool:
-    """Whether no two characters of it can be lost without changing its sum."""
+    """Return whether the loss of any two characters changes the text's sum."""
     codes = text.encode("ascii")
     return not any(
         one in codes and other in codes and (one != other or codes.count(one) > 1)
@@ -52,7 +53,7 @@ def harmless(text: str) -> bool:
 
 
 def robust(text: bytes) -> bool:
-    """Whether its sum stands for no character of a number that is lost with another."""
+    """Return whether a lost line end or a lost digit of the sum cannot hide a lost character."""
     total = sum_of(text)
     tens, ones = divmod(total, 10)
     as_second = (ord(";") + 2 * ord("0") + tens + ones + total - 1) % MODULUS

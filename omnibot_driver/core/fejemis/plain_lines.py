@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``rc`` without a sum: whatever is lost on the way is not seen, so the lines let little be lost.
+"""``rc`` lines without a sum, written so that undetected damage has little effect.
 
-A lost space, or a lost source, moves each number to the place before it. So the drive board, which
-takes the root of the sum of both squares, gets it as the speed, with a turn rate of 0: moved, it
-commands to stand. What remains is a lost point or a lost digit behind it; it is obeyed until the
-next line, which comes with the next angle of the front wheel.
+A lost space or a lost source shifts each number to the place before it. The drive board takes the
+root of the sum of the squares of speed and turn rate; so it gets that root as the speed, with a
+turn rate of 0. Shifted, the line commands a stop. The remaining risk is a lost point or a lost
+digit after it; such a line is obeyed until the next one, which is sent with the next angle of the
+front wheel.
 """
 
 import math
@@ -14,12 +15,15 @@ from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, STOP
 
 
 def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Few digits, as these are damaged more seldom."""
+    """Return the front board's line, in few digits, as short lines are damaged less often."""
     return b"rc 2 %s %s" % (_short(speed_mps, 4), _short(math.degrees(turn_radps), 2))
 
 
 def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
-    """The speed of the outer wheel, forward or backward; the angle of the front wheel does rest."""
+    """Return the drive board's line: the outer wheel's speed, forward or backward.
+
+    The turning follows from the angle of the front wheel.
+    """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
         return STOP

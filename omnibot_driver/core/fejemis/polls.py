@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What only diagnostics show, asked for one after the other, and the trigger of the sonar."""
+"""Polls of the values that are only shown in diagnostics, and the trigger of the sonar."""
 
 import math
 from collections.abc import Mapping
@@ -19,15 +19,15 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
         b"cvsteeri", b"bati",
     ),
 }  # fmt: skip
-"""In this order, round and round."""
+"""Requests for each board, sent in this order, repeatedly."""
 WITH_SUMS: Final = (b"svpi", b"svjti")
-"""Without its last character each is a command, which sets the servo."""
+"""Requests that need a sum: without its last character, each is a command that sets the servo."""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1
 
 
 class Polls:
-    """Of one board. ``told``: what it answered last, by keyword, as text."""
+    """Polls of one board; ``told``: its last answers as text, by keyword."""
 
     def __init__(self, role: Role) -> None:
         self.told: dict[str, str] = {}
@@ -36,21 +36,21 @@ class Polls:
         self.begin()
 
     def begin(self) -> None:
-        """The board is new."""
+        """Begin the requests from the first one: the board is new."""
         self._turn = 0
         self._next_at = self._sonar_at = -math.inf
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something."""
+        """Time at which ``due`` has work, in s."""
         return min(self._next_at, self._sonar_at) if self._role == "drive" else self._next_at
 
     def unknown(self, words: Mapping[str, None]) -> None:
-        """What the firmware does not know is asked no more."""
+        """Stop sending the requests among ``words``, the lines that the firmware does not know."""
         self._unknown = {text for text in ASKED[self._role] if text.decode("ascii") in words}
 
     def due(self, now: float, *, sums: bool) -> list[bytes]:
-        """Lines to write now. ``sums``: whether the board sees that one is damaged."""
+        """Return the lines to send now; ``sums``: the board detects a damaged line."""
         texts = []
         if self._role == "drive" and now >= self._sonar_at:
             self._sonar_at = now + SONAR_EVERY_S
@@ -64,7 +64,7 @@ class Polls:
         return texts
 
     def hear(self, message: Message) -> None:
-        """An answer."""
+        """Take an answer."""
         if isinstance(message, Status):
             self.told[message.keyword] = " ".join(f"{number:g}" for number in message.numbers)
         elif isinstance(message, Words):

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which of the two boards is at which port, and lines to each.
+"""Finds which of the two boards (halves) is at which port, and addresses lines to them.
 
-The heartbeats tell, whatever the order of the ports. Until both have, what stops a robot goes to
-both. Knows identities; not what is said.
+The heartbeats identify the boards, whatever the order of the ports. Until both are identified,
+lines that stop the robot go to both ports. The module knows identities, not the lines' meaning.
 """
 
 from dataclasses import replace
@@ -18,12 +18,12 @@ from omnibot_driver.core.traits import Traits
 
 ROLES: Final[tuple[Role, Role]] = ("drive", "front")
 PARAMETERS: Final = ("port", "front_port")
-"""By channel."""
+"""Names of the port parameters, by channel."""
 SWAPPED: Final = replace(TRAITS, channels=TRAITS.channels[::-1])
 
 
 class Ports:
-    """``halves`` by channel; ``swapped``: drive is at the second one."""
+    """The halves by channel; ``swapped``: the drive board is at the second port."""
 
     def __init__(self, settings: FejemisSettings) -> None:
         self.halves = Half(settings.line_sums), Half(settings.line_sums)
@@ -31,43 +31,43 @@ class Ports:
 
     @property
     def traits(self) -> Traits:
-        """With the channels by what is at them."""
+        """The board's traits, with the channels named after the boards found at them."""
         return SWAPPED if self.swapped else TRAITS
 
     def begin(self, settings: FejemisSettings) -> None:
-        """The lines are new."""
+        """Begin new connections on both ports."""
         for half in self.halves:
             half.begin(settings.line_sums)
 
     def configure(self, settings: FejemisSettings) -> None:
-        """Whether lines have sums may be set otherwise."""
+        """Apply the setting whether lines have sums."""
         for half in self.halves:
             if half.decoder.line_sums != settings.line_sums:
                 half.decoder.line_sums = settings.line_sums
 
     @property
     def ready(self) -> bool:
-        """Whether both talk, and are what they should be."""
+        """Whether both boards send their needed streams, and are one of each kind."""
         return all(half.ready for half in self.halves) and not self.trouble
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both have sums."""
+        """Whether lines to both boards have sums."""
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:
-        """The one that is this; None where none or both are."""
+        """Return the half with this role; None if neither has it, or both."""
         first, second = self.halves
         if first.role == role:
             return None if second.role == role else first
         return second if second.role == role else None
 
     def role(self, channel: int) -> Role:
-        """What is there, or is believed to be."""
+        """Return the role of the board at this channel, or the assumed one."""
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
-        """A heartbeat came. Whether the ports are found to be swapped, or not any more."""
+        """Find the order of the ports after a heartbeat; return whether ``swapped`` changed."""
         first, second = (half.role for half in self.halves)
         if first == second:
             return False
@@ -77,7 +77,7 @@ class Ports:
 
     @property
     def trouble(self) -> str:
-        """Why these two are not one robot, and what to do; empty while they may be."""
+        """The reason why these boards are not one robot, with advice; empty while they may be."""
         for name, half in zip(PARAMETERS, self.halves, strict=True):
             if half.identity is not None and half.role is None:
                 return (
@@ -94,12 +94,12 @@ class Ports:
         return ""
 
     def line(self, role: Role, *texts: bytes) -> Packets:
-        """Lines to one board; to both ports while it is not known where it is."""
+        """Return lines for one board; for both ports while its port is unknown."""
         channels = (0, 1) if self.half(role) is None else (ROLES.index(role) ^ self.swapped,)
         return tuple(self._at(channel, *texts) for channel in channels)
 
     def both(self, text: bytes) -> Packets:
-        """A line to each, behind an empty one, which ends whatever was half said."""
+        """Return a line for each board, behind a line end that closes any incomplete line."""
         return tuple(
             (channel, b"\n" + self._at(channel, text)[1].lstrip(b"\n")) for channel in (0, 1)
         )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What only a Fejemis measures or answers, in SI units: values only. Each comes as an Extra."""
+"""Readings and answers that only a Fejemis has, in SI units; each comes as an ``ExtraReading``."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +14,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """What can be asked besides motion; the value reads well in a sentence."""
+    """Requests besides motion; the value is the name in messages to the user."""
 
     CALIBRATE_GYRO = "gyro calibration"
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"
@@ -25,14 +25,17 @@ class Job(Enum):
 
 @value(frozen=True, slots=True)
 class SteeringReading:
-    """Angle of the steered wheel, positive to the left."""
+    """Angle of the steered wheel in rad, positive to the left."""
 
     angle_rad: float
 
 
 @value(frozen=True, slots=True)
 class OrientedImuReading:
-    """The board's orientation as a quaternion x, y, z, w, with the latest rates and forces."""
+    """The board's orientation as a quaternion x, y, z, w, with the latest rates and forces.
+
+    Rates are in rad/s, specific forces in m/s².
+    """
 
     orientation: Quaternion
     angular_velocity: Vector3
@@ -41,14 +44,17 @@ class OrientedImuReading:
 
 @value(frozen=True, slots=True)
 class MagneticReading:
-    """In tesla, in the sensor's axes."""
+    """Magnetic field in tesla, in the sensor's axes."""
 
     field_t: Vector3
 
 
 @value(frozen=True, slots=True)
 class BatteryReading:
-    """``amps``: negative while it is discharged; NaN where unknown. ``cells``: 0 where unknown."""
+    """State of the battery; ``amps``: negative while it is discharged, NaN if unknown.
+
+    ``cells``: 0 if unknown.
+    """
 
     volts: float
     amps: float
@@ -58,7 +64,7 @@ class BatteryReading:
 
 @value(frozen=True, slots=True)
 class RangeReading:
-    """``distance_m`` is infinite where nothing is seen."""
+    """Distance by one sensor; ``distance_m``: infinite if it does not detect anything."""
 
     name: RangeName
     distance_m: float
@@ -66,7 +72,7 @@ class RangeReading:
 
 @dataclass(frozen=True, slots=True)
 class JobDone:
-    """What came of a job; ``token`` is what the asker handed in."""
+    """Result of a job; ``token`` identifies it for its caller."""
 
     token: object
     success: bool

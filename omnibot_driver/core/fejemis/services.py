@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user asks of this robot besides motion: brush, lift, LED band, and jobs.
+"""Requests of the user besides motion: brush, lift, LED band, and jobs.
 
-Knows when each may be done; not how it is said, nor what shows that it is done.
+The module knows when each request is allowed, not its lines or the proof of its success.
 """
 
 from typing import Final, Protocol
@@ -17,15 +17,15 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""How long after Stop a configuration is loaded."""
+"""Time after Stop before a configuration is loaded, in s."""
 
 
 class Robot(Protocol):
-    """What the services ask of the two boards."""
+    """The robot, as the services use it."""
 
     @property
     def mode(self) -> Mode:
-        """Whether both halves talk and obey."""
+        """The mode: nominal while both halves send data and the drive board obeys."""
 
     @property
     def driving(self) -> bool:
@@ -33,11 +33,11 @@ class Robot(Protocol):
 
     @property
     def settings(self) -> FejemisSettings:
-        """For times and delays."""
+        """The settings, which have the services' times and delays."""
 
 
 class Services:
-    """One call each."""
+    """The services, with one method for each request."""
 
     def __init__(
         self, robot: Robot, upkeep: Upkeep, obedience: Obedience, odometry: PoseOdometry, told: Told
@@ -46,24 +46,27 @@ class Services:
         self._odometry, self._told = odometry, told
 
     def set_brush(self, on: bool, now: float) -> None:
-        """Until it is switched off, or something ends it. Raises RequestRefused."""
+        """Switch the brush on or off. Raises RequestRefused while it must not run."""
         if on and (reason := self._why_not_turn()):
             raise RequestRefused(f"brush not switched on: {reason}")
         self._upkeep.machine.set_brush(on)
 
     def lift(self, volts: float, now: float) -> None:
-        """For ``command_timeout_s`` at most; positive lifts. Raises CommandRefused."""
+        """Move the lift for ``command_timeout_s`` at most; positive volts raise the wheel.
+
+        Raises CommandRefused while it must not run.
+        """
         if volts and (reason := self._why_not_turn()):
             raise CommandRefused(f"lift_cmd rejected: {reason}")
         self._upkeep.machine.lift(volts, now, self._robot.settings.command_timeout_s)
 
     def set_led(self, red: int, green: int, blue: int, now: float) -> None:
-        """Colour of the band, 0..255 each."""
+        """Set the colour of the LED band, 0..255 each."""
         red, green, blue = (max(0, min(255, part)) for part in (red, green, blue))
         self._upkeep.machine.set_colour(red, green, blue, now)
 
     def ask(self, job: Job, token: object, now: float) -> None:
-        """Begin a job; a JobDone answers. Raises RequestRefused."""
+        """Begin a job, whose result comes as a JobDone. Raises RequestRefused."""
         robot, moving = self._robot, self._odometry.moving
         if robot.mode is Mode.UNKNOWN:
             raise RequestRefused(f"{job.value} refused: a board is not heard; check both cables")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user has to say of a Fejemis robot, because its two boards do not."""
+"""Settings of a Fejemis robot, which its two boards do not report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ AccelerationUnit = Literal["m/s^2", "g"]
 
 
 class Written(Enum):
-    """What a user may write to a board's configuration: its command, and how many numbers."""
+    """Settings that a user may write to a board: the command, and the count of numbers."""
 
     WHEELS = "confw", 5
     """Radius of the left and right wheel in m, gear, encoder ticks a revolution, track in m."""
@@ -23,11 +23,11 @@ class Written(Enum):
     INFRARED = "irc", 4
     """Raw values at 13 cm and 50 cm, of sensor 1, then 2."""
     MAGNETOMETER = "magcal", 12
-    """Three offsets, then a matrix of nine by rows."""
+    """Three offsets, then a 3 × 3 matrix, row by row."""
     ACCELEROMETER = "acccal", 6
     """Three offsets, then three scales."""
     STEERING_GAINS = "cssteer", 0
-    """As in the firmware's ucontrolbase.cpp; any count of numbers."""
+    """Parameters as in the firmware's ucontrolbase.cpp; any count of numbers."""
 
     command: str
     count: int
@@ -38,14 +38,14 @@ class Written(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FejemisSettings:
-    """``track_m``, ``wheelbase_m``: what the driver computes with until the boards have told
-    theirs. ``written``: what the user wants on the boards; anything else is only read.
+    """Settings of the robot.
 
-    ``line_sums``: whether lines carry a sum; ``auto`` learns it from the heartbeats.
-    ``allow_reverse``: whether a negative speed is passed on, see docs/boards/fejemis.md.
-    ``command_timeout_s``: the longest time that is sent with a voltage of the lift.
-    ``power_off_delay_s``: between the request and the end of power. ``low_cell_v``: a battery with
-    less for each cell is reported as low.
+    ``track_m``, ``wheelbase_m``: the geometry that is used until the boards report theirs.
+    ``written``: values to write to the boards; all others are only read. ``line_sums``: whether
+    lines carry a sum; ``auto`` learns it from the heartbeats. ``allow_reverse``: whether a negative
+    speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the longest time that is
+    sent with a voltage of the lift. ``power_off_delay_s``: between the request and the end of
+    power. ``low_cell_v``: voltage per cell below which a battery is reported as low.
     """
 
     track_m: float = 0.4

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What only this board has to show in diagnostics, by names for people. Knows no bytes."""
+"""Diagnostics of this board only, by names for people."""
 
 import math
 from typing import Final
@@ -11,14 +11,14 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""How many of the latest lines that a board did not know are shown."""
+"""Count of a board's latest unknown lines that are shown."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 
 def own_figures(
     ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None
 ) -> dict[str, str]:
-    """Version, identity and what was read of each board; ``source``: rcSource."""
+    """Return version, identity and the values read from each board; ``source``: rcSource."""
     front, machine = translation.front, upkeep.machine
     own = {"Ports": "swapped" if ports.swapped else "as configured"}
     for role in ROLES:

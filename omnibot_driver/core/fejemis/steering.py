@@ -1,14 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From a body twist to the commands for both boards that move the body so.
+"""Conversion of a body twist into commands for both boards.
 
-The drive board does not do what ``rc`` says: its outer wheel turns with the root of v² + w²,
-about the centre that the *measured* front angle gives. So both are multiplied by
-(`|v|` + `|w|`·B/2) / sqrt(v² + w²), which makes that root the speed of the outer wheel.
+The drive board does not obey ``rc`` literally: its outer wheel turns with the root of v² + w²,
+about the centre given by the *measured* front angle. So both numbers are multiplied by (`|v|` +
+`|w|`·B/2) / sqrt(v² + w²), which makes that root the speed of the outer wheel.
 
-While the front wheel is on its way the drive board gets less: as much as moves the body no faster
-and turns it no quicker than commanded. A turn on the spot begins when the wheel is across; until
-then the drive board is commanded to stand. Knows geometry and angles, not lines.
+While the front wheel moves to its angle, the drive board gets a lower speed: at most as much as
+moves and turns the body no faster than commanded. A turn on the spot begins when the front wheel is
+across; until then the drive board is commanded to stop. The module knows geometry and angles, not
+lines.
 """
 
 import math
@@ -20,20 +21,21 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Beyond this angle the body turns on the spot."""
+"""Angle of the front wheel in rad from which the body turns on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
-"""A robot that turns goes on up to here."""
+"""Deviation in rad of the front wheel up to which a turn on the spot continues."""
 GIVEN_RAD: Final = math.radians(5.0)
-"""What a body may do besides while its wheel is on the way: as if it were off by this angle."""
+"""Deviation in rad of the front wheel whose effect on the body is tolerated while it moves."""
 
 
 @value(frozen=True, slots=True)
 class Steered:
-    """``speed_mps``, ``turn_radps`` for the front board; ``part`` of both for the drive board.
+    """Command for both boards, and what the body does with it.
 
-    ``angle_rad``: where the wheel is to stand. ``twist``: what the body does with the wheel as it
-    is. ``whole``: whether nothing is held back.
+    ``speed_mps``, ``turn_radps``: for the front board; the drive board gets ``part`` of both.
+    ``angle_rad``: the front wheel's target. ``twist``: the body's motion at the present front
+    angle. ``whole``: the speed is not limited.
     """
 
     speed_mps: float
@@ -46,14 +48,14 @@ class Steered:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Of the boards: B and F of the manual, in m."""
+    """Geometry of the boards: B and F of the manual, in m."""
 
     track_m: float
     wheelbase_m: float
 
     @property
     def kinematics(self) -> SteeredKinematics:
-        """With wheels of 1 m."""
+        """The kinematics with wheels of 1 m radius, whose rates are the speeds of the rims."""
         return SteeredKinematics(1.0, self.track_m, self.wheelbase_m)
 
 
@@ -61,22 +63,22 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def scale(twist: BodyTwist, track_m: float) -> float:
-    """What both numbers of ``rc`` are multiplied by; 1 at rest."""
+    """Return the factor for both numbers of ``rc``; 1 at rest."""
     root = math.hypot(twist.vx_mps, twist.yaw_rate_radps)
     return outer_mps(twist, track_m) / root if root else 1.0
 
 
 def outer_mps(twist: BodyTwist, track_m: float) -> float:
-    """Speed of the rim of the faster wheel, without sign."""
+    """Return the rim speed of the faster wheel in m/s, without sign."""
     return abs(twist.vx_mps) + abs(twist.yaw_rate_radps) * track_m / 2
 
 
 def steer(
     wanted: BodyTwist, geometry: Geometry, angle_rad: float | None, *, turning: bool
 ) -> Steered:
-    """What to command. ``angle_rad``: of the front wheel, None while it is unknown.
+    """Return the command for both boards; ``angle_rad``: the front angle, None while unknown.
 
-    ``turning``: whether the body turns on the spot already.
+    ``turning``: the body turns on the spot already.
     """
     target_rad = geometry.kinematics.steering_rad(wanted)
     factor = scale(wanted, geometry.track_m)
@@ -99,7 +101,10 @@ def steer(
 
 
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
-    """Of a body whose outer wheel rolls so, by the manual's equations; negative is backward."""
+    """Return the body's twist from the outer wheel's speed and the front angle.
+
+    It follows the manual's equations. A negative speed is backward.
+    """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)
     return BodyTwist(rolled * math.cos(angle_rad), 0.0, rolled * across)
@@ -108,7 +113,7 @@ def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTw
 def told_twist(
     speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
 ) -> BodyTwist:
-    """Of a body whose drive board gets this command, by the manual's equations."""
+    """Return the body's twist when the drive board gets this command, by the manual's equations."""
     outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
     return body_twist(outer, geometry, angle_rad)
 
@@ -116,7 +121,7 @@ def told_twist(
 def _allowed(
     wanted: BodyTwist, geometry: Geometry, target_rad: float, angle_rad: float, *, turning: bool
 ) -> float:
-    """Speed of the outer rim with the wheel at this angle, m/s."""
+    """Return the outer rim's largest speed at this front angle, in m/s; infinity without limit."""
     off_rad = abs(angle_rad - target_rad)
     if abs(target_rad) >= ACROSS_RAD:
         near = off_rad <= (STILL_ALIGNED_RAD if turning else ALIGNED_RAD)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The sum before a line: ``;NN``, by which a board tells most damaged lines from right ones.
+"""The sum before a line, ``;NN``, by which a board detects most damaged lines.
 
 NN is the sum of the characters from 0x20 on, modulo 99, plus 1. One damaged line in 99 passes, and
-so does a line that lost a ``c``, or two characters whose codes add up to 99. Knows characters; not
-what a line says.
+so does a line that lost a ``c``, or two characters whose codes add up to 99. The module knows
+characters, not the meaning of a line.
 """
 
 import re
@@ -16,17 +16,17 @@ _SUMMED: Final = re.compile(rb";([0-9]{2})(.*)", re.DOTALL).fullmatch
 
 
 def sum_of(text: bytes) -> int:
-    """1..99, of the characters after the prefix."""
+    """Return the sum of the characters after the prefix, 1..99."""
     return sum(text.translate(None, _CONTROL)) % MODULUS + 1
 
 
 def with_sum(text: bytes) -> bytes:
-    """The line without its end."""
+    """Return the text with its sum in front, without a line end."""
     return b";%02d%s" % (sum_of(text), text)
 
 
 def without_sum(line: bytes) -> tuple[bytes, bool | None]:
-    """The text of a line, and whether its sum is right; None where it has none."""
+    """Return the text of a line, and whether its sum is right (None without a sum)."""
     if not line.startswith(b";"):
         return line, None
     found = _SUMMED(line)

@@ -2,7 +2,7 @@
 
 """Notices for the user of this robot: each sentence at most once in a while.
 
-Knows sentences and times. A stop is never left out, only its sentence.
+The module knows sentences and times. A repeated stop keeps its notice, but with an empty text.
 """
 
 import math
@@ -11,22 +11,22 @@ from typing import Final
 from omnibot_driver.core.readings import NoticeReading
 
 TELL_EVERY_S: Final = 10.0
-"""The same notice is repeated no more often."""
+"""Shortest time between two equal notices, in s."""
 
 
 class Told:
-    """``notices``: those that were not taken yet."""
+    """Collects notices; ``notices``: those that the caller has not taken yet."""
 
     def __init__(self) -> None:
         self.notices: list[NoticeReading] = []
         self._told_at: dict[str, float] = {}
 
     def halt(self, text: str, now: float) -> None:
-        """The robot is stopped, and why."""
+        """Add a notice that the robot is stopped, with the reason."""
         self.notices.append(NoticeReading(self._news(text, now), halt=True))
 
     def tell(self, text: str, now: float) -> None:
-        """Something that stops nothing."""
+        """Add a notice of something that does not stop the robot."""
         if text := self._news(text, now):
             self.notices.append(NoticeReading(text, halt=False))
 

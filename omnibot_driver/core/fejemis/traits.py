@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a Fejemis has and can do, and what to check when a robot with one does not obey."""
+"""The features of a Fejemis, and what to check when such a robot does not obey."""
 
 from typing import Final
 
@@ -11,7 +11,7 @@ from omnibot_driver.core.traits import Traits
 
 DRIVE: Final = 0
 FRONT: Final = 1
-"""Channels, as they are configured; the heartbeats tell which board is on which."""
+"""Channels as configured; the heartbeats show which board is on which channel."""
 
 TRAITS: Final = Traits(
     channels=("drive", "front"),

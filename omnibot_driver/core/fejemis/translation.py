@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From messages of both boards to readings in SI units, each with its stamp.
+"""Conversion of both boards' messages into readings in SI units, each with its stamp.
 
-Knows units and what a message is worth; not which of them come, nor what is done about it.
+The module knows units and readings, not which messages come or what follows from them.
 """
 
 import math
@@ -37,13 +37,13 @@ from omnibot_driver.core.readings import ExtraReading, ImuReading, NoticeReading
 
 TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
-"""How often a low battery is reported."""
+"""Shortest time between two notices of a low battery, in s."""
 PERIOD_S: Final = 0.03
-"""An orientation gets the stamp of the last IMU sample, unless that sample is older than this."""
+"""Age in s of the last IMU sample up to which an orientation gets its stamp."""
 
 
 class Translation:
-    """``front``, ``odometry``: what is known of the front wheel and of the way."""
+    """Converts messages to readings; ``front``: the front wheel, ``odometry``: the motion."""
 
     def __init__(self, settings: FejemisSettings) -> None:
         self._settings = settings
@@ -56,12 +56,12 @@ class Translation:
         self.connect()
 
     def configure(self, settings: FejemisSettings) -> None:
-        """From the next message on."""
+        """Use new settings from the next message on."""
         self._settings = settings
         self._imu.unit = settings.acceleration_unit
 
     def connect(self) -> None:
-        """The lines are new."""
+        """Begin new connections."""
         self.front.begin()
         self.odometry.begin()
         self._imu.begin()
@@ -69,32 +69,32 @@ class Translation:
         self._imu_stamp_s = -math.inf
 
     def restarted(self) -> None:
-        """The drive board is: its frame and its phases begin anew."""
+        """Forget the frame and the IMU's phase: the drive board has restarted."""
         self.odometry.forget()
         self._imu.begin()
         self._pose_s = -math.inf
 
     def add(self, reading: Reading, now: float) -> None:
-        """One that is stamped with its arrival."""
+        """Add a reading that is stamped with its arrival."""
         self.stamped.add(reading, now, now)
 
     def extra(self, content: object, now: float) -> None:
-        """A value of this board's own kind."""
+        """Add a value that only this board has."""
         self.add(ExtraReading(content), now)
 
     def steering(self, angle_rad: float, now: float) -> None:
-        """Of the front wheel."""
+        """Add the angle of the front wheel, in rad."""
         self.extra(SteeringReading(angle_rad), now)
 
     def hear_front(self, message: Message, now: float) -> None:
-        """What the front board tells besides its angle."""
+        """Convert a message of the front board other than its angle."""
         if isinstance(message, Infrared):
             first, second = message.distances_m
             self.extra(RangeReading("ir1", _seen(first)), now)
             self.extra(RangeReading("ir2", _seen(second)), now)
 
     def hear_drive(self, message: Message, clock: TeensyClock, now: float) -> None:
-        """What the drive board tells."""
+        """Convert a message of the drive board."""
         self.stamped.skew_ppm = clock.skew_ppm
         match message:
             case BoardPose():
@@ -159,7 +159,7 @@ class Translation:
 
 
 def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
-    """x, y, z, w of turns about the fixed axes x, y, z in this order."""
+    """Return x, y, z, w of rotations about the fixed axes x, y, z in this order."""
     cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
     cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
     cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
@@ -172,5 +172,5 @@ def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
 
 
 def _seen(distance_m: float) -> float:
-    """Nothing is seen where a sensor tells no positive distance."""
+    """Return the distance in m; infinity if the sensor did not measure a positive one."""
     return distance_m if distance_m > 0.0 else math.inf

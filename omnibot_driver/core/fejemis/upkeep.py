@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What keeps both boards talking and configured, and what is asked of them besides motion.
+"""Keeps both boards sending and configured, and runs requests besides motion.
 
-Composes subscriptions, polls, configuration, jobs and what turns on the front board. Knows which of
-them has something to send; not what is made of the answers.
+It composes subscriptions, polls, configuration, jobs, and what moves on the front board. It knows
+which of them has something to send, not how the answers are used.
 """
 
 from typing import Final
@@ -22,7 +22,7 @@ GEOMETRIES_DIFFER_M: Final = 0.002
 
 
 class Upkeep:
-    """``machine``: brush, lift, lights; ``jobs``: one at a time; the rest by role."""
+    """The parts: ``machine`` for brush, lift and lights, ``jobs``, and the others by role."""
 
     def __init__(self, ports: Ports, settings: FejemisSettings) -> None:
         self._ports, self._settings = ports, settings
@@ -31,20 +31,20 @@ class Upkeep:
         self.polls = {role: Polls(role) for role in ROLES}
 
     def configure(self, settings: FejemisSettings) -> None:
-        """Other settings; what is written to the boards follows while the robot stands."""
+        """Use new settings; those written to the boards are sent while the robot is at rest."""
         self._settings = settings
         for configuration in self.configurations.values():
             configuration.configure(settings.written)
 
     def begin(self) -> None:
-        """The lines are new: all is off, and both boards are read and configured again."""
+        """Begin new connections: all is off, and both boards are read and configured again."""
         self.machine.off()
         self.jobs.begin()
         for role in ROLES:
             self._begin(role)
 
     def restarted(self, role: Role) -> None:
-        """A board forgot what was not saved; what turned is off, and stays so."""
+        """Configure a restarted board again; what moved on the front board stays off."""
         self._begin(role)
         self.machine.begin()
         self.jobs.cancel(f"the {role} board has restarted")
@@ -57,12 +57,12 @@ class Upkeep:
 
     @property
     def geometry(self) -> Geometry:
-        """B and F, as the drive board computes with them where that is known."""
+        """Track B and wheelbase F as the drive board uses them, or as set while that is unknown."""
         nominal = Geometry(self._settings.track_m, self._settings.wheelbase_m)
         return self.configurations["drive"].geometry or nominal
 
     def hear(self, role: Role, message: Message, now: float) -> None:
-        """What may answer any of them."""
+        """Pass a message to the parts that it may answer."""
         configurations = self.configurations
         self.jobs.hear(role, message, now)
         configurations[role].hear(message)
@@ -75,7 +75,7 @@ class Upkeep:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something."""
+        """Time at which ``due`` has work, in s."""
         times = [self.jobs.wake_at, self.machine.wake_at]
         for half in self._ports.halves:
             times.append(half.wake_at)
@@ -84,7 +84,7 @@ class Upkeep:
         return min(times)
 
     def due(self, now: float, *, stands: bool) -> dict[Role, list[bytes]]:
-        """Lines to send now, to each board. ``stands``: no motion is commanded."""
+        """Return the lines to send now, by board; ``stands``: motion is not commanded."""
         texts: dict[Role, list[bytes]] = {"drive": [], "front": self.machine.due(now)}
         for role, more in self.jobs.due(now).items():
             texts[role] += more
@@ -103,7 +103,7 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """Why a new board is not to be driven yet, in words; empty if it has what the user set."""
+        """The reason why a new board must not be driven yet; empty once it is configured."""
         for configuration in self.configurations.values():
             if configuration.pending:
                 return (
@@ -114,7 +114,7 @@ class Upkeep:
 
     @property
     def advice(self) -> str | None:
-        """What a user should set or update; None while all is well."""
+        """Advice on what the user should set or update; None if nothing is wrong."""
         for configuration in self.configurations.values():
             if configuration.failed:
                 names = ", ".join(setting.command for setting in configuration.failed)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the times say: a half that is silent, an angle or a pose that is too old to drive by.
+"""Timeouts: a silent half, or an angle or a pose that is too old to drive.
 
-Knows when lines came; not what they say.
+The module knows when lines came, not what they contain.
 """
 
 import math
@@ -14,40 +14,40 @@ from omnibot_driver.core.fejemis.ports import PARAMETERS, Ports
 from omnibot_driver.core.fejemis.told import Told
 
 NO_POSE_S: Final = 0.25
-"""A robot whose pose is older is driven no further."""
+"""Age of the pose in s after which the robot is stopped."""
 NO_ANGLE_S: Final = 0.25
-"""A front board that is silent for longer may have restarted: brush and lift are switched off."""
+"""Silence of the front board in s after which brush and lift are off: it may have restarted."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
-"""A board that is silent for this time after the port was opened is reported."""
+"""Silence in s after opening a port at which its board is reported missing."""
 SLACK_S: Final = 1e-6
 
 
 class Watch:
-    """``blind``: the angle of the front wheel is too old; ``unposed``: the pose is."""
+    """The timeouts; ``blind``: the front angle is too old. ``unposed``: the pose is too old."""
 
     def __init__(self, ports: Ports, front: FrontWheel, told: Told) -> None:
         self._ports, self._front, self._told = ports, front, told
         self.begin()
 
     def begin(self) -> None:
-        """The lines are new."""
+        """Begin new connections."""
         self.blind = self.unposed = False
         self._begun_at = math.inf
 
     def open(self, now: float) -> None:
-        """Input begins."""
+        """Note the time of the first input, in s."""
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:
-        """Halts what is to be stopped. Whether a half was lost."""
+        """Report what must stop the robot; return whether a half was lost."""
         lost = [self._look_at(channel, now) for channel in (0, 1)]
         self._look_at_age(now, driving=driving)
         return any(lost)
 
     @property
     def wake_at(self) -> float:
-        """When an angle or a pose becomes too old."""
+        """Time at which an angle or a pose becomes too old, in s."""
         times = [math.inf]
         drive = self._ports.half("drive")
         if not self.blind:
@@ -58,7 +58,7 @@ class Watch:
 
     @property
     def front_unheard_at(self) -> float:
-        """When the front board has been silent for too long for what turns there."""
+        """Time in s at which the front board has been silent too long for brush and lift to run."""
         front = self._ports.half("front")
         return -math.inf if front is None else front.came_at("fwl") + NO_ANGLE_S + SLACK_S
 
@@ -105,7 +105,7 @@ class Watch:
 
     @property
     def refusal(self) -> str:
-        """Why the robot is not to be driven; empty if it may be."""
+        """The reason why the robot must not be driven; empty if it may be."""
         if trouble := self._ports.trouble or self._front.trouble:
             return trouble
         if self.blind:

@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Poses in the plane and wheels: pure geometry."""
+"""Geometry of poses in the plane and of wheels, without bytes or times."""

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two driven wheels on one axle, and the body they carry.
+"""Kinematics of a body with two driven wheels on one axle.
 
 The body turns about a point on the line of the axle, its instantaneous centre of rotation. Its
 frame has its origin in the middle of the axle.
@@ -15,7 +15,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 @dataclass(frozen=True, slots=True)
 class DifferentialKinematics:
-    """Wheels of radius ``wheel_radius_m``, ``track_m`` apart; both turn forward alike."""
+    """Wheels of radius ``wheel_radius_m``, ``track_m`` apart; positive rates drive forward."""
 
     wheel_radius_m: float
     track_m: float
@@ -28,11 +28,11 @@ class DifferentialKinematics:
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """The twist without its sideways part."""
+        """Return the twist without its sideways part."""
         return BodyTwist(twist.vx_mps, 0.0, twist.yaw_rate_radps)
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, float]:
-        """Rates of left and right in rad/s."""
+        """Return the rates of the left and the right wheel, in rad/s."""
         turning = twist.yaw_rate_radps * self.track_m / 2
         return (
             (twist.vx_mps - turning) / self.wheel_radius_m,
@@ -40,6 +40,6 @@ class DifferentialKinematics:
         )
 
     def body_twist(self, wheel_rates: Sequence[float]) -> BodyTwist:
-        """Twist of the body whose left and right wheels turn at these rates in rad/s."""
+        """Return the twist of the body whose left and right wheel turn at these rates in rad/s."""
         left, right = (rate * self.wheel_radius_m for rate in wheel_rates)
         return BodyTwist((left + right) / 2, 0.0, (right - left) / self.track_m)

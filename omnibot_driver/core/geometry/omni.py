@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Three omni wheels and the body they carry.
+"""Kinematics of a body on three omni wheels.
 
 Source: the velocity equations and the odometry matrix of the manual's "Control equation" and
 "Odometry equation", without the firmware's command-path gains.
@@ -32,11 +32,11 @@ class OmniKinematics:
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """The whole twist: three wheels have three degrees of freedom."""
+        """Return the complete twist: three wheels have three degrees of freedom."""
         return twist
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, float, float]:
-        """Rates of A, B, C in rad/s that move the body with this twist."""
+        """Return the rates of A, B, C in rad/s that move the body with this twist."""
         along_x = COS30 * twist.vx_mps
         along_y = SIN30 * twist.vy_mps
         turning = self.base_radius_m * twist.yaw_rate_radps
@@ -47,7 +47,7 @@ class OmniKinematics:
         )
 
     def body_twist(self, wheel_rates: Sequence[float]) -> BodyTwist:
-        """Twist of the body whose wheels A, B, C turn without slip at these rates in rad/s."""
+        """Return the twist of the body whose wheels turn without slip at these rates in rad/s."""
         a, b, c = (rate * self.wheel_radius_m for rate in wheel_rates)
         return BodyTwist(
             vx_mps=(b - a) / (2 * COS30),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The plane: poses, and the way from one to another. Knows geometry, nothing that moves in it."""
+"""Poses in the plane, and the displacements between them."""
 
 import math
 
@@ -19,34 +19,34 @@ class Pose:
     yaw_rad: float = 0.0
 
     def __add__(self, other: "Pose") -> "Pose":
-        """Component by component, as differences in one frame add up."""
+        """Add component by component, as differences in one frame add up."""
         return Pose(self.x_m + other.x_m, self.y_m + other.y_m, self.yaw_rad + other.yaw_rad)
 
     def __sub__(self, other: "Pose") -> "Pose":
-        """The difference, component by component."""
+        """Subtract component by component."""
         return Pose(self.x_m - other.x_m, self.y_m - other.y_m, self.yaw_rad - other.yaw_rad)
 
     def times(self, x: float, y: float, yaw: float) -> "Pose":
-        """The product, component by component."""
+        """Multiply component by component."""
         return Pose(x * self.x_m, y * self.y_m, yaw * self.yaw_rad)
 
     @property
     def way_m(self) -> float:
-        """Length of the position, in m."""
+        """Length of the position vector, in m."""
         return math.hypot(self.x_m, self.y_m)
 
     @property
     def finite(self) -> bool:
-        """Whether no component is NaN or infinite."""
+        """Whether all components are finite."""
         return all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad)))
 
     def turned(self, angle_rad: float) -> "Pose":
-        """The same displacement seen from axes turned by ``-angle_rad``; yaw stays."""
+        """Return the same displacement seen from axes turned by ``-angle_rad``; yaw stays."""
         cos, sin = math.cos(angle_rad), math.sin(angle_rad)
         return Pose(cos * self.x_m - sin * self.y_m, sin * self.x_m + cos * self.y_m, self.yaw_rad)
 
     def moved(self, displacement: "Pose") -> "Pose":
-        """The pose after a displacement given in this pose's own axes."""
+        """Return the pose after a displacement that is given in this pose's own axes."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         dx_m, dy_m = displacement.x_m, displacement.y_m
         return Pose(
@@ -56,7 +56,7 @@ class Pose:
         )
 
     def way_to(self, other: "Pose") -> "Pose":
-        """The displacement in this pose's own axes that leads there, the shorter turn of both."""
+        """Return the displacement to ``other`` in this pose's own axes, by the shorter rotation."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         dx_m, dy_m = other.x_m - self.x_m, other.y_m - self.y_m
         return Pose(
@@ -66,12 +66,12 @@ class Pose:
         )
 
     def over(self, duration_s: float) -> BodyTwist:
-        """The constant twist that makes this tangent in this time."""
+        """Return the constant twist that makes this tangent in ``duration_s``."""
         return BodyTwist(self.x_m / duration_s, self.y_m / duration_s, self.yaw_rad / duration_s)
 
 
 def log_of(chord: Pose) -> Pose:
-    """The constant twist times duration (the SE(2) logarithm) whose result is this displacement."""
+    """Return the tangent (twist x time) that makes this displacement: the SE(2) logarithm."""
     half = chord.yaw_rad / 2
     if not half:
         return chord
@@ -82,7 +82,7 @@ def log_of(chord: Pose) -> Pose:
 
 
 def roll(tangent: Pose) -> Pose:
-    """The displacement that a constant twist times duration makes (the SE(2) exponential)."""
+    """Return the displacement that this tangent (twist x time) makes: the SE(2) exponential."""
     half = tangent.yaw_rad / 2
     if not half:
         return tangent

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two driven wheels on one axle and a steered wheel before it, and the body they carry.
+"""Kinematics of a body with two driven wheels on one axle and a steered wheel before it.
 
-All three wheels roll about one instantaneous centre of rotation: it lies on the line of the axle,
-where the line through the steered wheel, across its rolling direction, meets it. The frame of the
-body has its origin in the middle of the driven axle.
+All three wheels roll about one instantaneous centre of rotation. It is the point where the line of
+the driven axle meets the line of the steered wheel's axle. The frame of the body has its origin in
+the middle of the driven axle.
 """
 
 import math
@@ -18,7 +18,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 @dataclass(frozen=True, slots=True)
 class SteeredKinematics:
-    """Driven wheels as in ``DifferentialKinematics``, the steered one ``wheelbase_m`` ahead."""
+    """Driven wheels as in ``DifferentialKinematics``, and a steered one ``wheelbase_m`` ahead."""
 
     wheel_radius_m: float
     track_m: float
@@ -33,21 +33,22 @@ class SteeredKinematics:
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """The twist without its sideways part."""
+        """Return the twist without its sideways part."""
         return self._axle.feasible(twist)
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, float]:
-        """Rates of left and right in rad/s."""
+        """Return the rates of the left and the right wheel, in rad/s."""
         return self._axle.wheel_rates(twist)
 
     def body_twist(self, wheel_rates: Sequence[float]) -> BodyTwist:
-        """Twist of the body whose driven wheels turn at these rates in rad/s."""
+        """Return the twist of the body whose driven wheels turn at these rates, in rad/s."""
         return self._axle.body_twist(wheel_rates)
 
     def steering_rad(self, twist: BodyTwist) -> float:
-        """Angle of the steered wheel, positive to the left, from -pi/2 to pi/2; 0 at rest.
+        """Return the steered wheel's angle in rad, from -pi/2 to pi/2; 0 at rest.
 
-        A body that turns on the spot has it across: to the left for a turn to the left.
+        Positive is to the left. For a turn on the spot it is across the body: at pi/2 for a turn to
+        the left.
         """
         speed, sideways = twist.vx_mps, self.wheelbase_m * twist.yaw_rate_radps
         if speed < 0.0:
@@ -55,7 +56,7 @@ class SteeredKinematics:
         return math.atan2(sideways, speed)
 
     def steered_twist(self, speed_mps: float, steering_rad: float) -> BodyTwist:
-        """Twist of the body whose steered wheel rolls at this speed, at this angle."""
+        """Return the twist of the body whose steered wheel rolls at this speed, at this angle."""
         return BodyTwist(
             speed_mps * math.cos(steering_rad),
             0.0,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The velocity of a body in the plane. Knows no wheels."""
+"""Velocity of a body in the plane."""
 
 import math
 
@@ -16,7 +16,7 @@ class BodyTwist:
     yaw_rate_radps: float
 
     def faster_than(self, linear_mps: float, angular_radps: float) -> bool:
-        """Whether it is faster than these limits, linear or angular."""
+        """Return whether the linear or the angular speed exceeds its limit."""
         return (
             math.hypot(self.vx_mps, self.vy_mps) > linear_mps
             or abs(self.yaw_rate_radps) > angular_radps

@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From an IMU's counts to measurements without bias."""
+"""Conversion of an IMU's counts into measurements without bias."""

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the IMU measured, without its biases; and what it says of itself while the robot stands."""
+"""Correction of the IMU's biases, and the findings about the sensor at standstill."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from omnibot_driver.core.values import value
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuCorrection:
-    """Biases in rad/s and m/s², and whether standstills may refine the gyro's."""
+    """Biases in rad/s and m/s²; ``auto_gyro_bias``: standstills may refine the gyro's."""
 
     gyro_bias: Vector3 = (0.0, 0.0, 0.0)
     accel_bias: Vector3 = (0.0, 0.0, 0.0)
@@ -45,7 +45,7 @@ class BiasCorrector:
         self._correction = correction
 
     def estimate(self, reading: ImuReading, stamp_s: float) -> ImuEstimate:
-        """The reading without biases."""
+        """Return the reading without biases."""
         (x, y, z), (bias_x, bias_y, bias_z) = reading.specific_force, self._correction.accel_bias
         force = x - bias_x, y - bias_y, z - bias_z
         (u, v, w) = rate = reading.angular_velocity
@@ -54,12 +54,12 @@ class BiasCorrector:
         return ImuEstimate(stamp_s, force, (u - bias_u, v - bias_v, w - bias_w))
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Note the motion or rest that the wheels report."""
+        """Take the displacement that the wheels report."""
         self.calibration.displaced(reading.dx_m, reading.dy_m, reading.dyaw_rad)
 
     @property
     def advice(self) -> str:
-        """A sentence on the setting that gravity contradicts; empty if there is none."""
+        """Advice on the setting that the measured gravity contradicts; empty if it agrees."""
         gravity_mps2 = self.calibration.gravity_mps2
         return "" if gravity_mps2 is None else self._board.gravity_advice(gravity_mps2)
 

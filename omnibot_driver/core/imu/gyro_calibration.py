@@ -2,12 +2,12 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-A gyro at rest reads its bias and noise. Three sources tell whether the robot is at rest:
-the wheels (displacements that add up to nothing), the gyro (readings that hardly vary) and the
-accelerometer (the same test). A steady turn without wheels is seen by none of them, so what comes
-out must also be a bias that the sensor may have. By the way the length of gravity is found.
+A gyro at rest reads its bias and noise. Three sources show whether the robot is at rest: the wheels
+(displacements whose sum is zero), the gyro (readings that hardly vary) and the accelerometer (the
+same test). None of them detects a steady turn without wheels, so the result must also be a bias
+that the sensor may have. The measurement yields the length of gravity as well.
 
-This module knows readings and times. It reads no clock, and does not know when one should measure.
+This module knows readings and times. It does not read a clock, and does not know when to measure.
 """
 
 import math
@@ -19,26 +19,30 @@ from omnibot_driver.core.requests import RequestDone
 
 MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0
-"""Length of an observation that was not requested."""
+"""Length of an observation that was not requested, in s."""
 GAP_S: Final = 0.2
-"""After a longer time without readings a look begins anew."""
+"""Longest pause between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
-"""Leaves a second of the five that a service has for writing a file."""
+"""Time in s within which a request is answered, of the five that a service has.
+
+The rest is for writing a file."""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
-"""Ten times the noise of one reading, rms: a robot that is touched shows more."""
+"""Largest standard deviations at rest, ten times the noise of one reading.
+
+A robot that is touched shows more."""
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
-"""Wheels that stand may say one count to and fro."""
+"""Largest displacement at rest, in m and rad: resting wheels may report one count to and fro."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """MPU-6050 product specification, section 6.1: initial zero-rate output."""
 REFINEMENT: Final = 0.05
-"""Part of the way to what one block says: half the way in a quarter of a minute."""
+"""Part of the difference to one block's bias that is corrected: half of it in about 14 s."""
 
 
 class Look:
-    """Observations of the robot since ``began_s``."""
+    """One observation of the robot, which began at ``began_s``."""
 
     def __init__(self) -> None:
         self.rates: list[Vector3] = []
@@ -48,7 +52,7 @@ class Look:
         self._x_m = self._y_m = self._yaw_rad = 0.0
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """Look at a reading of the IMU."""
+        """Add a reading of the IMU."""
         if not self.rates:
             self.began_s = stamp_s
         self.last_s = stamp_s
@@ -56,7 +60,7 @@ class Look:
         self.forces.append(force)
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
-        """Look at a displacement, in any axes."""
+        """Add a displacement, in any axes."""
         self.displacements += 1
         self._x_m += dx_m
         self._y_m += dy_m
@@ -64,7 +68,7 @@ class Look:
 
     @property
     def length_s(self) -> float:
-        """Time from the first reading to the last."""
+        """Time from the first reading to the last, in s."""
         return self.last_s - self.began_s if self.rates else 0.0
 
     @property
@@ -74,7 +78,7 @@ class Look:
 
     @property
     def motion(self) -> str:
-        """The evidence of motion, in words; empty if there is none."""
+        """The evidence of motion, as text; empty without any."""
         shaken_radps, shaken_mps2 = max(deviation(self.rates)), max(deviation(self.forces))
         bias_radps = max(map(abs, mean(self.rates)))
         if self.rolled:
@@ -89,9 +93,10 @@ class Look:
 
 
 class GyroCalibration:
-    """``bias`` is what the gyro reads at rest, in rad/s; ``refine``: whether standstills refine it.
+    """Calibration of the gyro; ``bias``: its reading at rest, in rad/s.
 
-    ``answers`` has a RequestDone for every measurement that came to an end.
+    ``refine``: whether standstills refine the bias. ``answers``: a RequestDone for every
+    measurement that came to an end.
     """
 
     def __init__(self, bias: Vector3, *, refine: bool) -> None:
@@ -99,13 +104,13 @@ class GyroCalibration:
         self.refine = refine
         self.answers: list[RequestDone] = []
         self.gravity_mps2: float | None = None
-        """Mean specific force when the robot last stood still."""
+        """Length of the mean specific force at the last standstill, in m/s²."""
         self.noise: Vector3 | None = None
-        """Standard deviation of the gyro's readings then."""
+        """Standard deviation of the gyro's readings at the last standstill, in rad/s."""
         self._look = Look()
         self._token: object = None
         self.wake_at = math.inf
-        """When ``tick`` has something to do."""
+        """Time at which ``tick`` has work, in s."""
 
     @property
     def measuring(self) -> bool:
@@ -113,22 +118,22 @@ class GyroCalibration:
         return self.wake_at < math.inf
 
     def measure(self, token: object, now: float) -> None:
-        """Find the bias from the next two seconds; the answer comes in ``answers``."""
+        """Measure the bias in the next two seconds; the answer comes in ``answers``."""
         self._look = Look()
         self._token, self.wake_at = token, now + ANSWER_WITHIN_S
 
     def give_up(self, reason: str) -> None:
-        """Fail a running measurement, with a reason and a remedy."""
+        """Fail a running measurement; ``reason``: the cause and a remedy."""
         if self.wake_at < math.inf:
             self._answer(False, f"gyro bias unchanged: {reason}")
 
     def tick(self, now: float) -> None:
-        """Give up what is overdue."""
+        """Fail a running measurement that is overdue."""
         if now >= self.wake_at:
             self.give_up("no two seconds of readings without a gap; check ~/state, then call again")
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """Look at a reading of the IMU, raw except for the accelerometer's bias."""
+        """Take a reading of the IMU, raw except for the accelerometer's bias."""
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()
@@ -138,7 +143,7 @@ class GyroCalibration:
             self._conclude()
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
-        """Motion that the wheels reported."""
+        """Take a displacement that the wheels report."""
         self._look.displaced(dx_m, dy_m, dyaw_rad)
 
     def _conclude(self) -> None:
@@ -168,13 +173,13 @@ class GyroCalibration:
 
 
 def mean(vectors: Sequence[Vector3]) -> Vector3:
-    """Of at least one, axis by axis."""
+    """Return the mean of one or more vectors, axis by axis."""
     x, y, z = (math.fsum(row) / len(vectors) for row in zip(*vectors, strict=True))
     return x, y, z
 
 
 def deviation(vectors: Sequence[Vector3]) -> Vector3:
-    """Standard deviation of at least one, axis by axis."""
+    """Return the standard deviation of one or more vectors, axis by axis."""
     n = len(vectors)
     x, y, z = (
         math.dist(axis, (middle,) * n) / math.sqrt(n)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From the counts of an MPU6050 to SI units, and what gravity says of it; axes stay the sensor's.
+"""Conversion of an MPU6050's counts into SI units, in the sensor's axes, and a check by gravity.
 
 Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale factors).
 """
@@ -14,22 +14,22 @@ from omnibot_driver.core.readings import Vector3
 STANDARD_GRAVITY: Final = 9.80665
 
 ACCEL_COUNTS_PER_G: Final = {2: 16384.0, 4: 8192.0, 8: 4096.0, 16: 2048.0}
-"""By full-scale range in g."""
+"""Counts per g, by full-scale range in g."""
 GYRO_COUNTS_PER_DPS: Final = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}
-"""By full-scale range in degrees per second."""
+"""Counts per degree per second, by full-scale range in degrees per second."""
 _MPS2_PER_COUNT: Final = {g: STANDARD_GRAVITY / counts for g, counts in ACCEL_COUNTS_PER_G.items()}
 _RADPS_PER_COUNT: Final = {
     dps: math.radians(1.0 / counts) for dps, counts in GYRO_COUNTS_PER_DPS.items()
 }
 
 ACCEL_TOLERANCE: Final = 0.1
-"""Part of gravity by which a sound sensor may be off, its initial tolerance and bias together."""
+"""Relative deviation from gravity that a sound sensor may have: initial tolerance and bias."""
 
 Counts = tuple[int, int, int]
 
 
 def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
-    """Advice on the settings by a specific force at rest; empty if it is gravity."""
+    """Return advice on the settings by the specific force at rest; empty if that is gravity."""
     if abs(gravity_mps2 / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
         return ""
     wrong = f"at rest the accelerometer measures {gravity_mps2:.2f} m/s² instead of gravity: "
@@ -42,7 +42,7 @@ def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuScale:
-    """The ranges the sensor is set to; keys of the two tables above."""
+    """The ranges that the sensor is set to; keys of the two tables above."""
 
     accel_range_g: int = 2
     gyro_range_dps: int = 250

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU, a control unit for differential drives, and nothing else."""
+"""Driver core for the LOIS ECU, a control unit for differential drives."""
 
 from omnibot_driver.core.lois_ecu.codec import decode_command, encode_command, encode_report
 from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU as a board of the driver: what ``LoisConversation`` knows, in the words of the seam.
+"""The LOIS ECU as a ``Board`` of the driver: an adapter around ``LoisConversation``.
 
-Its odometry is its own: told ``odom_rate_hz`` times a second, predicted from one group of ticks to
-the next. Displacements tell whether the robot obeys, and stands; where the board is blind they are
-marked as not measured.
+It computes its own odometry and returns it ``odom_rate_hz`` times a second, predicted from one
+group of ticks to the next. Displacements show whether the robot obeys and whether it is at rest.
+They are marked as not measured where the board does not report the motion.
 """
 
 import math
@@ -37,13 +37,14 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Longer than a wheel rolls on, and than four groups of ticks take."""
+"""Pause in s before a reset is repeated: longer than wheels roll on, and four groups of ticks
+take."""
 STEADY_S: Final = 0.3
-"""More than one period of the ticks without a change of the counts."""
+"""Time in s without new counts after which ticks are steady: more than one period of the ticks."""
 
 
 class LoisEcuBoard(Board):
-    """One LOIS ECU. ``settings`` may be replaced at any time."""
+    """A robot's LOIS ECU; ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -64,7 +65,7 @@ class LoisEcuBoard(Board):
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """The settings that the wire does not reveal."""
+        """Settings that cannot be read from the board."""
         return self._ecu.settings
 
     @settings.setter
@@ -74,12 +75,12 @@ class LoisEcuBoard(Board):
 
     @property
     def mode(self) -> Mode:
-        """Nominal while it is heard."""
+        """Present mode: nominal while reports arrive, unknown otherwise."""
         return self._ecu.mode
 
     @property
     def figures(self) -> BoardFigures:
-        """Over all connections."""
+        """Counters and rates for diagnostics, over all connections."""
         return self._ecu.figures
 
     @property
@@ -89,19 +90,25 @@ class LoisEcuBoard(Board):
 
     @property
     def shows_standstill(self) -> bool:
-        """The public firmware counts no ticks of a wheel that was not commanded forward."""
+        """Whether the ticks of both wheels count now, so that they can prove a standstill.
+
+        The public firmware counts a wheel's ticks only while its RPM target is positive.
+        """
         return self._ecu.translation.odometry.counting
 
     # Inbound
 
     def connect(self) -> None:
-        """The line is new; the settings are written again."""
+        """Begin a new connection; the settings are written again."""
         self._ecu.connect()
         self._once = NO_PACKETS
         self._connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Decode bytes; returns the readings that they complete."""
+        """Decode bytes; return the readings that they complete.
+
+        If only ``mode`` changes, the result is ``NOTHING_MEASURED``.
+        """
         before = self.mode
         readings = self._read(self._ecu.receive(data, now))
         if not readings and self.mode is not before:
@@ -109,15 +116,15 @@ class LoisEcuBoard(Board):
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """The line is closed."""
+        """Return the readings that held lines still give, as the line is closed."""
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
-        """Note that the board is silent, and may be lost."""
+        """Forget the mode, as the board has been silent for too long."""
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Groups that were held until nothing spoke against them, and odometry."""
+        """Return held groups that nothing has contradicted, and odometry that is due."""
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)
@@ -129,7 +136,7 @@ class LoisEcuBoard(Board):
         return readings
 
     def reset_odometry(self) -> None:
-        """The frame begins where the robot stands."""
+        """Begin the odometry frame at the robot's present pose."""
         self._ecu.reset_odometry()
 
     def _read(self, found: list[LoisReading]) -> list[Reading]:
@@ -161,7 +168,7 @@ class LoisEcuBoard(Board):
         return [ResetReading(proof.remark)]
 
     def _tangent(self, fused: FusedOdometry) -> Pose:
-        """The robot's motion since the last estimate, by both wheels."""
+        """Return the robot's motion since the last estimate, from the distances of both wheels."""
         left_m, right_m = fused.wheel_ways_m
         sign = -1.0 if self.settings.inverted else 1.0
         return Pose((left_m + right_m) / 2, 0.0, sign * (right_m - left_m) / self.settings.track_m)
@@ -181,7 +188,7 @@ class LoisEcuBoard(Board):
 
     @property
     def wake_at(self) -> float:
-        """The time of the next ``due`` or ``elapse``."""
+        """Time of the next call of ``due`` or ``elapse``."""
         odometry_at = self._odometry_at if self.mode is Mode.NOMINAL else math.inf
         if self._leaving:
             return odometry_at
@@ -189,11 +196,11 @@ class LoisEcuBoard(Board):
         return min(self._ecu.wake_at, odometry_at, once_at, self._reset_at_s)
 
     def leave(self) -> None:
-        """Nothing is set any more, so that Stop is the last line."""
+        """Make ``due`` return nothing from now on, so that Stop is the last line."""
         self._leaving = True
 
     def due(self, now: float) -> Packets:
-        """Settings, and what clears up after a Stop."""
+        """Return the lines that are due: settings, repeated resets, and RPM 0/0 after a Stop."""
         if self._leaving:
             return NO_PACKETS
         once, self._once = self._once, NO_PACKETS
@@ -206,7 +213,7 @@ class LoisEcuBoard(Board):
         return packed(data) + once
 
     def actuator(self, proof: StopProof) -> SetpointStream:
-        """Set-points, as RPM or as duty."""
+        """Return the stream that sends set-points, as RPM or as duty."""
         return SetpointStream(self, proof, heard=self._heard)
 
     def _heard(self, packets: Packets, now: float) -> None:
@@ -217,7 +224,7 @@ class LoisEcuBoard(Board):
             self._say_reset_again(now)
 
     def encode(self, order: Order) -> Packets:
-        """The lines that say it. Raises CommandRefused for a pose."""
+        """Return the lines of an order. Raises CommandRefused for a pose."""
         match order:
             case Drive(twist):
                 return packed(self._ecu.velocity(twist))
@@ -230,23 +237,23 @@ class LoisEcuBoard(Board):
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """The body velocity that the last set-point in them commands."""
+        """Return the body velocity that the last set-point in ``packets`` commands."""
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Stop; any line begins a new one, so what was half said is forgotten."""
+        """Return Stop. Its ``:`` begins a new line, so the board discards a partial one."""
         return self.stop()
 
     def stop(self) -> Packets:
-        """Duty 0/0."""
+        """Return duty 0/0."""
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """RPM 0/0: the board has no emergency stop command."""
+        """Return RPM 0/0, as the board has no e-stop command; empty in a terminal mode."""
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Stop, and the board's counters begin anew; sent again until they show it."""
+        """Return Stop and a reset of the board's counters; it is repeated until they show it."""
         self._resets_left, self._reset_shown = RESETS, False
         return self._reset()
 
@@ -266,13 +273,16 @@ class LoisEcuBoard(Board):
     # What only this board has
 
     def set_led(self, on: bool, now: float) -> None:
-        """Said until it has surely arrived."""
+        """Switch the board's LED; the line is repeated, as single lines are lost."""
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Begin to record; a RecordReading or a RecordFailed comes of it. Raises RequestRefused."""
+        """Start a record; a RecordReading or RecordFailed follows. Raises RequestRefused."""
         self._ecu.record(kind, samples)
 
     def distribute_ball(self) -> None:
-        """Said once, as each is another ball; a lost line is not noticed."""
+        """Send the ball command once.
+
+        A repetition would distribute another ball. The loss of the line is not noticed.
+        """
         self._once += packed(self._ecu.distribute_ball())

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What 0x20 tells from one group to the next: turned, rolled, and the speeds behind its velocity.
+"""Changes between two groups of 0x20: turn, distance, and the wheel speeds behind its velocity.
 
-The public firmware integrates whole RPM of both wheels. Its way stands while both are equal, and
-its velocity is that of the last tick. Knows groups; not when they came.
+The public firmware integrates whole RPM of both wheels. Its position does not change while both
+speeds are equal, and its velocity is that of the last tick. Works on groups, without their times.
 """
 
 import math
@@ -18,12 +18,12 @@ MOST_RPM: Final = 150.0
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """Since the group before.
+    """Changes that a group of 0x20 reports since the group before.
 
-    ``turned_m``: way of the right rim less that of the left one; ``along_m``: of the middle of the
-    axle. ``still``: neither changed. With the ``same_velocity`` too there was no tick, unless both
-    speeds are equal. ``speeds_mps``: of the rims at the last tick, left and right, without the
-    fraction of an RPM; None where the velocity tells none.
+    ``turned_m``: distance of the right rim minus that of the left one. ``along_m``: distance of the
+    middle of the axle. ``still``: neither changed. If ``same_velocity`` holds too, no tick came,
+    unless both speeds are equal. ``speeds_mps``: speeds of the left and right rim at the last tick,
+    without the fraction of an RPM; None where the velocity does not give them.
     """
 
     turned_m: float
@@ -34,18 +34,21 @@ class Told:
 
 
 class OdometryReader:
-    """Reads odometry of a board with these wheels."""
+    """Comparison of each odometry group with the one before, for wheels of this size."""
 
     def __init__(self, track_m: float, rpm_mps: float) -> None:
         self._track_m, self._rpm_mps = track_m, rpm_mps
         self._before: BoardOdometry | None = None
 
     def begin(self) -> None:
-        """The next group is a first one."""
+        """Treat the next group as the first."""
         self._before = None
 
     def take(self, group: BoardOdometry) -> Told | None:
-        """None for a first group, and for one that is not a number."""
+        """Return the changes since the last group.
+
+        Return None for a first group, and for a pose that is not finite.
+        """
         if not all(map(math.isfinite, (group.x_m, group.y_m, group.yaw_rad))):
             return None
         before, self._before = self._before, group
@@ -79,9 +82,9 @@ class OdometryReader:
 
 
 def rim_speeds(group: BoardOdometry, track_m: float) -> tuple[float, float] | None:
-    """Speeds of the left and right rim by the velocity; None where it is not a number."""
+    """Return the speeds of the left and right rim in m/s; None if the velocity is not finite."""
     along = group.dx_mps * math.cos(group.yaw_rad) + group.dy_mps * math.sin(group.yaw_rad)
-    # Of a tick that took a rest the velocity points to the middle of a large turn.
+    # After a tick that lasted for a rest, the velocity points along the middle of a large turn.
     forward = math.copysign(math.hypot(group.dx_mps, group.dy_mps), along)
     turning = group.yaw_rate_radps * track_m / 2
     if not (math.isfinite(forward) and math.isfinite(turning)):

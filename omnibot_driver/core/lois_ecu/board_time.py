@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How much later than usual a group of ticks was read, by the board's own time in it.
+"""Delay of a group of ticks: how much later than usual it was read, by the board's time in it.
 
-The public firmware's clock stands while it sends, so it falls behind by 4 to 36 %; what it sent
-since is known, and a line takes about 1.2 ms. The manual's clock goes on. Both are tried, and the
-one that fits the arrivals better is taken: a straight line under the last of them, as a read may be
-late but never early. Knows clock counts, lines and arrival times.
+The public firmware's clock stands still while it sends, so it falls behind by 4 to 36 %. What it
+has sent is known, and a line takes about 1.2 ms. The manual's clock does not stop. Both models are
+tried, and the one that fits the arrivals better is used: a straight line below the last of them,
+because a read may be late but never early. Works on clock counts, numbers of lines and arrival
+times.
 """
 
 import math
@@ -19,34 +20,35 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Five seconds: a crystal that is off by 100 ppm is off by half a millisecond then."""
+"""Number of groups kept: five seconds, in which a crystal off by 100 ppm drifts by 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
-"""Later than this is a board that began anew, or a clock that is not understood."""
+"""Longest plausible delay in s; more shows a restart of the board, or a clock of an unknown
+kind."""
 UNKNOWN_S: Final = 0.012
-"""Standard deviation of an arrival as long as the clock is not known."""
+"""Standard deviation of an arrival in s, while the clock is unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Groups that arrive nearer to each other than this were read together, after a stall: the last of
-them is the least late.
-"""
+"""Longest time in s between groups that were read together, after a stall: the last of them is the
+least late."""
 Point = tuple[float, float]
-"""An arrival, and how far the board's time is behind it."""
+"""Arrival time in s, and how far the board's time is behind it, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
 
 
 class BoardTime:
-    """``stddev_s``: of what ``late_s`` says."""
+    """Estimate of the delay of each group of ticks; ``stddev_s``: its standard deviation in s."""
 
     def __init__(self) -> None:
         self.stddev_s = UNKNOWN_S
         self.begin()
 
     def begin(self) -> None:
-        """The line, or the board, is new."""
+        """Forget the clock, as the line or the board is new."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrivals less board time since the beginning: as it is, and with the lines' time."""
+        """Arrival minus board time since the beginning, in s: as it is, and minus the lines'
+        sending time."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -56,11 +58,14 @@ class BoardTime:
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
-        """This many lines came from the board."""
+        """Count this many lines that the board sent."""
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
-        """Delay of ticks that arrive now: at least zero, and never older than earlier ones."""
+        """Return the delay in s of ticks that arrive at ``now``.
+
+        It is at least zero, and never dates ticks before earlier ones.
+        """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s
         return late_s
@@ -91,7 +96,7 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Height of each point above a line through the lowest points of either half."""
+    """Return the height of each point above a line through the lowest points of both halves."""
     half = len(kept) // 2
     points = list(kept)
     first_s, first = min(points[:half], key=itemgetter(1))

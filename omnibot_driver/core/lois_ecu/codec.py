@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Messages as lines and back: one table for what a host says, one case for each report.
+"""Messages as lines and back: a table of the host's commands, and one case for each report.
 
-Source: the ECU's manual; for the order of words within a payload the public firmware. Groups of
-several lines are put together elsewhere.
+Sources: the ECU's manual; the public firmware for the order of words within a payload. Groups of
+several lines are parsed in ``groups``, records in ``record_lines``.
 """
 
 from collections.abc import Callable
@@ -60,7 +60,7 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """The form of a command: its byte, its kind, and its payload from its fields and back."""
+    """The form of a command: its byte, its class, and its payload from its fields and back."""
 
     code: Code
     kind: type
@@ -107,7 +107,7 @@ _BY_CODE: Final[dict[int, Form]] = {form.code: form for form in _FORMS}
 
 
 def encode_command(command: Command, *, with_sum: bool = True) -> bytes:
-    """The one line that says it. Raises FrameError when a value does not fit or is not a period."""
+    """Return the line of a command. Raises FrameError for a value or a period out of range."""
     code, payload = _said(command)
     return encode_line(code, payload, with_sum=with_sum)
 
@@ -126,7 +126,7 @@ def _said(command: Command) -> tuple[int, int]:
 
 
 def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
-    """Decode one line of a host. Raises FrameError if it is not a command."""
+    """Decode one line from a host. Raises FrameError if it is not a command."""
     line = line_of(data, sum_required=with_sum)
     if line is None or (not with_sum and len(data.replace(b"\r", b"")) != 12):
         raise FrameError(f"not one whole line: {data!r}")
@@ -144,7 +144,7 @@ def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
 
 
 def encode_report(report: Report) -> bytes:
-    """All lines of one report, as the board sends it. Raises FrameError when a value is too big."""
+    """Return all lines of a report as the board sends it. Raises FrameError if it does not fit."""
     match report:
         case EStopButton(pressed):
             return encode_line(Code.ESTOP_BUTTON, int(pressed))
@@ -191,7 +191,7 @@ def _encode_record(record: Record) -> bytes:
 
 
 def single_report(line: Line) -> Report | None:
-    """Decode a line that is a report by itself; None if it is not a valid one."""
+    """Decode a line that is a complete report; None if it is not a valid one."""
     payload = line.payload
     low = payload & 0xFFFF
     high, middle, last = payload >> 16, low >> 8, low & 0xFF

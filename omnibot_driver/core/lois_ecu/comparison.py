@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a LOIS ECU tells against what the motion filter expects: each report corrects the filter.
+"""Corrections of the motion filter: each report of a LOIS ECU is compared with what it expects.
 
-Ticks are facts where they count. Of 0x20 the heading is compared wherever ticks are missing; the
-way only where both speeds differ, as the public firmware's stands at equal ones; the speeds if the
-wheel has ticked since, as one that stands keeps its speed. Knows counts and what 0x20 tells; not
-where the robot is.
+Ticks are exact where they count. The heading of 0x20 is compared wherever ticks are missing. Its
+distance is compared only where both speeds differ, because the public firmware's position does not
+change at equal ones. Its speeds are compared only if the wheel has ticked since, because a wheel at
+rest keeps its speed. Works on counts and changes of 0x20, without the robot's pose.
 """
 
 import math
@@ -30,48 +30,51 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 
 TICKS_AGE_S: Final = 0.005
 ODOMETRY_AGE_S: Final = 0.0135
-"""Lines of 14 characters take 1.2 ms each; the content is that of the first one's beginning."""
+"""Ages in s of ticks and odometry when their last line arrives: a line of 14 characters takes 1.2
+ms, and the content is from the beginning of the first line."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""In squared ticks: what a count, a heading and a way of 0x20 hide."""
+"""Variances, in squared ticks, of what a count, a heading of 0x20 and a distance of 0x20 hide."""
 COUNT_READ_S: Final = 0.003
 SAME_TICKS: Final = 0.6
-"""The same count again tells nothing new of a wheel within this of it."""
+"""Residual in ticks within which an unchanged count is not a measurement."""
 DOUBT: Final = 3.0
-"""Standard deviations: what is further off is not noise, but the filter's belief is wrong."""
+"""Residual, in standard deviations, beyond which it is not noise: the estimate is wrong."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""A heading that is further off has counted a held speed for the time of a rest."""
+"""Residual, in standard deviations and in m, beyond which a heading is discarded: it has integrated
+a kept speed for the time of a rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 FASTER_RPM: Final = 2.5
-"""A slower speed may be that of a tick that took a rest."""
+"""Lowest speed in RPM to compare: a slower one may be that of a tick that lasted for a rest."""
 LONGEST_PAUSE_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""No wheel changes its speed by more: a tick waited while the board sent something else."""
+"""Largest change of a wheel's speed, in RPM and in RPM per s: a larger one shows a tick that waited
+while the board sent something else."""
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.035
-"""After 1 m without ticks: what is not known of a wheel's way, besides all else; at speeds that
-swing the board tells too few of them."""
+"""Standard deviations in m of a wheel's distance after 1 m without ticks, besides all other errors:
+usually, and at speeds that swing, of which the board reports too few."""
 SWERVED_M: Final = 0.025
-"""After 1 m at such speeds: what is not known of the place although the ways are."""
+"""Standard deviation in m of the position after 1 m at such speeds, even with known distances."""
 COASTED_TICKS: Final = 1.0
-"""Ticks by which a wheel that comes to rest has rolled less than at its last speed."""
+"""Ticks by which a wheel that comes to rest has rolled less than at its last reported speed."""
 EQUAL_RPM: Final = 3.0
-"""Standard deviation of the true difference of two speeds of which the board tells the same."""
+"""Standard deviation in RPM of the true difference of two speeds that are reported as equal."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
-"""Of a change of speed that was not expected: how much of its time it may have lasted."""
+"""Part of its time for which an unexpected change of speed may have lasted."""
 UNSEEN_PART: Final = 0.6
-"""A wheel of which no tick was seen has wound up by this part at the most."""
+"""Largest part of ``WINDUP_M`` by which a wheel without a seen tick has wound up."""
 
 
 class Comparison:
-    """Corrects ``motion``."""
+    """Comparison of reports with ``motion``, which they correct."""
 
     def __init__(self, motion: MotionFilter) -> None:
         self._motion = motion
@@ -84,19 +87,22 @@ class Comparison:
         self._jumped = [False, False]
         self._resting = RestingWheel(), RestingWheel()
         self._changed_at_m = [0.0, 0.0]
-        """Way of each wheel when its reported speed changed last."""
+        """Distance in m of each wheel when its reported speed changed last."""
 
     # Ticks
 
     def begin_counts(self) -> None:
-        """The next counts are compared with these."""
+        """Start counting anew: later counts are compared with the present ones."""
         self._counted_m = [0.0, 0.0]
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
     def count(self, index: int, ticks: int, late_s: float) -> None:
-        """This many more ticks of this wheel, which came ``late_s`` later than usual."""
+        """Correct the filter by this many more ticks of a wheel.
+
+        ``late_s``: how much later than usual they came.
+        """
         motion, estimate = self._motion, self._motion.filter
         wheel, tick_m = motion.wheels[index], motion.tick_m
         self._counted_m[index] += ticks * tick_m
@@ -104,7 +110,7 @@ class Comparison:
         counts = wheel.counts(speed, signed=motion.signed)
         counted, self._counted[index] = self._counted[index], bool(counts)
         if not counts and wheel.blind and not counted:
-            if ticks:  # somebody pushes
+            if ticks:  # the robot is pushed
                 self._counted_m[index] = estimate.mean[wheel.base + COUNT]
             return
         residual = self._counted_m[index] - estimate.mean[wheel.base + COUNT]
@@ -120,7 +126,7 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Later headings and ways are compared with those of now."""
+        """Start anew: later headings and distances are compared with the present ones."""
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
         self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)
@@ -131,7 +137,10 @@ class Comparison:
         self._motion.differing_mps = math.inf
 
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
-        """Since the group before, ``duration_s`` ago."""
+        """Correct the filter by the changes of 0x20 since the group before, ``duration_s`` ago.
+
+        ``late_s``: how much later than usual the group came.
+        """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
         for index, wheel in enumerate(motion.wheels):
@@ -163,7 +172,7 @@ class Comparison:
             self._equal(duration_s)
 
     def _equal(self, duration_s: float) -> None:
-        """Both speeds are the same, whatever they are."""
+        """Correct the filter by the fact that both speeds are equal, whatever they are."""
         motion = self._motion
         sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
         if sure and not any(resting.chance for resting in self._resting):
@@ -175,7 +184,7 @@ class Comparison:
                 resting.note(abs(motion.speed_mps(index)) / motion.rpm_mps, duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Neither wheel has rolled further than this."""
+        """Correct the filter by the fact that neither wheel has rolled further than ``ticks``."""
         motion = self._motion
         self.begin_odometry()
         variance = (ticks * motion.tick_m / max(duration_s, 0.01)) ** 2
@@ -218,7 +227,7 @@ class Comparison:
         self._begin_way(variance)
 
     def _speed(self, index: int, speed_mps: float, duration_s: float) -> None:
-        """A speed that was measured over the last tick, and is kept until the next one."""
+        """Correct a wheel by the speed of its last tick, which the board keeps until the next."""
         motion, estimate = self._motion, self._motion.filter
         wheel, base = motion.wheels[index], PER_WHEEL * index
         rpm_mps, tick_m = motion.rpm_mps, motion.tick_m
@@ -256,7 +265,7 @@ class Comparison:
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
     def _rest(self, index: int, told_mps: float, duration_s: float, *, repeated: bool) -> None:
-        """Whether this wheel stands by now, or rolls again."""
+        """Decide whether this wheel is at rest by now, or rolls again."""
         motion, resting = self._motion, self._resting[index]
         wheel, tick_m, speed = motion.wheels[index], motion.tick_m, motion.speed_mps(index)
         sign = math.copysign(1.0, wheel.course.target_mps)
@@ -273,7 +282,7 @@ class Comparison:
             rolled_m = motion.way_m(index) - self._changed_at_m[index]
             too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
             motion.shift(index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
-            for state in (X, Y):  # it may have pointed elsewhere then
+            for state in (X, Y):  # it may have had another heading then
                 motion.filter.disturb([(state, 1.0)], (too_far_m / 4) ** 2)
             motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
             motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
@@ -281,7 +290,7 @@ class Comparison:
             motion.doubt(index, resting.chance * abs(speed) * duration_s)
 
     def _rolls_at(self, index: int, speed_mps: float, duration_s: float) -> None:
-        """On average over the last tick."""
+        """Correct a wheel by its mean speed over the last tick."""
         motion, estimate, base = self._motion, self._motion.filter, PER_WHEEL * index
         push = estimate.mean[base + PUSH]
         lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)

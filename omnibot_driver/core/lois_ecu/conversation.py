@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU: its lines as readings, orders as its lines.
+"""The conversation with a LOIS ECU: its lines become readings, and orders become its lines.
 
-``wrote`` must be called with whatever goes out: the odometry rests on it, since the board tells
-little of where its wheels turn. ``translation`` explains what the board sends, how settings reach
-it in ``opening``, why set-points look as they do in ``outbound``.
+Call ``wrote`` with all bytes that are sent: the odometry depends on them, because the board reports
+little of where its wheels turn. ``translation`` explains what the board sends, ``opening`` how
+settings reach it, and ``outbound`` why set-points look as they do.
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ from omnibot_driver.core.lois_ecu.upkeep import Upkeep
 
 
 class LoisConversation:
-    """One LOIS ECU on one line. ``settings`` may be replaced at any time."""
+    """A conversation with one LOIS ECU on one line; ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -64,7 +64,7 @@ class LoisConversation:
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """The settings that the wire does not reveal."""
+        """Settings that cannot be read from the board."""
         return self._settings
 
     @settings.setter
@@ -76,19 +76,19 @@ class LoisConversation:
     # Inbound
 
     def connect(self) -> None:
-        """The line is new; the settings are written again."""
+        """Begin a new connection; the settings are written again."""
         self.mode = Mode.UNKNOWN
         self._upkeep.connect()
         self._forget_line()
         self._translation.connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
-        """The readings that these bytes complete. Call it without bytes when none came."""
+        """Return the readings that these bytes complete. Call it without bytes when none came."""
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
 
     def flush(self, now: float) -> list[LoisReading]:
-        """The line is closed: what was held is all there will be."""
+        """Return the readings that held lines still give, as the line is closed."""
         return self._understood(self._decoder.flush(now), now)
 
     def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
@@ -96,7 +96,7 @@ class LoisConversation:
         if reports:
             own = not all(isinstance(report, TerminalLine) for report in reports)
             if own and self.mode is Mode.UNKNOWN and self._upkeep.opened:
-                self._upkeep.writer.begin(now)  # it may have booted, and lost its settings
+                self._upkeep.writer.begin(now)  # the board may have booted, and lost its settings
             self.mode = Mode.NOMINAL
             self._upkeep.heard_at_s = now
             self._suspicion.understood()
@@ -120,7 +120,7 @@ class LoisConversation:
             self._upkeep.change.left = False
             self._upkeep.writer.begin(now)
             found.append(TerminalLeft())
-        if self._decoder.in_record:  # right lines, of which there is no report yet
+        if self._decoder.in_record:  # valid lines, not yet a complete report
             self._upkeep.heard_at_s = now
             self._suspicion.understood()
         return self._upkeep.request.look(
@@ -138,16 +138,16 @@ class LoisConversation:
 
     @property
     def translation(self) -> Translation:
-        """The translation, which knows the robot's state."""
+        """Translation of reports, which knows the robot's state."""
         return self._translation
 
     @property
     def held_until(self) -> float:
-        """The time at which ``receive`` without bytes returns held data; infinity without any."""
+        """Time at which ``receive`` without bytes returns held data; infinity without any."""
         return self._decoder.resolves_at
 
     def predicted(self, now: float) -> FusedOdometry | None:
-        """The predicted pose of the robot now; None before the first ticks."""
+        """Return the odometry predicted for ``now``; None before the first ticks."""
         return self._translation.odometry.predict(now)
 
     def reset_odometry(self) -> None:
@@ -155,9 +155,10 @@ class LoisConversation:
         self._translation.odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Whether the robot is seen to stand since it was stopped; None where that is unknown.
+        """Return whether the robot is seen at rest since it was stopped; None if unknown.
 
-        The public firmware counts no ticks of a wheel that was commanded backward, or by RPM 0/0.
+        The public firmware does not count ticks of a wheel that was commanded backward, or by RPM
+        0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -172,7 +173,7 @@ class LoisConversation:
 
     @property
     def figures(self) -> BoardFigures:
-        """Over all connections."""
+        """Counters and rates for diagnostics, over all connections."""
         ticks_ms = self._settings.periods_ms.get(Stream.TICKS, PERIOD_ONCE)
         gains = own_gains(self._settings)
         return BoardFigures(
@@ -193,25 +194,28 @@ class LoisConversation:
 
     @property
     def configured(self) -> bool:
-        """Whether the settings have gone out; by RPM the wheels do not turn before."""
+        """Whether the settings have been sent; before that the wheels do not turn in RPM mode."""
         return self._upkeep.opened and self._upkeep.writer.done
 
     @property
     def confirmed(self) -> bool:
-        """Whether the board has answered, and shown that it took the period of its ticks."""
+        """Whether the board has answered, and its ticks come with the period that was set."""
         return self._upkeep.writer.confirmed
 
     # Outbound
 
     def due(self, now: float) -> bytes:
-        """Settings, modes, and what clears up after a Stop; call it at ``wake_at``."""
+        """Return the lines that are due: settings, modes, a record, and RPM 0/0 after a Stop.
+
+        Call it at ``wake_at``.
+        """
         data = self._upkeep.due(now, stands=bool(self.stands(now)))
         self._decoder.terminal = self._upkeep.change.terminal
         return data
 
     @property
     def wake_at(self) -> float:
-        """The time at which ``due`` must be called again."""
+        """Time of the next call of ``due``, or of ``receive`` without bytes."""
         return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property
@@ -220,7 +224,7 @@ class LoisConversation:
         return self._points.driving
 
     def wrote(self, data: bytes, now: float) -> None:
-        """These bytes went to the board."""
+        """Record that these bytes went to the board."""
         said = self._points.wrote(data, now)
         if said:
             self._stall.wrote(said[-1], now)
@@ -228,57 +232,60 @@ class LoisConversation:
             self._translation.odometry.wrote(command, now)
 
     def stop(self) -> bytes:
-        """Duty 0/0."""
+        """Return duty 0/0."""
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """RPM 0/0, which alternates with Stop; the board has no latch of its own.
+        """Return RPM 0/0, which alternates with Stop, as the board does not latch an e-stop.
 
-        Nothing in a terminal mode, where Stop alone goes out: the public firmware passes all that
-        it hears on to the sensor, and reads no faster than 480 characters a second.
+        In a terminal mode the result is empty and only Stop is sent: the public firmware passes all
+        characters that it receives on to the sensor, and reads at most 480 characters a second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode a velocity by the drive mode; Stop if it rounds to zero."""
+        """Encode a velocity as RPM or duty, by the drive mode; Stop if it rounds to zero."""
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Left and right in rad/s; Stop when both round to nothing. Raises CommandRefused."""
+        """Encode the rates of the left and right wheel in rad/s; Stop if both round to zero.
+
+        Raises CommandRefused while a change of mode, or a terminal mode, forbids motion.
+        """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
         return self._lines(*self._points.wheels(rates_radps))
 
     def duty(self, percents: Sequence[float]) -> bytes:
-        """Left and right in percent, open loop. Refused in RPM mode."""
+        """Encode left and right duty in percent, open loop. Raises CommandRefused in RPM mode."""
         return self._lines(self._points.duty(percents))
 
     def meaning(self, data: bytes) -> BodyTwist:
-        """The body velocity that the last set-point in these bytes commands."""
+        """Return the body velocity that the last set-point in these bytes commands."""
         return self._points.meaning(data)
 
     # Other requests
 
     def reset(self) -> bytes:
-        """Stop, then the board's reset; the counters begin anew."""
+        """Return Stop and the board's reset, after which its counters start at zero."""
         self._decoder.forget_counters()
         self._translation.connect()
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """All of them again: by the manual a reset is one of controllers and interfaces too."""
+        """Write all settings again: by the manual a reset includes controllers and interfaces."""
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Something that may be repeated, until it has surely arrived."""
+        """Send a command that may be repeated, until it has surely arrived."""
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:
-        """Once; do not repeat it."""
+        """Return the ball command; send it once only."""
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Begin to record. Raises RequestRefused where it could not complete."""
+        """Start a record. Raises RequestRefused where it could not complete."""
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
         self._upkeep.request.begin(kind, samples, self._decoder)

@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From a stream of bytes to reports.
+"""Decoder from a stream of bytes to reports.
 
 A line ends with a line feed and begins at the last ``:`` before it, so a line that lost its end
-costs no other one. Anything that is not a line is counted and dropped. A line that lost or gained
-characters has another length; two lines that became one would have to lose fourteen characters
-between them, and pass the checksum besides.
+does not cost another one. Anything else is counted and discarded. A line that lost or gained
+characters has a wrong length. Two lines can become one only if fourteen characters between them are
+lost, and the result would have to pass the checksum too.
 
-This module reads no clock and never raises on input. It holds less than ``LONGEST_LINE`` bytes
-between calls, and looks at each byte a bounded number of times.
+This module does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
+bytes between calls, and looks at each byte a bounded number of times.
 """
 
 from dataclasses import dataclass
@@ -21,13 +21,15 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
 from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
 
 LONGEST_LINE: Final = 256
-"""Longer than any line of a serial sensor."""
+"""Limit of a line in bytes: longer than any line of a serial sensor."""
 
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counts since they were made. ``lines``: right ones; ``faults``: pieces that were not a
-    line."""
+    """Counters of the decoder since its creation.
+
+    ``lines``: valid lines; ``faults``: pieces that were not a line.
+    """
 
     lines: int = 0
     faults: int = 0
@@ -35,10 +37,11 @@ class DecoderStatistics:
 
 
 class LoisDecoder:
-    """``terminal``: whether lines of a sensor are expected, and text is not damage. ``times``: when
-    the last line of each report of the last call arrived, which may have waited for what follows.
+    """Decoder of one serial line.
 
-    Without ``sum_required`` lines that have no checksum are taken as well.
+    Without ``sum_required``, lines without a checksum are accepted too. ``terminal``: lines of a
+    sensor are expected, so text is not damage. ``times``: when the last line of each report of the
+    last call arrived; the report may have been held since.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:
@@ -49,7 +52,7 @@ class LoisDecoder:
         self._assembler = Assembler()
         self._held = b""
         self._cut_bytes = 0
-        """Of the line in hand, already given up."""
+        """Number of bytes of the current line that were already discarded."""
 
     @property
     def group_statistics(self) -> GroupStatistics:
@@ -58,31 +61,31 @@ class LoisDecoder:
 
     @property
     def clock_unit(self) -> ClockUnit | None:
-        """The unit of ``Ticks.time_counts``; None while unknown."""
+        """Unit of ``Ticks.time_counts``; None while unknown."""
         return self._assembler.clock_unit
 
     @property
     def resolves_at(self) -> float:
-        """The latest time for the next ``feed``, with or without bytes."""
+        """Latest time for the next ``feed``, with or without bytes."""
         return self._assembler.resolves_at
 
     @property
     def in_record(self) -> bool:
-        """Whether the lines of a record are coming."""
+        """Whether lines of a record are arriving."""
         return self._assembler.in_record
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """A record of this many samples was requested; others are dropped."""
+        """Expect a record of this many samples; others are discarded."""
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
-        """The board was asked to set its counters to zero."""
+        """Forget the board's counters, as it was asked to set them to zero."""
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:
-        """The reports that these bytes complete, in the order of the line.
+        """Return the reports that these bytes complete, in the order of the line.
 
-        Without bytes: those that waited for what might follow, if nothing did for some time.
+        Without bytes, return held reports if nothing has followed them for some time.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))
@@ -99,7 +102,7 @@ class LoisDecoder:
         return self._untimed(found)
 
     def flush(self, now: float) -> list[Report]:
-        """The line is closed: what was held is all there will be."""
+        """Return the reports that held lines still give, as the line is closed."""
         if self._held or self._cut_bytes:
             self._damaged(len(self._held) + self._cut_bytes)
         self._held, self._cut_bytes = b"", 0

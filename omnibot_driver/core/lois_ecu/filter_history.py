@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a filter was some groups ago, for what turns out to have ended before it was noticed.
+"""History of a filter's states, to go back to before a change that was noticed late.
 
-Knows states and times; not what they mean.
+Works on states and times, without their meaning.
 """
 
 from collections import deque
@@ -11,27 +11,30 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 
 KEPT: Final = 32
-"""Groups that may come until a restart is noticed."""
+"""Number of states kept: groups that may arrive before a restart is noticed."""
 
 
 class FilterHistory:
-    """Of one filter."""
+    """History of the states of one filter."""
 
     def __init__(self, estimate: SparseFilter) -> None:
         self._filter = estimate
         self._kept: deque[tuple[float, list[float], list[list[float]]]] = deque(maxlen=KEPT)
 
     def forget(self) -> None:
-        """What was remembered is in another frame."""
+        """Discard all states, as they are in another frame."""
         self._kept.clear()
 
     def keep(self, now: float) -> None:
-        """Remember how it is now."""
+        """Store the filter's present state."""
         covariance = [list(row) for row in self._filter.covariance]
         self._kept.append((now, list(self._filter.mean), covariance))
 
     def go_back(self, then_s: float) -> float | None:
-        """The filter as it was last before then, or at first. When that was; None: never kept."""
+        """Restore the filter's last state up to ``then_s``, or else the oldest.
+
+        Return the time of that state; None if none was kept.
+        """
         if not self._kept:
             return None
         while len(self._kept) > 1 and self._kept[-1][0] > then_s:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How well the motion filter knows the body's pose and velocity. Knows its states, no motion."""
+"""Covariance of the body's pose and twist, from the states of the motion filter."""
 
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, SPEED, WAY, X, Y
@@ -8,7 +8,10 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 
 def pose_covariance(motion: SparseFilter, turn: float) -> Covariance:
-    """Of x, y and yaw; ``turn``: rad for each m that the right wheel rolls further."""
+    """Return the covariance of x, y and yaw.
+
+    ``turn``: rad of yaw for each m that the right wheel rolls further.
+    """
     matrix = motion.covariance
     left, right = WAY, PER_WHEEL + WAY
     return Covariance(
@@ -22,7 +25,7 @@ def pose_covariance(motion: SparseFilter, turn: float) -> Covariance:
 
 
 def twist_variances(motion: SparseFilter, track_m: float) -> tuple[float, float]:
-    """Of the speed in (m/s)² and the turning in (rad/s)²."""
+    """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)²."""
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])
     turning = motion.variance_of([(left, -1 / track_m), (right, 1 / track_m)])

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The estimate of a LOIS ECU's motion as it is passed on; values only."""
+"""The estimate of a LOIS ECU's motion as it is passed on: values only."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,16 +10,17 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import Covariance
 
 Source = Literal["standing", "ticks", "ticks and heading", "commands and heading", "commands"]
-"""What the last interval is known by."""
+"""What the motion of the last interval is known from."""
 
 
 @dataclass(frozen=True, slots=True)
 class FusedOdometry:
     """The odometry at ``stamp_s``: pose and covariance in its frame, twist in the body's.
 
-    ``displacement``: since the estimate before, in the robot's own axes. ``wheel_ways_m``: of
-    nominal wheels, the board's left and right, since then. ``predicted``: nothing was heard of this
-    time yet. ``blind``: the board told nothing of some of the motion.
+    ``twist_covariance``: variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
+    ``displacement``: motion since the estimate before, in the robot's axes. ``wheel_ways_m``:
+    distances of nominal wheels since then, the board's left and right. ``predicted``: nothing was
+    received for this time yet. ``blind``: the board did not report some of the motion.
     """
 
     stamp_s: float
@@ -34,5 +35,5 @@ class FusedOdometry:
 
     @property
     def blind(self) -> bool:
-        """Whether the motion is known by commands and not by measurement."""
+        """Whether the motion is known from commands instead of ticks."""
         return self.source in ("commands", "commands and heading")

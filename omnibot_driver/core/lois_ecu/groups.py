@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From lines to reports of several lines: groups behind a marker. Records are ``record_lines``'.
+"""Assembly of reports that take several lines: groups behind a marker line.
 
-A group comes out whole or not at all. A lost line makes it too short, one that stands twice or does
-not belong makes it too long or cuts it. So a group is known to be whole when something else follows
-it. It comes out with its last line already where that line does not repeat the one before (no line
-can stand twice then) and the values go on from the last group. Else it waits for the next line,
-or for ``QUIET_S`` without one.
+A group is returned complete or not at all. A lost line makes it too short; a repeated or foreign
+line makes it too long or cuts it. So a group is known to be complete when something else follows
+it. It is returned with its last line already if no line repeats the one before (so none was
+received twice) and its values can follow those of the last group. Otherwise it waits for the next
+line, or for ``QUIET_S`` without one.
 
-0x12 is two kinds of group, told apart by their length: ticks of 3 lines, and in the public firmware
-6 of odometry right behind them. A count of -1 looks like a marker; then too the length tells.
-Knows lines and arrival times, no characters.
+0x12 is two kinds of group, distinguished by their length: ticks of 3 lines, and in the public
+firmware 6 lines of odometry right behind them. A count of -1 looks like a marker; there the length
+decides too. Records are assembled in ``record_lines``. Works on lines and arrival times.
 """
 
 import math
@@ -42,7 +42,8 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Lines of a group follow each other within 1.2 ms, and a reader hands them over within this."""
+"""Silence in s after which a group has ended: its lines follow each other within 1.2 ms, and a
+reader passes them on within this time."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
@@ -53,12 +54,15 @@ _LONGEST: Final = 10
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
 Timed = tuple[float, Report]
-"""When its last line arrived, which may be before it is known to be whole."""
+"""A report, and when its last line arrived, which may be before it is known to be complete."""
 
 
 class Assembler:
-    """``add`` each line, ``damage`` where characters were not a line, ``rest`` while nothing
-    comes."""
+    """Assembler of reports from lines.
+
+    Call ``add`` for each line, ``damage`` where characters were not a line, and ``rest`` while
+    nothing arrives.
+    """
 
     def __init__(self) -> None:
         self.statistics = GroupStatistics()
@@ -74,36 +78,36 @@ class Assembler:
         self._astray = False
         self._after_ticks = False
         self._appends = True
-        """Whether this board has odometry follow its ticks, as far as is known."""
+        """Whether this board sends odometry behind its ticks, as far as is known."""
         self._at = -math.inf
 
     @property
     def clock_unit(self) -> ClockUnit | None:
-        """The unit of ``Ticks.time_counts``; None while unknown."""
+        """Unit of ``Ticks.time_counts``; None while unknown."""
         return self._ticks_gate.unit
 
     @property
     def resolves_at(self) -> float:
-        """The time at which a held group comes out if nothing follows it; infinity without one."""
+        """Time at which a held group is returned if nothing follows it; infinity without one."""
         return self._at + QUIET_S if self._code is not None and not self._done else math.inf
 
     @property
     def in_record(self) -> bool:
-        """Whether the lines of a record are coming."""
+        """Whether lines of a record are arriving."""
         return self._record.begun
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """A record of this many samples was requested; others are dropped."""
+        """Expect a record of this many samples; others are discarded."""
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
-        """The counters begin anew: a reset."""
+        """Forget the counters, as a reset starts them anew."""
         self._ticks_gate.forget()
         for gate in self._odometry_gates.values():
             gate.forget()
 
     def add(self, line: Line, now: float) -> list[Timed]:
-        """The reports that this line completes."""
+        """Return the reports that this line completes."""
         code, payload = line.command, line.payload
         if code in _LENGTHS:
             self._record.cut_off()
@@ -126,17 +130,17 @@ class Assembler:
         return [*found, (now, report)]
 
     def damage(self) -> None:
-        """Characters between two lines were not a line."""
+        """Note that characters between two lines were not a line."""
         if self._code is not None and not self._done:
             self._drop()
         self._record.damage()
 
     def rest(self, now: float) -> list[Timed]:
-        """Note that nothing has arrived until now."""
+        """Return the held group if nothing has followed it for ``QUIET_S``."""
         return self._end(now) if now >= self.resolves_at else []
 
     def finish(self, now: float) -> list[Timed]:
-        """The line is closed."""
+        """Return the held group if it is complete, as the line is closed."""
         found = self._end(now)
         self._record.cut_off()
         return found
@@ -144,7 +148,7 @@ class Assembler:
     # Groups
 
     def _may_be_minus_one(self, code: int) -> bool:
-        """Whether this marker could be a count; if it is none, the group will be too long."""
+        """Return whether this marker may be a count of -1; if not, the group gets too long."""
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
     def _value(self, code: int, payload: int, now: float) -> list[Timed]:
@@ -155,7 +159,7 @@ class Assembler:
             self._astray, self._after_ticks = True, code == Code.TICKS
             return found
         self._at = now
-        if self._done:  # it was longer than it seemed
+        if self._done:  # the group is longer than it seemed
             self._drop()
             return []
         if len(self._payloads) < _LONGEST:
@@ -172,7 +176,7 @@ class Assembler:
         return self._believed(group, now)
 
     def _end(self, now: float) -> list[Timed]:
-        """End the group that was begun."""
+        """End the present group; return it if it is complete and plausible."""
         code = self._code
         if code is None:
             return []
@@ -183,7 +187,7 @@ class Assembler:
         if self._done:
             return []
         payloads = self._payloads
-        if MARKER in payloads and len(payloads) != 3:  # it was not a count
+        if MARKER in payloads and len(payloads) != 3:  # the marker was not a count
             self.statistics.damaged_groups += 1
             payloads = payloads[payloads.index(MARKER) + 1 :]
         group = _group(code, payloads)
@@ -192,7 +196,7 @@ class Assembler:
             return []
         if isinstance(group, Ticks) and was_after_ticks:
             if self._appends and not self._ticks_gate.would_pass(group, self._at):
-                self.statistics.damaged_groups += 1  # more likely half an odometry
+                self.statistics.damaged_groups += 1  # more likely half an odometry group
                 return []
             self._appends = False
         if not in_range(group):
@@ -211,7 +215,7 @@ class Assembler:
                 return self._ticks_gate.would_pass(group, now)
             case BoardOdometry():
                 return self._odometry_gates[group.appended].would_pass(group, now)
-        return False  # one fix says little of the next
+        return False  # one GPS fix says little about the next
 
     def _believed(self, group: GroupReport, now: float) -> list[Timed]:
         match group:

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Compass headings without the false ones that the public firmware makes at north.
+"""Filter of compass headings that rejects the false ones of the public firmware at north.
 
-It averages three numbers of 0 to 359: between 359 and 1 it says 120 or -121. A heading is believed
-that goes on from the last one by what the odometry turned meanwhile. Another one is believed when a
-second of headings agrees with it, and it is none of the two that north is mistaken for. Knows
-degrees and the odometry's yaw, no lines.
+The firmware averages three numbers of 0 to 359 degrees: between 359 and 1 it reports 120 or -121. A
+heading is accepted if it differs from the last one by what the odometry turned meanwhile. Another
+heading is accepted when ``SURE_AFTER`` further ones agree with it, and it is not one of the two
+that north is mistaken for. Works on degrees and the odometry's yaw.
 """
 
 import math
@@ -13,7 +13,7 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Of what the odometry turned."""
+"""Part of the odometry's turn by which a heading may be off, besides ``NEAR_DEG``."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)
@@ -21,20 +21,23 @@ MISTAKEN_WITHIN_DEG: Final = 12.0
 
 
 class HeadingFilter:
-    """``refused``: how many headings could not be true."""
+    """Filter of compass headings; ``refused``: number of headings that were rejected."""
 
     def __init__(self) -> None:
         self.refused = 0
         self.forget()
 
     def forget(self) -> None:
-        """The next one is the first, and must be confirmed."""
+        """Treat the next heading as the first, which must be confirmed."""
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
         self._agreed = 0
 
     def believes(self, heading_deg: float, yaw_rad: float) -> bool:
-        """``heading_deg`` clockwise from north; ``yaw_rad`` of the odometry at the same time."""
+        """Return whether a heading is accepted.
+
+        ``heading_deg``: clockwise from north. ``yaw_rad``: yaw of the odometry at the same time.
+        """
         if self._last is not None and _goes_on(self._last, heading_deg, yaw_rad):
             self._last, self._other, self._agreed = (heading_deg, yaw_rad), None, 0
             return True
@@ -54,7 +57,7 @@ class HeadingFilter:
         return True
 
     def _mistaken(self, heading_deg: float, yaw_rad: float) -> bool:
-        """Whether the robot looks north, and the firmware makes this of it."""
+        """Return whether the robot faces north, and this is a false heading of the firmware."""
         if self._last is None or abs(_expected(self._last, yaw_rad)) > NORTH_DEG:
             return False
         return any(
@@ -64,7 +67,7 @@ class HeadingFilter:
 
 
 def _expected(before: tuple[float, float], yaw_rad: float) -> float:
-    """The heading that the odometry expects, -180..180."""
+    """Return the heading that the odometry implies, -180..180 degrees."""
     return _difference(before[0] - math.degrees(yaw_rad - before[1]), 0.0)
 
 

@@ -3,7 +3,7 @@
 """One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
 
 ``:<command><payload><checksum>\\n``, 14 characters. The checksum is the XOR of the first eleven
-characters. The board can be set to expect lines without it (12 characters); it sends it always.
+characters. The board can be set to accept lines without it (12 characters), but always sends it.
 This module knows the layout only, not what a command means.
 """
 
@@ -31,19 +31,19 @@ _WORD: Final = struct.Struct(">I")
 
 @value(frozen=True, slots=True)
 class Line:
-    """``command`` 0..255, ``payload`` 0..2³²-1."""
+    """One line: ``command`` 0..255 and ``payload`` 0..2³²-1."""
 
     command: int
     payload: int
 
 
 def checksum(text: bytes) -> int:
-    """XOR of the characters of a line before its checksum."""
+    """Return the XOR of the characters of a line before its checksum."""
     return reduce(xor, text[:_SUMMED], 0)
 
 
 def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
-    """The characters of one line. Raises FrameError when a value does not fit."""
+    """Return the characters of one line. Raises FrameError when a value does not fit."""
     if not (0 <= command <= 0xFF and 0 <= payload <= MARKER):
         raise FrameError(f"command {command} with payload {payload} does not fit a line")
     text = b":%02x%08x" % (command, payload)
@@ -51,10 +51,10 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 
 
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
-    """The line that these characters are, from ``:`` to the line feed; None if they are none.
+    """Parse the characters from ``:`` to the line feed; None if they are not a line.
 
     A carriage return before the line feed is accepted. Without ``sum_required`` a line may also
-    have no checksum; a checksum that is there must be right in any case.
+    lack the checksum; a checksum that is there must be right in any case.
     """
     if text.endswith(b"\r\n"):
         text = text[:-2] + END
@@ -69,29 +69,32 @@ def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
 
 
 def from_pair(left: int, right: int) -> int:
-    """Payload of two words, each signed or unsigned. Raises FrameError when one does not fit."""
+    """Return the payload of two 16-bit words, signed or unsigned.
+
+    Raises FrameError when one does not fit.
+    """
     if not (-0x8000 <= left <= 0xFFFF and -0x8000 <= right <= 0xFFFF):
         raise FrameError(f"{left} and {right} do not fit two words of 16 bits")
     return (left & 0xFFFF) << 16 | right & 0xFFFF
 
 
 def unsigned_pair(payload: int) -> tuple[int, int]:
-    """High and low word."""
+    """Return the high and the low word, unsigned."""
     return payload >> 16, payload & 0xFFFF
 
 
 def signed(word: int) -> int:
-    """A word of 16 bits in two's complement."""
+    """Return the value of a 16-bit word in two's complement."""
     return word - 0x10000 if word & 0x8000 else word
 
 
 def signed_pair(payload: int) -> tuple[int, int]:
-    """High and low word in two's complement."""
+    """Return the high and the low word, in two's complement."""
     return signed(payload >> 16), signed(payload & 0xFFFF)
 
 
 def from_float(number: float) -> int:
-    """Payload of a float32. Raises FrameError when it is too large for one."""
+    """Return the payload of a float32. Raises FrameError when the number is too large."""
     try:
         (payload,) = _WORD.unpack(_FLOAT.pack(number))
     except OverflowError as error:
@@ -100,6 +103,6 @@ def from_float(number: float) -> int:
 
 
 def to_float(payload: int) -> float:
-    """A float32; may be NaN or infinite."""
+    """Return the float32 of a payload; it may be NaN or infinite."""
     (number,) = _FLOAT.unpack(_WORD.pack(payload))
     return float(number)

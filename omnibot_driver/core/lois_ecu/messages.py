@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every message of the manual's table as a value. How it is written in lines is in ``codec``.
+"""All messages of the manual's table as values; ``codec`` turns them into lines and back.
 
-Source: the ECU's manual, table of messages; for 0x21 to 0x23 the public firmware. What the host
+Sources: the ECU's manual, table of messages; the public firmware for 0x21 to 0x23. What the host
 sends is a ``Command``, what the ECU sends a ``Report``; some command bytes are both. Units are in
-the names; what a count means in SI units is known elsewhere.
+the names. Modules that use a count know what it is in SI units.
 """
 
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from enum import Enum, IntEnum
 from typing import Final
 
 PERIOD_ONCE: Final = 0xFFFE
-"""Instead of a period in ms: send the message once, then never."""
+"""Value instead of a period in ms: the message is sent once, then never."""
 PERIOD_OFF: Final = 0xFFFF
 MOST_SAMPLES: Final = 1024
-"""A record of more never completes."""
+"""Largest number of samples in a record; a longer one never completes."""
 
 RECORD_END: Final = 0x00000000
 HEADING_END: Final = 0x016A016A
 HEADING_PADDING: Final = 0x016A
-"""362 degrees, which no heading is."""
+"""Padding of a heading record: 362 degrees, which is not a heading."""
 
 
 class Code(IntEnum):
-    """The command byte."""
+    """The command bytes."""
 
     DUTY = 0x01
     RPM = 0x02
@@ -45,7 +45,7 @@ class Code(IntEnum):
 
 
 class Setting(IntEnum):
-    """A float32 that can be written and not read back; the value is its command byte."""
+    """A float32 setting that can be written but not read back; the value is its command byte."""
 
     LEFT_KP = 0x06
     LEFT_TN = 0x07
@@ -63,7 +63,7 @@ class Setting(IntEnum):
 
 
 class Stream(IntEnum):
-    """A message that the ECU sends periodically; the value is its command byte."""
+    """A message that the ECU can send periodically; the value is its command byte."""
 
     GPS_POSITION = 0x0D
     GPS_TIME = 0x0E
@@ -74,9 +74,10 @@ class Stream(IntEnum):
 
 
 class TerminalMode(IntEnum):
-    """``HOST`` is the protocol; the others pass a serial input through and silence the protocol.
+    """What the board's host line carries.
 
-    ``HOST_WITHOUT_SUM``: the protocol, and what the host sends has no checksum.
+    ``HOST`` is the protocol. ``HOST_WITHOUT_SUM`` is the protocol too, but the host's lines do not
+    have a checksum. The others pass a serial input through and silence the protocol.
     """
 
     HOST = 0
@@ -99,7 +100,7 @@ class RecordKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SetDuty:
-    """Open loop: percent of the supply for each motor, -100..100."""
+    """A command of an open-loop duty for each motor: percent of the supply, -100..100."""
 
     left_percent: int
     right_percent: int
@@ -107,7 +108,7 @@ class SetDuty:
 
 @dataclass(frozen=True, slots=True)
 class SetRpm:
-    """Closed loop: revolutions of each wheel per minute."""
+    """A command of a closed-loop speed for each wheel, in revolutions per minute."""
 
     left_rpm: int
     right_rpm: int
@@ -115,14 +116,14 @@ class SetRpm:
 
 @dataclass(frozen=True, slots=True)
 class SetLed:
-    """The board's LED."""
+    """A command that switches the board's LED."""
 
     on: bool
 
 
 @dataclass(frozen=True, slots=True)
 class RecordRpm:
-    """Record this many tick times of each wheel, then send them."""
+    """A command to record this many tick times of each wheel, then send them."""
 
     left_samples: int
     right_samples: int
@@ -130,7 +131,7 @@ class RecordRpm:
 
 @dataclass(frozen=True, slots=True)
 class RecordTorque:
-    """Record this many torque readings of each motor, then send them."""
+    """A command to record this many torque readings of each motor, then send them."""
 
     left_samples: int
     right_samples: int
@@ -138,14 +139,14 @@ class RecordTorque:
 
 @dataclass(frozen=True, slots=True)
 class RecordHeading:
-    """Record this many compass headings, then send them."""
+    """A command to record this many compass headings, then send them."""
 
     samples: int
 
 
 @dataclass(frozen=True, slots=True)
 class WriteSetting:
-    """A command that writes a setting, one float32."""
+    """A command that writes a setting."""
 
     setting: Setting
     value: float
@@ -153,7 +154,10 @@ class WriteSetting:
 
 @dataclass(frozen=True, slots=True)
 class SetPeriod:
-    """``period_ms`` below ``PERIOD_ONCE``, or that, or ``PERIOD_OFF``."""
+    """A command that sets the period of a stream.
+
+    ``period_ms``: below ``PERIOD_ONCE``, or ``PERIOD_ONCE``, or ``PERIOD_OFF``.
+    """
 
     stream: Stream
     period_ms: int
@@ -161,22 +165,22 @@ class SetPeriod:
 
 @dataclass(frozen=True, slots=True)
 class SetTerminalMode:
-    """A command that sets the terminal mode, and the check of the host's lines."""
+    """A command that sets the terminal mode, and whether the host's lines are checked."""
 
     mode: TerminalMode
 
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """A command that resets.
+    """A command that resets the board.
 
-    The manual: controllers, interfaces and counters; the firmware: ticks.
+    By the manual it resets controllers, interfaces and counters; in the firmware only the ticks.
     """
 
 
 @dataclass(frozen=True, slots=True)
 class DistributeBall:
-    """Use the ball distribution device once."""
+    """A command to use the ball distribution device once."""
 
 
 Command = (
@@ -206,7 +210,7 @@ class EStopButton:
 
 @dataclass(frozen=True, slots=True)
 class GpsPosition:
-    """Degrees, north and east positive; 0/0 where there is no fix."""
+    """The GPS position in degrees, north and east positive; 0/0 without a fix."""
 
     latitude_deg: float
     longitude_deg: float
@@ -214,7 +218,7 @@ class GpsPosition:
 
 @dataclass(frozen=True, slots=True)
 class GpsTime:
-    """UTC."""
+    """The GPS time of day in UTC."""
 
     hours: int
     minutes: int
@@ -223,7 +227,7 @@ class GpsTime:
 
 @dataclass(frozen=True, slots=True)
 class GpsDate:
-    """UTC, the year of the century; zeros while unknown."""
+    """The GPS date in UTC, with the year of the century; zeros while unknown."""
 
     year: int
     month: int
@@ -232,14 +236,14 @@ class GpsDate:
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """Degrees to magnetic north, clockwise, -180..180."""
+    """The compass heading in degrees clockwise from magnetic north, -180..359."""
 
     heading_deg: int
 
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """Encoder ticks since the board began or was reset, and its clock as it was sent.
+    """Encoder ticks since the board started or was reset, and its clock when it sent them.
 
     ``time_counts``: ns by the manual, ms in the firmware; wraps at 2³². Ticks are signed.
     """
@@ -251,7 +255,7 @@ class Ticks:
 
 @dataclass(frozen=True, slots=True)
 class BoardOdometry:
-    """The board's own dead reckoning; velocities in its earth frame, may be NaN or infinite.
+    """The board's own dead reckoning, in its earth frame; velocities may be NaN or infinite.
 
     ``appended``: it came behind a Ticks group, under that group's command byte.
     """
@@ -267,10 +271,10 @@ class BoardOdometry:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """As recorded, left and right as long as was asked for; a heading record has no right.
+    """A record; left and right have as many samples as requested.
 
-    RPM: time of a tick in the board's unit (see Ticks of the docs); torque: 12 bit of an ADC;
-    heading: degrees.
+    A heading record has only left ones. RPM: time of a tick in the board's unit (``COUNT_S`` in
+    ``record_request``); torque: 12-bit values of an ADC; heading: degrees.
     """
 
     kind: RecordKind

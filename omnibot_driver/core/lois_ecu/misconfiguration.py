@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is set wrong, or was not set: by bytes that are not lines, and by the settings themselves.
+"""Advice on what is misconfigured, by bytes that are not lines and by the settings themselves.
 
-Knows bytes and settings, no time. One sentence at most. What bytes look like (which other board,
-which wrong setting) is not said while lines are understood.
+It is one sentence at most. Advice by bytes (another board, a wrong setting) is given only while
+lines are not understood. Works on bytes and settings, without times.
 """
 
 import re
@@ -20,15 +20,17 @@ GAINS: Final = (
     Setting.RIGHT_TN,
     Setting.RIGHT_TD,
 )
-"""Of the speed controllers; the board does not tell which it has."""
+"""Gains of the speed controllers; the board does not report which values it has."""
 OWN_GAINS: Final = (
     "the speed controllers run with the board's own {}; with those of the public firmware a wheel"
     " swings, so the robot does not hold its course, and odometry is 0.04 m off in 5 m on average,"
     " in a few drives 0.2 to 2 m: run calibrate step, or set these parameters"
 )
-"""Of 150 forward drives of the compiled firmware with wheels of the right size."""
+"""Advice for missing gains. Its figures are from 150 forward drives of the compiled firmware with
+wheels of the right size."""
 LOOK_AT: Final = 600
-"""Bytes without one right line. At the slowest, the board sends 70 of them in a second."""
+"""Number of bytes without a valid line after which advice is given: the board sends at least 70 of
+them a second."""
 
 _LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
 _NMEA: Final = re.compile(rb"[$!][A-Z]{2}[A-Z]{3},")
@@ -36,18 +38,21 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 
 
 class Suspicion:
-    """``look`` at all bytes; ``understood`` when some were a report."""
+    """Detection of a misconfiguration by received bytes.
+
+    Call ``look`` with all bytes, and ``understood`` when some of them were a report.
+    """
 
     def __init__(self) -> None:
         self.advice: str | None = None
         self._seen = b""
 
     def understood(self) -> None:
-        """Note a valid line: it is the right board."""
+        """Clear the advice, as a valid line shows that it is the right board."""
         self._seen, self.advice = b"", None
 
     def look(self, data: bytes) -> None:
-        """More bytes."""
+        """Examine more bytes; give advice when enough of them were not understood."""
         if not data:
             return
         self._seen = (self._seen + data)[-2 * LOOK_AT :]
@@ -56,7 +61,7 @@ class Suspicion:
 
 
 def own_gains(settings: LoisEcuSettings) -> str:
-    """The names of the gains that are the board's own, while they matter; empty if none are."""
+    """Return the names of gains that keep the board's values; empty if not in RPM mode."""
     if settings.drive_mode != "rpm":
         return ""
     return ", ".join(gain.name.lower() for gain in GAINS if gain not in settings.written)

@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How both wheels move, and what the board's counters make of it, as one Kalman filter.
+"""Kalman filter of how both wheels move, and of what the board's counters make of it.
 
-Of each wheel: its way, speed and acceleration, the ticks that should have counted, the speed that
-the firmware measured last, and a bias. Of the body: its place, and the changes of 0x20's heading
-and way. Errors of any of them are correlated with those of the place, so whatever the board tells
-corrects the place as far as it can.
+States of each wheel: its distance, speed and acceleration, the ticks that should have counted, the
+speed that the firmware measured last, and a bias. States of the body: its position, and the changes
+of 0x20's heading and distance. Errors of all of them are correlated with those of the position, so
+whatever the board reports corrects the position as far as it can.
 
-The wheels are the board's left and right; ways and speeds are those of nominal wheels. Knows the
-commanded course and the firmware's counters; no messages.
+The wheels are the board's left and right; distances and speeds are those of nominal wheels. Works
+on the commanded course and the firmware's counters, without messages.
 """
 
 import math
@@ -39,29 +39,32 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""What was not heard of for longer is not predicted any further."""
+"""Longest time in s that is predicted at once; earlier time is skipped."""
 ROLLED_OUT_S: Final = 0.15
-"""At the speed that it had, a wheel without power rolls on for about this time."""
+"""Time in s for which a wheel without power rolls on, at the speed that it had."""
 LATE_PART: Final = 0.6
-"""Of the controller's period: standard deviation of the time at which a command takes effect."""
+"""Standard deviation of the time at which a command takes effect, in controller periods."""
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""What the measured speed misses of a wheel that starts and stops."""
+"""Mean and standard deviation of the ticks that the measured speed misses when a wheel starts."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
-"""Fraction of an RPM that the firmware drops, on average."""
+"""Mean and standard deviation of the fraction of an RPM that the firmware drops."""
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
 
 
 class MotionFilter:
-    """``tick_m``, ``rpm_mps``: of a rim; ``turn_sign``: -1 if the board's left wheel is the right
-    one.
+    """Estimate of the wheels' motion and the body's pose.
 
-    signed: ticks count both ways, always. holds: a wheel that stands keeps its measured speed.
-    reverse_gain: speed over target, backwards. unsettled_s: a wheel that is halted soon after a
-    change of its set-point rolled at another speed than the model says, perhaps in the other
-    direction: its way is off by this time that change.
+    ``tick_m``, ``rpm_mps``: distance of a tick, and speed at one RPM, of a rim. ``turn_sign``: -1
+    if the board's left wheel is the robot's right one. ``signed``: ticks always count in both
+    directions. ``holds``: a wheel at rest keeps its measured speed. ``reverse_gain``: speed over
+    target, backwards.
+
+    ``unsettled_s``: a wheel that is halted soon after a change of its set-point rolled at another
+    speed than the model says, perhaps in the other direction. Its distance has an error of that
+    change times this time.
     """
 
     def __init__(self) -> None:
@@ -73,41 +76,41 @@ class MotionFilter:
         self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """The least difference of both measured speeds since this was last set."""
+        """Least difference of both measured speeds since this was last reset, in m/s."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 
     @property
     def yaw_rad(self) -> float:
-        """Of the body."""
+        """Yaw of the body, in rad."""
         mean = self.filter.mean
         return self.yaw0_rad + self.turn_sign * (mean[PER_WHEEL] - mean[WAY]) / self.track_m
 
     def speed_mps(self, wheel: int) -> float:
-        """Of a rim."""
+        """Return the speed of a wheel's rim, in m/s."""
         return self.filter.mean[PER_WHEEL * wheel + SPEED]
 
     def way_m(self, wheel: int) -> float:
-        """Rolled since the beginning."""
+        """Return the distance that a wheel has rolled since the beginning, in m."""
         return self.filter.mean[PER_WHEEL * wheel + WAY]
 
     def rounded_mps(self, wheel: int) -> float:
-        """What the firmware drops of a measured speed."""
+        """Return what the firmware drops of a measured speed, in m/s."""
         if self.wheels[wheel].course.kind == "rpm":
             return self.filter.mean[BIAS + wheel]
         return ROUNDED * self.rpm_mps
 
     def shown_mps(self, wheel: int) -> float:
-        """The speed that the firmware should have measured last, signed as it does."""
+        """Return the speed in m/s that the firmware should have measured last, with its sign."""
         held = self.filter.mean[PER_WHEEL * wheel + HELD] - self.rounded_mps(wheel)
         return self.wheels[wheel].course.measured_sign * max(held, 0.0)
 
     def pose_covariance(self) -> Covariance:
-        """Of x, y and yaw."""
+        """Return the covariance of x, y and yaw."""
         return pose_covariance(self.filter, self.turn_sign / self.track_m)
 
     def twist_variances(self) -> tuple[float, float]:
-        """Of the speed in (m/s)² and the turning in (rad/s)²."""
+        """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)²."""
         return twist_variances(self.filter, self.track_m)
 
     @property
@@ -119,7 +122,7 @@ class MotionFilter:
         )
 
     def advance(self, from_s: float, to_s: float) -> None:
-        """From then to then."""
+        """Predict the motion from ``from_s`` to ``to_s``."""
         at_s = max(from_s, to_s - LONGEST_STEP_S)
         while at_s < to_s:
             self._take_effect(at_s)
@@ -132,10 +135,11 @@ class MotionFilter:
             at_s = end_s
 
     def restart(self, then_s: float) -> None:
-        """The board restarted then, and the wheels have rolled out since.
+        """Go back to ``then_s``, when the board restarted, and let the wheels roll out since then.
 
-        What was believed of the time after is taken back, and no set-point is in force. Where ticks
-        count both ways they have begun at zero, and tell how far the wheels rolled out.
+        Estimates of the time after are discarded. Where ticks count in both directions, they have
+        started at zero and report how far the wheels rolled out. Elsewhere the set-points are
+        forgotten too.
         """
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
@@ -151,15 +155,17 @@ class MotionFilter:
                 self.filter.forget(wheel.base + state, 0.0, 0.0)
 
     def shift(self, index: int, way_m: float, stddev_m: float) -> None:
-        """Move this wheel by ``way_m`` further than estimated."""
+        """Move this wheel by ``way_m`` further than estimated, with this standard deviation."""
         terms = self._way_terms(index)
         for state, factor in terms:
             self.filter.mean[state] += factor * way_m
         self.filter.disturb(terms, stddev_m**2)
 
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
-        """The way of this wheel may be off by this, and all that follows from it; ``counted``: the
-        way before it stopped counting.
+        """Add an error of the distance of this wheel, and of all that follows from it.
+
+        ``stddev_m``: its standard deviation. ``counted``: it is of the distance before the wheel's
+        ticks stopped counting.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -168,7 +174,7 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """What depends on a way of this wheel that was not measured."""
+        """Return the terms that depend on a distance of this wheel that was not measured."""
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = [*self._way_terms(index), (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
@@ -177,7 +183,7 @@ class MotionFilter:
         return terms
 
     def _way_terms(self, index: int) -> Terms:
-        """What a way of this wheel changes."""
+        """Return the terms that a distance of this wheel changes."""
         base, yaw = PER_WHEEL * index, self.yaw_rad
         terms = [(base + WAY, 1.0), (X, math.cos(yaw) / 2), (Y, math.sin(yaw) / 2)]
         counts = self.wheels[index].counts(self.speed_mps(index), signed=self.signed)
@@ -210,7 +216,7 @@ class MotionFilter:
             self._begin_biases()
 
     def _begin_biases(self) -> None:
-        """Of a driven duty: relative; else what the firmware drops of a speed, in m/s."""
+        """Reset the biases: relative for a driven duty, else what the firmware drops, in m/s."""
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:
                 self.filter.forget(BIAS + index, 0.0, DUTY_STDDEV**2)
@@ -223,7 +229,7 @@ class MotionFilter:
         if wheel.course.kind == "duty" or not target:
             return target
         if target < 0 and self.filter.mean[wheel.base + SPEED]:
-            target *= self.reverse_gain  # its ticks lower the target; without ticks it stays
+            target *= self.reverse_gain  # ticks lower the target; without them it stays
         return target + math.copysign(ROUNDED * self.rpm_mps, target)
 
     # Time
@@ -250,10 +256,10 @@ class MotionFilter:
                 self.filter.forget(wheel.base + PUSH, 0.0, 0.0)
 
     def _measure_speeds(self, step: Step, before: tuple[float, float]) -> None:
-        """What the firmware holds as speeds, and what 0x20 integrates of them.
+        """Predict the speeds that the firmware keeps, and what 0x20 integrates of them.
 
-        It does so at each tick of either wheel, so a wheel that alone rolls is measured as it is;
-        one that stands beside it goes on with the speed that it had.
+        The firmware measures at each tick of either wheel. So a wheel that rolls alone is measured
+        as it is, while a wheel at rest beside a rolling one keeps the speed that it had.
         """
         dt, new = step.dt, step.new
         turn: Terms = [(TURN, 1.0)]

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Where the robot is, from what a LOIS ECU tells and what it was commanded.
+"""Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-Ticks are right to a tick, but the public firmware counts them only while a wheel is commanded
+Ticks are exact to one tick, but the public firmware counts them only while a wheel is commanded
 forward. Elsewhere the commands say how the wheels should move (``motion_filter``), and 0x20 how
-they did (``comparison``). Errors of the wheels' sizes and their slip, of which the board tells
-nothing, are kept apart. Time is an argument; all times are arrival times.
+they did (``comparison``). Errors of the wheels' sizes and their slip, which the board cannot
+report, are kept apart. Time is an argument; all times are arrival times in s.
 """
 
 import math
@@ -30,22 +30,24 @@ from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, U
 __all__ = ["FusedOdometry", "LoisOdometry", "LoisOdometrySettings", "Source"]
 
 FIRMWARE_GAIN: Final = 1.1
-"""Backwards, the firmware lowers its target with each tick, until the controller's next step."""
+"""Speed over target, backwards: the firmware lowers its target with each tick, until the
+controller's next step."""
 LONE_TICKS: Final = 2
-"""This many groups of ticks without odometry behind them show a board like the manual's."""
+"""Number of groups of ticks without odometry behind them that show a board like the manual's."""
 UNCOUNTED_M: Final = 0.06
-"""After this much motion, a wheel that did not count backwards cannot do so."""
+"""Backward motion in m without a negative count which shows that ticks do not count backwards."""
 LATE_S: Final = 0.012
-"""Standard deviation of an arrival, where nothing better is known."""
+"""Standard deviation of an arrival in s, where nothing better is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""The prediction of the pose ends after this silence: the board may be switched off."""
+"""Silence, in s and in periods of the ticks, after which the prediction of the pose ends: the board
+may be switched off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
 
 class LoisOdometry:
-    """``settings`` of the board; wheels are left, right."""
+    """Odometry of a robot with a LOIS ECU, by ``settings``; wheels are in the order left, right."""
 
     def __init__(
         self, settings: LoisEcuSettings, noise: LoisOdometrySettings | None = None
@@ -60,18 +62,18 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._may_roll_mps = [0.0, 0.0]
-        """The greatest speed that each wheel may have had since the board was last heard."""
+        """Greatest speed that each wheel may have had since the last report, in m/s."""
         self._heard_at_s = self._lost_s = -math.inf
         self._uncertainty = Uncertainty(OdometryNoise())
         self._source: Source = "standing"
         self.late_stddev_s = LATE_S
-        """Standard deviation of the stamps."""
+        """Standard deviation of the stamps, in s."""
         self.configure(settings)
         self.reset()
         self.connect()
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """From the next group on."""
+        """Use these settings from the next group on."""
         motion, yaw_rad = self._motion, self._motion.yaw_rad
         self._settings = settings
         period_s = settings.periods_ms.get(Stream.TICKS, 0) / 1e3
@@ -90,7 +92,7 @@ class LoisOdometry:
 
     @property
     def yaw_rad(self) -> float:
-        """Of the last estimate."""
+        """Yaw of the last estimate, in rad."""
         return self._pose.yaw_rad
 
     @property
@@ -114,7 +116,7 @@ class LoisOdometry:
         self._motion.history.forget()
 
     def connect(self) -> None:
-        """The line is new: counters may have begun anew, the pose goes on."""
+        """Begin a new connection: counters may have started anew, but the pose continues."""
         self._lost_s = max(self._heard_at_s, self._lost_s)
         self._ticks = None
         self._board.begin()
@@ -122,17 +124,17 @@ class LoisOdometry:
         self._heading_compared = False
 
     def restarted(self, now: float, age_s: float | None) -> None:
-        """The board started anew ``age_s`` ago, if that is known: it has no set-point since."""
+        """Note that the board restarted ``age_s`` ago (None: unknown), and lost its set-point."""
         self._motion.restart(self._heard_at_s if age_s is None else now - age_s)
         self.connect()
         self._lost_s = -math.inf
         self._ticks = Ticks(0, 0, 0)
         self._comparison.begin_counts()
 
-    # What goes out
+    # Outbound
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """A set-point went to the board."""
+        """Record that a set-point went to the board."""
         if isinstance(command, SetRpm):
             kind: CommandKind = "rpm"
             unit = self._settings.rim_mps_per_rpm
@@ -145,13 +147,16 @@ class LoisOdometry:
             self._may_roll_mps[index] = max(self._may_roll_mps[index], abs(speed_mps))
 
     def halted(self, now: float) -> None:
-        """The board has set both set-points to zero by itself: its button."""
+        """Note that the board set both set-points to zero by itself, because of its button."""
         self.wrote(SetRpm(0, 0), now)
 
-    # What comes in
+    # Inbound
 
     def heard_ticks(self, ticks: Ticks, now: float, late_s: float = 0.0) -> list[FusedOdometry]:
-        """0x12, ``late_s`` later than it usually comes."""
+        """Process ticks (0x12) that came ``late_s`` later than usual; return the new estimate.
+
+        The first ticks of a connection give an empty list.
+        """
         before, from_s = self._ticks, self._at_s
         if now > max(self._heard_at_s, self._lost_s) + self._unheard_s > -math.inf:
             self._after_silence(now)
@@ -167,7 +172,7 @@ class LoisOdometry:
             return []
         counts = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
         if max(map(abs, counts)) * self._settings.tick_m > FASTEST_MPS * (now - from_s + 1.0):
-            self._comparison.begin_counts()  # the counters began anew
+            self._comparison.begin_counts()  # the counters started anew
             return [self._estimate()]
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
@@ -177,7 +182,10 @@ class LoisOdometry:
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
-        """0x20, or what came behind 0x12. It corrects what is predicted and told next."""
+        """Process odometry (0x20, or what came behind 0x12).
+
+        It corrects the next predictions and the next estimate.
+        """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now
         if self._ticks is None:
@@ -199,14 +207,14 @@ class LoisOdometry:
         self._heading_compared = True
 
     def predict(self, now: float) -> FusedOdometry | None:
-        """Where it should be now; None before the first ticks on a connection."""
+        """Return the odometry predicted for ``now``; None before the first ticks of a line."""
         if self._ticks is None or self._at_s == -math.inf:
             return None
         self._advance(min(now, self._heard_at_s + self._unheard_s))
         return self._fused(predicted=True, stamp_s=max(now, self._at_s))
 
     def _keep(self, now: float) -> None:
-        """This was heard: what is predicted from now on may be taken back."""
+        """Store the state after a report, as later predictions may have to be undone."""
         self._heard_at_s, self._lost_s = now, -math.inf
         for index, wheel in enumerate(self._motion.wheels):
             speed_mps = abs(self._motion.speed_mps(index))
@@ -214,7 +222,7 @@ class LoisOdometry:
         self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
-        """What the wheels did in a long silence is not known; nor what 0x20 was compared with.
+        """Add the errors of a long silence, and forget what 0x20 was compared with.
 
         The stop may not have reached the board, so each wheel may have kept its speed.
         """
@@ -242,7 +250,7 @@ class LoisOdometry:
             wheel.course.step_s = FIRMWARE_STEP_S
 
     def _watch_motion(self, told: Told | None) -> None:
-        """Whether a wheel of a board that should count both ways rolls back without a tick."""
+        """Detect that ticks do not count backwards: a wheel rolls back, but no count falls."""
         if told is None or not self._motion.signed or self._seen_signed:
             return
         for index, wheel in enumerate(self._motion.wheels):
@@ -252,7 +260,7 @@ class LoisOdometry:
         if self._uncounted_m > UNCOUNTED_M:
             self._motion.signed, self._seen_unsigned = False, True
 
-    # What goes on
+    # Estimates
 
     @property
     def _blind(self) -> bool:
@@ -274,7 +282,7 @@ class LoisOdometry:
         fused = self._fused(predicted=False)
         self._uncertainty.move(self._pose.yaw_rad, self._tangent(fused.wheel_ways_m))
         self._sizes.move(*fused.wheel_ways_m, motion.turn_sign * motion.track_m)
-        # What a tick hides points elsewhere after a turn, and does not cancel with the next.
+        # The error within a tick has another direction after a turn: the next does not cancel it.
         turned = min(abs(fused.displacement.yaw_rad), 1.0)
         hidden = HIDDEN_PART * (self._settings.tick_m * turned) ** 2
         for state in (X, Y):

@@ -1,15 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings on their way to a board that acknowledges nothing and loses single lines.
+"""Writing of settings to a board that does not acknowledge, and loses single lines.
 
-Every line goes out ``ROUNDS`` times, the rounds apart by more than the board is deaf for. What can
-be confirmed is the period of the ticks, and that the board answers: each round asks for the date
-once, which is off after a boot. While either is missing the rounds go on. Writing a gain makes the
-firmware's controller begin anew, so settings wait while the robot drives.
+Every line is sent ``ROUNDS`` times, with longer pauses between the rounds than the board is deaf
+for. Two things can be confirmed: the period of the ticks, and that the board answers, because each
+round requests the date once, which is off after a boot. While either is missing, the rounds
+continue. Writing a gain resets the firmware's controller, so settings wait while the robot drives.
 
-A board whose terminal mode or checksum is set otherwise is silent, or seems to obey nothing. Then a
-line that puts it back goes out in both forms, and the left short correction after it, which any
-write of the terminal mode overwrites.
+A board with another terminal mode or checksum setting is silent, or seems to ignore everything.
+Then a line that restores the setting is sent both with and without a checksum, and after it the
+left short correction, which any write of the terminal mode overwrites.
 """
 
 import math
@@ -36,18 +36,19 @@ ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""After a group of ticks the next group is often on its way, and the board is deaf."""
+"""Times in s from a group of ticks to another round. Soon after a group the next one is often on
+its way, and the board is deaf."""
 CONFIRMED_WITHIN: Final = 0.35
-"""Part by which the ticks' period may differ from what was asked for."""
+"""Part by which the ticks' period may differ from the requested one."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
-"""The board boots for two seconds."""
+"""Time in s before a recovery; the board boots for two seconds."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
-"""What the public firmware begins with."""
+"""Value of the left short correction in the public firmware after a boot."""
 
 
 class SettingsWriter:
-    """``due`` what to write now. ``confirmed``: the board has answered, and shows our period."""
+    """Queue of settings; ``due`` returns what to write now."""
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self.settings = settings
@@ -58,16 +59,16 @@ class SettingsWriter:
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
         self.overwritten = False
-        """The terminal mode was written, and the left short correction with it."""
+        """Whether the terminal mode was written, which overwrites the left short correction."""
 
     @property
     def confirmed(self) -> bool:
-        """Whether the board has taken what could be confirmed."""
+        """Whether the board has answered, and its ticks come with our period."""
         return self._answered and self._in_period
 
     @property
     def done(self) -> bool:
-        """All that was to be written went out as often as it should."""
+        """Whether all that was to be written has been sent as often as it should."""
         return not self._queue and not self._rounds_left
 
     @property
@@ -77,13 +78,13 @@ class SettingsWriter:
 
     @property
     def wake_at(self) -> float:
-        """The time of the next ``due``; infinity while nothing is left."""
+        """Time of the next ``due``; infinity while nothing is left to send."""
         if self._queue:
             return self._queue[0][0]
         return self._round_at_s if self._rounds_left else math.inf
 
     def begin(self, now: float) -> None:
-        """All settings, from now on: a new line, a restart, or other settings."""
+        """Start to write all settings, after a new line, a restart or a change of settings."""
         self._queue.clear()
         self._arrivals.clear()
         self._rounds_left, self._round_at_s = ROUNDS, now
@@ -97,7 +98,7 @@ class SettingsWriter:
         self._queue = deque(sorted(self._queue, key=lambda entry: entry[0]))
 
     def ticks_came(self, now: float) -> None:
-        """A group of ticks: its period confirms ours."""
+        """Note a group of ticks; its period may confirm the requested one."""
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
         if len(self._arrivals) < 4:
@@ -110,11 +111,11 @@ class SettingsWriter:
             self._rounds_left, self._round_at_s = 1, now + away_s
 
     def date_came(self) -> None:
-        """The date, which was asked for."""
+        """Note that the date has come, which was requested."""
         self._answered |= self._rounds > 0
 
     def due(self, now: float, *, driving: bool) -> bytes:
-        """The lines to write now, possibly none."""
+        """Return the lines to write now, possibly none."""
         if driving and self._rounds >= ROUNDS:
             return b""
         if self._rounds_left and not self._queue and now >= self._round_at_s:
@@ -129,17 +130,19 @@ class SettingsWriter:
         return data
 
     def _turned(self, rounds: int) -> list[Command]:
-        """All of them, each round beginning elsewhere: a round may take as long as the board takes
-        from one group to the next, and then it would be deaf for the same line in each.
+        """Return all commands, in an order that begins at another one in each round.
+
+        A round may take as long as the board takes from one group to the next. With the same order
+        it would then be deaf for the same line in each round.
         """
         found = list(self.commands())
-        first = 0 if self.settings.with_sum else 2  # these two have their order
+        first = 0 if self.settings.with_sum else 2  # the first two must keep their order
         rest = found[first:]
         place = rounds * len(rest) // ROUNDS % len(rest)
         return [*found[:first], *rest[place:], *rest[:place]]
 
     def commands(self) -> Iterable[Command]:
-        """The commands in the order in which they are written."""
+        """Yield the commands in the order in which they are written."""
         settings = self.settings
         if not settings.with_sum:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
@@ -153,7 +156,7 @@ class SettingsWriter:
             yield WriteSetting(setting, number)
 
     def recovery(self) -> bytes:
-        """The commands for a board that is silent or does not obey, in any mode."""
+        """Return the lines for a board in any mode that is silent or does not obey."""
         self.overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
         back = SetTerminalMode(mode)

@@ -1,22 +1,22 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is said to make the robot move and stop, to a board that loses characters and whole lines.
+"""Lines that make the robot move and stop, for a board that loses characters and complete lines.
 
-The argument. A line is accepted if it is 14 characters from a ``:`` (12 without checksum) up to a
-line feed, and its checksum is right. The public firmware counts characters from the last ``:`` and
-begins anew after the fourteenth. So a line that lost characters is too short. For two lines to
-become one, fourteen characters in a row must be lost, the end of one and the beginning of the next
-among them (twelve without checksum). No loss of up to two characters makes another line. The board
-is deaf for 13 ms while it sends a group, and set-points are 18 ms apart at least, so one deaf time
-does not take the end of one and the beginning of the next.
+Damage. A line is accepted if it is 14 characters from a ``:`` (12 without checksum) up to a line
+feed, and its checksum is right. The public firmware counts characters from the last ``:`` and
+starts anew after the fourteenth. So a line that lost characters is too short. Two lines become one
+only if fourteen characters in a row are lost (twelve without checksum), among them the end of one
+and the beginning of the next. A loss of up to two characters never makes another line. The board is
+deaf for 13 ms while it sends a group, and set-points are at least 18 ms apart, so one deaf time
+does not take both the end of one and the beginning of the next.
 
-Which zero. By its firmware both take the power away with the controller's next step. Duty 0/0
-leaves the hidden RPM target, so ticks go on counting while a robot that drove forward rolls out:
-its standstill is proved. RPM 0/0 ends the counting, and forgets the measured speed. It must be said
-before the wheels are to turn again: a wheel that stands keeps its last speed in the controller's
-eyes, and a slower set-point in the same direction would never start it. So Stop is duty 0/0, the
-emergency stop is RPM 0/0 (under the latch both alternate), and the first set-points after a Stop
-are preceded by RPM 0/0.
+Choice of zero. In the firmware both zeros take the power away with the controller's next step. Duty
+0/0 leaves the hidden RPM target, so ticks continue to count while a robot that drove forward rolls
+out: its standstill can be proved. RPM 0/0 ends the counting, and clears the measured speed. It must
+be sent before the wheels turn again: for the controller, a wheel at rest keeps its last speed, and
+a slower set-point in the same direction would never start it. So Stop is duty 0/0, the emergency
+stop is RPM 0/0 (while it is latched both alternate), and RPM 0/0 precedes the first set-points
+after a Stop.
 """
 
 from typing import Final
@@ -32,14 +32,17 @@ from omnibot_driver.core.lois_ecu.messages import (
 STOP: Final = SetDuty(0, 0)
 EMERGENCY_STOP: Final = SetRpm(0, 0)
 MOST_RPM: Final = 50
-"""The firmware drives no faster."""
+"""Largest set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""The first set-points after a Stop that have RPM 0/0 before them: it may be lost."""
+"""Number of set-points after a Stop with RPM 0/0 before them; more than one, as it may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
-    """Rounded; both slowed alike where one is faster than ``most``, and whether that was so."""
+    """Return the rounded pair, and whether it was slowed down to ``most``.
+
+    If one value exceeds ``most``, both are scaled alike.
+    """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0
     left, right = (round(one * scale) for one in pair)
@@ -47,7 +50,7 @@ def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], 
 
 
 def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
-    """The set-points in written bytes, whole lines, in order."""
+    """Return the set-points in written bytes, which are complete lines, in order."""
     length = LENGTH if with_sum else LENGTH_WITHOUT_SUM
     found: list[SetRpm | SetDuty] = []
     for line in data.splitlines(keepends=True):
@@ -59,5 +62,5 @@ def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
 
 
 def lines(*commands: Command, with_sum: bool) -> bytes:
-    """The lines one after the other."""
+    """Return the lines of these commands, one after the other."""
     return b"".join(encode_command(command, with_sum=with_sum) for command in commands)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether a group of lines that is whole can be true: its ranges, and the way from the one before.
+"""Plausibility of a complete group of lines: its ranges, and its change since the one before.
 
 A group that is not reachable from the last one is kept aside. If the next one is reachable from it,
-the board has begun anew (a restart, a reset), and that next one is accepted. Knows values and
-arrival times, no lines.
+the board has started anew (a restart, a reset), and that next one is accepted. Works on values and
+arrival times.
 """
 
 import math
@@ -14,22 +14,23 @@ from typing import Final, Generic, Literal, TypeVar
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, GpsPosition, Ticks
 
 FASTEST_TICKS_PER_S: Final = 300.0
-"""Five turns of a wheel with 60 ticks: six times what the firmware commands."""
+"""Largest plausible rate of ticks: five turns a second of a wheel with 60 ticks, six times what the
+firmware commands."""
 TICKS_MARGIN: Final = 30
 FASTEST_MPS: Final = 5.0
 FASTEST_RADPS: Final = 20.0
 POSE_MARGIN_M: Final = 0.5
 POSE_MARGIN_RAD: Final = 1.0
 FARTHEST: Final = 1e5
-"""Neither m nor rad of a robot on one charge."""
+"""Largest plausible position in m, and yaw in rad, of a robot on one charge."""
 LATEST_S: Final = 0.3
-"""How much later than sent a group may arrive."""
+"""Longest time in s from the sending of a group to its arrival."""
 SLOWEST_CLOCK: Final = 0.5
-"""Part of the time that the board's clock counts at least; it stands still while it sends."""
+"""Lowest rate of the board's clock, as part of real time; it stands still while the board sends."""
 SURE_AFTER: Final = 2
-"""After this many further steps of a clock in one unit, it has that unit."""
+"""Number of further clock steps in one unit after which the clock has that unit."""
 LEARNT_FROM_S: Final = 0.15
-"""Arrival tells the length of shorter steps badly."""
+"""Shortest clock step in s to learn from; arrivals measure shorter ones badly."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -40,12 +41,15 @@ Group = TypeVar("Group")
 
 
 def wrapped(difference: int) -> int:
-    """The difference of two counters of 32 bits: -2³¹..2³¹-1."""
+    """Return the difference of two 32-bit counters, wrapped to -2³¹..2³¹-1."""
     return (difference + _HALF) % _WRAP - _HALF
 
 
 class Gate(Generic[Group]):
-    """``reachable(before, after, duration_s)`` says whether one can follow the other."""
+    """Check of each group against the last accepted one.
+
+    ``reachable(before, after, duration_s)`` returns whether one can follow the other.
+    """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:
         self._reachable = reachable
@@ -53,7 +57,7 @@ class Gate(Generic[Group]):
         self._aside: tuple[Group, float] | None = None
 
     def passes(self, group: Group, now: float) -> bool:
-        """Whether to believe it."""
+        """Return whether to accept this group, and remember it."""
         aside = self._aside
         if self._last is not None and not self.would_pass(group, now):
             if aside is None or not self._reachable(aside[0], group, now - aside[1]):
@@ -64,21 +68,21 @@ class Gate(Generic[Group]):
         return True
 
     def would_pass(self, group: Group, now: float) -> bool:
-        """Whether it goes on from the last one that was believed. Changes nothing."""
+        """Return whether the group can follow the last accepted one. Changes nothing."""
         last = self._last
         return last is not None and self._reachable(last[0], group, now - last[1])
 
     def forget(self) -> None:
-        """The next one is the first."""
+        """Treat the next group as the first."""
         self._last = self._aside = None
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what was learnt of the board's counters."""
+        """Forget what was learnt about the board's counters."""
 
 
 class TicksGate(Gate[Ticks]):
-    """Checks ticks. It also learns the unit of the board's clock, and then requires it."""
+    """Check of ticks, which also learns the unit of the board's clock and then requires it."""
 
     def __init__(self) -> None:
         super().__init__(_ticks_follow)
@@ -86,7 +90,7 @@ class TicksGate(Gate[Ticks]):
         self._steps = 0
 
     def passes(self, group: Ticks, now: float) -> bool:
-        """Whether to believe it."""
+        """Return whether to accept these ticks, and remember them."""
         last = self._last
         passed = super().passes(group, now)
         if passed and last is not None and now - last[1] > LEARNT_FROM_S:
@@ -96,7 +100,7 @@ class TicksGate(Gate[Ticks]):
         return passed
 
     def would_pass(self, group: Ticks, now: float) -> bool:
-        """Whether it goes on from the last one that was believed. Changes nothing."""
+        """Return whether these ticks can follow the last accepted ones. Changes nothing."""
         last, unit = self._last, self.unit
         return super().would_pass(group, now) and (
             last is None
@@ -107,7 +111,7 @@ class TicksGate(Gate[Ticks]):
 
     @property
     def unit(self) -> ClockUnit | None:
-        """None while unknown."""
+        """Unit of the board's clock; None while unknown."""
         return self._fits if self._steps >= SURE_AFTER else None
 
     def _begins_anew(self) -> None:
@@ -134,7 +138,7 @@ def _unit_of(before: Ticks, after: Ticks, duration_s: float) -> ClockUnit | None
 
 
 def odometry_gate() -> Gate[BoardOdometry]:
-    """A gate that checks the board's odometry by its pose; the velocities may be anything."""
+    """Return a gate that checks the pose of the board's odometry; velocities may be anything."""
     return Gate(_odometry_follows)
 
 
@@ -147,7 +151,7 @@ def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: f
 
 
 def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
-    """Whether it can be true by itself; NaN is in no range, but velocities may be anything."""
+    """Return whether a group is in range; NaN is not, but velocities may be anything."""
     match group:
         case GpsPosition(latitude, longitude):
             return abs(latitude) <= 90.0 and abs(longitude) <= 180.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a LOIS ECU measured besides motion, in SI units and REP-103's axes; values only.
+"""Readings of a LOIS ECU besides motion, in SI units and REP-103 axes: values only.
 
 EStopButton, Record and TerminalLine are passed on as they are.
 """
@@ -14,7 +14,7 @@ from omnibot_driver.core.readings import DisplacementReading
 
 @dataclass(frozen=True, slots=True)
 class FixReading:
-    """Degrees, north and east positive. ``valid``: it is not 0/0."""
+    """GPS position in degrees, north and east positive. ``valid``: it is not 0/0."""
 
     latitude_deg: float
     longitude_deg: float
@@ -30,14 +30,14 @@ class TimeReading:
 
 @dataclass(frozen=True, slots=True)
 class HeadingReading:
-    """Yaw in ENU: counter-clockwise from east, -pi..pi."""
+    """Yaw in ENU, in rad: counter-clockwise from east, -pi..pi."""
 
     yaw_rad: float
 
 
 @dataclass(frozen=True, slots=True)
 class RecordReading:
-    """A record that was asked for. ``count_s``: unit of an RPM record, None while it is unknown."""
+    """A requested record. ``count_s``: time unit of an RPM record in s, None while unknown."""
 
     record: Record
     count_s: float | None
@@ -46,24 +46,27 @@ class RecordReading:
 
 @dataclass(frozen=True, slots=True)
 class RecordComes:
-    """Lines of a record that was asked for came in; a whole one takes up to 1.3 s."""
+    """Notice that lines of a requested record arrive; a complete one takes up to 1.3 s."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordFailed:
-    """A record that was asked for is not going to come; ``reason``: why, and what to do."""
+    """Notice that a requested record will not come; ``reason``: why, and what to do."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class TerminalLeft:
-    """The board speaks for itself again; a press of its button meanwhile is unknown."""
+    """Notice that a terminal mode has ended; presses of the button meanwhile are unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class WheelReading:
-    """Rotation of both wheels since the last reading, in rad, by ticks where they count."""
+    """Rotation of both wheels since the last reading, in rad, by ticks where they count.
+
+    ``measured``: it is not taken from commands alone.
+    """
 
     left_rad: float
     right_rad: float

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From lines to a record that was asked for, up to its end; whole or not at all.
+"""Assembly of a requested record from its lines, up to its end: complete or not at all.
 
-Knows lines, no characters and no times.
+Works on lines, without characters and times.
 """
 
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 
 @dataclass(slots=True)
 class GroupStatistics:
-    """Counts since they were made.
+    """Counters of groups and records since their creation.
 
-    ``damaged_groups``: groups and records that were dropped, ``damaged_records`` of them records;
-    ``implausible``: groups that were
-    whole and cannot be true; ``unknown_lines``: right lines that say nothing.
+    ``damaged_groups``: discarded groups and records; ``damaged_records``: the records among them;
+    ``implausible``: groups that were complete and cannot be true; ``unknown_lines``: valid lines
+    that are not a report.
     """
 
     damaged_groups: int = 0
@@ -37,7 +37,11 @@ class GroupStatistics:
 
 
 class RecordAssembler:
-    """``add`` its lines; ``cut_off`` where another message comes, ``damage`` where no line does."""
+    """Assembler of the lines of a record.
+
+    Call ``add`` for its lines, ``cut_off`` when another message comes, and ``damage`` where
+    characters were not a line.
+    """
 
     def __init__(self, statistics: GroupStatistics) -> None:
         self._statistics = statistics
@@ -50,25 +54,25 @@ class RecordAssembler:
 
     @property
     def begun(self) -> bool:
-        """Whether lines of one have come."""
+        """Whether lines of a record have arrived."""
         return self._code is not None
 
     def expect(self, kind: RecordKind, left: int, right: int) -> None:
-        """A record of this many samples was requested; others are dropped."""
+        """Expect a record of this many samples; others are discarded."""
         self._expected = kind, left, right
         self._begin(None)
 
     def damage(self) -> None:
-        """A line of it may have been lost."""
+        """Note that a line of the record may have been lost."""
         self._damaged = self.begun
 
     def cut_off(self) -> None:
-        """Something else came before its end."""
+        """Discard an unfinished record, as another message came before its end."""
         if self.begun:
             self._drop()
 
     def add(self, code: int, payload: int) -> list[Record]:
-        """The record that this line completes, if it does."""
+        """Return the record that this line completes, or an empty list."""
         if not self.begun:
             self._begin(code)
         self._damaged |= code != self._code
@@ -87,7 +91,11 @@ class RecordAssembler:
         return [record]
 
     def _ends(self, code: int, payload: int) -> bool:
-        """The end of a torque record is what two motors without current read as well."""
+        """Return whether this line ends the record.
+
+        The end of a torque record looks like a reading of two motors without current, so it is
+        valid only after all samples.
+        """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END
         if payload != RECORD_END:

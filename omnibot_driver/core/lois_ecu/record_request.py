@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A record that is asked for: said more than once, as lines are lost, until it begins to come, and
-what becomes of it.
+"""Request of a record, which is repeated until the record begins to arrive, as lines are lost.
 
-Saying it again makes the board begin anew, so all is said within a short time.
+It also finds out whether the record arrives or fails. A repetition makes the board start the record
+anew, so all of them are sent within a short time.
 """
 
 import math
@@ -30,13 +30,15 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Apart by more than the board is deaf for, and by no multiple of its usual periods."""
+"""Times in s at which the request is sent: further apart than the board is deaf for, and not by a
+multiple of its usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
-"""Of an RPM record, by the unit of 0x12's time: the public firmware departs in both."""
+"""Time unit in s of an RPM record, by the unit of 0x12's time: the public firmware departs from the
+manual in both."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
-    """The command for a record. Raises RequestRefused if it could not complete."""
+    """Return the command for a record. Raises RequestRefused if it could not complete."""
     if not 0 < samples <= MOST_SAMPLES:
         raise RequestRefused(
             f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
@@ -51,7 +53,7 @@ def command_of(kind: RecordKind, samples: int) -> Command:
 
 
 class RecordRequest:
-    """``kind``: what is awaited; None while nothing is."""
+    """Request of one record; ``kind``: the kind that is awaited, or None."""
 
     def __init__(self) -> None:
         self.kind: RecordKind | None = None
@@ -60,7 +62,7 @@ class RecordRequest:
         self._said = self._damaged = 0
 
     def begin(self, kind: RecordKind, samples: int, decoder: LoisDecoder) -> None:
-        """Begin with the next ``due``; an earlier request is abandoned."""
+        """Request a record with the next ``due``; an earlier request is abandoned."""
         self._command, self.kind = command_of(kind, samples), kind
         self._begun_s, self._said = math.inf, 0
         decoder.expect_record(kind, samples, 0 if kind is RecordKind.HEADING else samples)
@@ -73,14 +75,14 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """These readings with the record that is awaited, or with why it is not going to come.
+        """Return the readings, with the awaited record or the reason why it will not come.
 
-        ``prevented``: why the board will not send it, in a sentence.
+        ``prevented``: why the board will not send it, as a sentence; empty if it may.
         """
         if self.kind is None:
             return found
         if decoder.in_record:
-            self._command = None  # it is not to begin anew
+            self._command = None  # a repetition would start it anew
         for place, reading in enumerate(found):
             if isinstance(reading, Record):
                 self._end()
@@ -100,7 +102,7 @@ class RecordRequest:
 
     @property
     def wake_at(self) -> float:
-        """The time of the next ``due``."""
+        """Time of the next ``due``; infinity while nothing is left to send."""
         if self._command is None or self._said == len(SAID_AFTER_S):
             return math.inf
         if self._begun_s == math.inf:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the board's tick counters show that it has obeyed a reset, and what they cannot show.
+"""Proof by the board's tick counters that it has obeyed a reset, and what they cannot prove.
 
-A count that is near zero proves nothing by itself: it may have been there before, or a wheel may
-have rolled back to it. Knows counts and times, no lines.
+A count near zero proves nothing by itself: it may have been there before, or a wheel may have
+rolled back to it. Works on counts and times.
 """
 
 import math
@@ -12,18 +12,20 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.messages import Ticks
 
 FEW_TICKS: Final = 20
-"""A wheel that was stopped rolls on for at most this many: 0.4 s at 50 RPM."""
+"""Most ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""More than any wheel rolls until a reset that arrived is shown."""
+"""More ticks than any wheel rolls before the counts show a reset that has arrived."""
 STEADY_TICKS: Final = 3
-"""For wheels at rest, this many cannot be backlash."""
+"""Lowest count that cannot be backlash, for wheels at rest."""
 UNPROVED_S: Final = 2.5
-"""How long to wait for a proof where none may come; meanwhile the reset is sent again."""
+"""Time in s to wait for a proof where none may come; meanwhile the reset is repeated."""
 
 
 class ResetProof:
-    """``before``: the counts when the reset was sent, None where they are unknown; ``steady``: they
-    did not change for some time. ``remark``: what was not shown, in a sentence.
+    """Search for a proof that the board has obeyed a reset.
+
+    ``before``: counts when the reset was sent, or None if unknown. ``steady``: they had not changed
+    for some time. ``remark``: what was not proved, as a sentence.
     """
 
     def __init__(self, before: Ticks | None, *, steady: bool) -> None:
@@ -32,16 +34,17 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """The reset is sent once more: wheels that stand by now show more than those that rolled.
+        """Note that the reset is repeated, and use the present counts if they prove more.
 
-        Counts of wheels that still roll are not better than those that were there at first.
+        Counts of wheels at rest prove more than those of wheels that rolled. Counts of wheels that
+        still roll are not better than the first ones.
         """
         if before is not None and steady and _largest(before) >= STEADY_TICKS:
             self._before, self._steady = before, steady
             self._waits_since_s, self._seen = math.inf, None
 
     def look(self, ticks: Ticks, now: float) -> bool:
-        """Whether all that can be shown is shown, by these counts."""
+        """Return whether the counts are near zero, with a proof or after the wait for one."""
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks
         if _largest(ticks) > FEW_TICKS:
@@ -59,7 +62,7 @@ class ResetProof:
 
     @property
     def remark(self) -> str:
-        """Empty where the counts prove the reset."""
+        """Sentence on what was not proved; empty where the counts prove the reset."""
         if self._proved:
             return ""
         if self._before is None:

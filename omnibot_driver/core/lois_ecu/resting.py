@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether a wheel stands when the board keeps reporting the same speed for it.
+"""Chance that a wheel is at rest while the board keeps reporting the same speed for it.
 
-The public firmware keeps the speed of the last tick of a wheel that stands. A wheel that comes to
-rest slows down before, and its last tick tells 5 to 17 RPM: then that number stays. A wheel that
-rolls on steadily repeats a number too, but not one that it has just fallen to. Knows speeds as
-the board reports them, one for each group, and how long ago; no filter.
+The public firmware keeps the speed of the last tick of a wheel at rest. A wheel that comes to rest
+slows down first, and its last tick gives 5 to 17 RPM: that number then stays. A wheel that rolls
+steadily repeats a number too, but not one that it has just fallen to. Works on the speeds that the
+board reports, one for each group, and on the time between them.
 """
 
 from collections import deque
@@ -14,28 +14,30 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 19.5
-"""A wheel that starts tells less; one that is faster ticks once more before it stands."""
+"""Range in RPM of the last speed of a wheel that came to rest: a wheel that starts shows less, and
+a faster one ticks once more before it is at rest."""
 STEEP_RPM: Final = 25.0
 FASTEST_STEEP_RPM: Final = 23.5
-"""A wheel that has fallen by this comes to rest within one tick from this speed."""
+"""Fall of speed in RPM after which a wheel comes to rest within one tick, and the greatest speed
+from which it does."""
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""The clock runs at this part of its speed while no speeds are reported."""
+"""Rate of the clock, as part of real time, while speeds are not reported."""
 STEEP: Final[tuple[float, ...]] = (0.0, 0.3, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Chance that it stands, by the number of repetitions: of a fast wheel after a steep fall, after a
-far fall, after a far fall from a speed that was reported once, and after a shorter fall. Counted on
-the public firmware with the gains that it boots with, and with better ones, with which no wheel
-falls like this."""
+"""Chances that the wheel is at rest, by the number of repetitions: of a fast wheel after a steep
+fall, after a far fall, after a far fall from a speed that was reported once, and after a shorter
+fall. Counted on the public firmware with the gains that it boots with, and with better ones, with
+which wheels never fall like this."""
 
 
 class RestingWheel:
-    """``chance`` that the wheel stands, 0..1."""
+    """Estimate of the ``chance`` (0..1) that a wheel is at rest."""
 
     def __init__(self) -> None:
         self.forget()
@@ -62,12 +64,12 @@ class RestingWheel:
         self._lately.append((self._clock_s, rpm))
 
     def tell(self, rpm: float, since_s: float) -> None:
-        """A speed without its sign, ``since_s`` after the one before."""
+        """Take a reported speed without its sign, ``since_s`` after the one before."""
         self._pass(since_s)
         if abs(rpm - self._told_rpm) < SAME_RPM:
             self._repeats += 1
         else:
-            # A lone fast tick is one that came late: the next one seems to be early.
+            # A lone fast speed comes from a late tick, after which the next one seems early.
             speeds = sorted({before for _, before in self._lately}, reverse=True)
             self._fell_rpm = speeds[1] - rpm if len(speeds) > 1 else 0.0
             self._lone = bool(speeds) and self._fell_rpm < FELL_FAR_RPM <= speeds[0] - rpm

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Set-points for a LOIS ECU: what a motion is in its words, and what was said last.
+"""Set-points for a LOIS ECU: the encoding of motions, and a memory of what was sent last.
 
-Why they look as they do is in ``outbound``. Knows commands and times, and bytes that were written.
+``outbound`` explains why set-points look as they do. Works on commands, times and written bytes.
 """
 
 import math
@@ -17,13 +17,16 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""After a Stop; then RPM 0/0 ends the counting."""
+"""Time in s from a Stop to RPM 0/0, which ends the counting of ticks."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
 class SetPoints:
-    """``saturated``: motions that were too fast; ``stopped_at_s``: since when nothing but zeros was
-    said, infinite while the robot is driven; ``stood``: it was seen to stand since then.
+    """Encoder of set-points, with a memory of those that were sent.
+
+    ``saturated``: number of motions that were too fast. ``stopped_at_s``: time since which only
+    zeros were sent, infinite while the robot is driven. ``stood``: the robot was seen at rest since
+    then.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -44,7 +47,7 @@ class SetPoints:
         return self._said is not None and _moves(self._said)
 
     def wrote(self, data: bytes, now: float) -> list[SetRpm | SetDuty]:
-        """These bytes went to the board; the set-points in them."""
+        """Record that these bytes went to the board; return the set-points in them."""
         said = outbound.set_points(data, with_sum=self.settings.with_sum)
         for command in said:
             if _moves(command):
@@ -61,7 +64,7 @@ class SetPoints:
             self._said = command
         return said
 
-    # RPM 0/0, which makes the firmware forget the speed of a wheel that stands
+    # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
         """Send the clearing command again before the next set-points."""
@@ -73,7 +76,7 @@ class SetPoints:
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Whether it is to be said now; it counts as said."""
+        """Return whether to send the clearing command now, and regard it as sent."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
@@ -82,7 +85,7 @@ class SetPoints:
     # Motions
 
     def wheels(self, rates_radps: Sequence[float]) -> list[SetRpm | SetDuty]:
-        """Left and right in rad/s; Stop when both round to nothing."""
+        """Encode the rates of the left and right wheel in rad/s; Stop if both round to zero."""
         settings = self.settings
         left, right = rates_radps
         if settings.drive_mode == "duty":
@@ -97,7 +100,7 @@ class SetPoints:
         return [outbound.EMERGENCY_STOP, command] if self._clears_left else [command]
 
     def duty(self, percents: Sequence[float]) -> SetDuty:
-        """Left and right in percent, open loop. Raises CommandRefused in RPM mode."""
+        """Encode left and right duty in percent, open loop. Raises CommandRefused in RPM mode."""
         if self.settings.drive_mode != "duty":
             raise CommandRefused(
                 "duty_cmd refused: drive_mode is rpm; set it to duty to drive without the"
@@ -110,7 +113,7 @@ class SetPoints:
         return SetDuty(*self._board_order(pair))
 
     def meaning(self, data: bytes) -> BodyTwist:
-        """The body velocity that the last set-point in these bytes commands."""
+        """Return the body velocity that the last set-point in these bytes commands."""
         settings = self.settings
         found = outbound.set_points(data, with_sum=settings.with_sum)
         if not found:
@@ -132,7 +135,7 @@ class SetPoints:
         )
 
     def _board_order(self, pair: tuple[int, int]) -> tuple[int, int]:
-        """The board's left and right, or back."""
+        """Swap left and right if the board's order is inverted; works in both directions."""
         return (pair[1], pair[0]) if self.settings.inverted else pair
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user has to say of a LOIS ECU and its robot, because its wire does not."""
+"""Settings of a LOIS ECU and its robot that a user must give, as the board does not report them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,20 +14,22 @@ DriveMode = Literal["rpm", "duty"]
 USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
     {Stream.TICKS: 200, Stream.ODOMETRY: 200}
 )
-"""What the odometry needs. Shorter ones make the board deaf for more of the time."""
+"""Periods in ms that the odometry needs. Shorter ones make the board deaf for more of the time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoisEcuSettings:
-    """``inverted``: the board's left wheel is the robot's right one, and the other way round.
+    """Settings of a LOIS ECU and its robot.
 
-    ``drive_mode``: whether ``cmd_vel`` is said as RPM or as duty; then ``duty_scale`` is percent
-    for each m/s of a rim, and no motor gets more than ``max_duty``. ``low_pass``: 0..1, what each
-    step of the speed controller takes over of a new set-point; a board that has none never turns
-    its wheels in RPM mode. ``written``: further settings that the user wants on the board.
-    ``periods_ms``: of what the board sends by itself; others stay as they are. ``with_sum``:
-    whether what is sent has a checksum. ``declination_rad``: of magnetic north, east positive.
-    ``odom_rate_hz``: how often the odometry is published, predicted from one group to the next.
+    ``inverted``: the board's left wheel is the robot's right one, and the other way round.
+    ``drive_mode``: whether ``cmd_vel`` is sent as RPM or as duty. ``duty_scale``: percent of duty
+    for each m/s of a rim; ``max_duty``: largest percentage for a motor. ``low_pass``: 0..1, the
+    part of a new set-point that each step of the speed controller takes over; a board without it
+    never turns its wheels in RPM mode. ``written``: further settings that the user wants on the
+    board. ``periods_ms``: periods of what the board sends by itself; others stay as they are.
+    ``with_sum``: lines to the board have a checksum. ``declination_rad``: of magnetic north, east
+    positive. ``odom_rate_hz``: how often the odometry is published, predicted from one group to the
+    next.
     """
 
     wheel_radius_m: float = 0.13
@@ -47,10 +49,10 @@ class LoisEcuSettings:
 
     @property
     def rim_mps_per_rpm(self) -> float:
-        """Speed of a rim at one revolution per minute."""
+        """Speed of a rim in m/s at one revolution per minute."""
         return 0.10471975511965977 * self.wheel_radius_m
 
     @property
     def tick_m(self) -> float:
-        """Distance that a wheel rolls in one tick."""
+        """Distance in m that a wheel rolls in one tick."""
         return 6.283185307179586 * self.wheel_radius_m / self.ticks_per_revolution

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How far a pose is off if the wheels are larger or smaller than believed, or slip alike.
+"""Covariance of a pose by errors of the wheels' sizes, and by a slip of both alike.
 
-Such an error is the same all along a drive, so it turns the robot further and further, and soon no
-longer acts in proportion. So the drive is followed with each error in either direction: the spread
-of where these robots end is the covariance. Knows ways of wheels; no board and no time.
+Such an error is the same all along a drive, so it turns the robot further and further, and soon its
+effect is not proportional to it. So the drive is repeated with each error in either direction: the
+spread of the resulting poses is the covariance. Works on distances of the wheels.
 """
 
 import math
@@ -15,13 +15,16 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
 
 KINDS: Final = 3
-"""Left wheel, right wheel, both alike."""
+"""Number of errors: left wheel, right wheel, both alike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoisOdometrySettings:
-    """Of the wheels on the ground: a random walk in m after 1 m, and standard deviations of a
-    wheel's relative size, and of the part that slip takes from both."""
+    """Errors of the wheels on the ground.
+
+    ``wheel_drift``: random walk in m after 1 m. ``wheel_scale``: standard deviation of a wheel's
+    relative size. ``wheel_slip``: standard deviation of the part that slip takes from both.
+    """
 
     wheel_drift: float = 0.0035
     wheel_scale: float = 0.01
@@ -29,8 +32,11 @@ class LoisOdometrySettings:
 
 
 class SizeErrors:
-    """``scale``, ``slip``: standard deviations of a wheel's relative size, and of what slip takes
-    from both."""
+    """Drives with errors of the wheels' sizes and slip.
+
+    ``scale``, ``slip``: standard deviations of a wheel's relative size, and of the part that slip
+    takes from both.
+    """
 
     def __init__(self, scale: float, slip: float) -> None:
         spread = math.sqrt(KINDS)
@@ -43,7 +49,7 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """By these ways; a ``track_m`` below zero turns the other way."""
+        """Continue all drives by these distances; a negative ``track_m`` turns the other way."""
         self._believed = _moved(self._believed, left_m, right_m, track_m)
         self._places = [
             _moved(place, left * left_m, right * right_m, track_m)
@@ -51,7 +57,10 @@ class SizeErrors:
         ]
 
     def covariance(self, yaw_rad: float) -> Covariance:
-        """For a pose of this heading. The frames of both poses may be turned to each other."""
+        """Return the covariance for a pose with this yaw.
+
+        The pose's frame may be rotated against that of the drives.
+        """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw
         cos, sin = math.cos(turn), math.sin(turn)

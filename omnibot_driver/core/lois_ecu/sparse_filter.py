@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A Kalman filter of a few states, in plain numbers. Knows no board, no wheels and no time.
+"""Kalman filter of a few states, in plain numbers, without a matrix library.
 
 Most of the transition is the identity, and a measurement is of one to three states. Both are given
-as their non-zero terms, so that a step costs little without a matrix library.
+as their non-zero terms, so that a step costs little.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,14 +16,14 @@ LEAST_VARIANCE: Final = 1e-12
 
 
 class SparseFilter:
-    """``mean`` and the symmetric ``covariance`` of all states; they begin at zero."""
+    """Kalman filter; ``mean`` and the symmetric ``covariance`` of all states begin at zero."""
 
     def __init__(self, states: int) -> None:
         self.mean = [0.0] * states
         self.covariance = [[0.0] * states for _ in range(states)]
 
     def propagate(self, rows: Mapping[int, Terms]) -> None:
-        """The covariance by a transition: ``rows`` are those that differ from the identity.
+        """Propagate the covariance by a transition; ``rows`` are those that differ from identity.
 
         The mean is not changed, as its transition need not be linear.
         """
@@ -32,7 +32,7 @@ class SparseFilter:
         self.covariance = whole
 
     def disturb(self, terms: Terms, variance: float) -> None:
-        """An error of this variance along ``terms``."""
+        """Add an error of this variance along ``terms``."""
         covariance = self.covariance
         for i, a in terms:
             row = covariance[i]
@@ -40,7 +40,7 @@ class SparseFilter:
                 row[j] += variance * a * b
 
     def forget(self, state: int, mean: float, variance: float) -> None:
-        """The state has this value, independent of all others."""
+        """Set a state to this value, independent of all others."""
         covariance = self.covariance
         for row in covariance:
             row[state] = 0.0
@@ -49,12 +49,15 @@ class SparseFilter:
         self.mean[state] = mean
 
     def variance_of(self, terms: Terms) -> float:
-        """Variance of this combination of states."""
+        """Return the variance of this combination of states."""
         covariance = self.covariance
         return max(sum(a * b * covariance[i][j] for i, a in terms for j, b in terms), 0.0)
 
     def measure(self, terms: Terms, residual: float, variance: float) -> None:
-        """``residual``: measured less expected, of this combination of states."""
+        """Correct all states by a measurement of this combination of states.
+
+        ``residual``: measured minus expected value. ``variance``: that of the measurement.
+        """
         covariance = self.covariance
         along = [sum(factor * row[state] for state, factor in terms) for row in covariance]
         total = sum(factor * along[state] for state, factor in terms) + variance

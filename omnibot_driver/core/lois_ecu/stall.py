@@ -1,13 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether a wheel stands that is commanded to turn: it may never start by itself.
+"""Detection of a wheel that is commanded to turn but stands still: it may never start by itself.
 
-In the eyes of the public firmware's controller a wheel that stands keeps its last speed. If that is
-more than a new, slower set-point, the motor gets no power. RPM 0/0 clears it. Of a wheel that is to
-turn backward 0x20 tells: its pose stands while nothing ticks, and while the other wheel ticks its
-velocity shows the same speed of this one again and again. A wheel that rolls steadily does that
-too, but not at a speed far above its set-point: there the controller gives it no power, so it would
-become slower. Knows set-points, reports and times.
+For the public firmware's controller, a wheel at rest keeps its last speed. If that is more than a
+new, slower set-point, the motor gets no power. RPM 0/0 clears it.
+
+Ticks show a wheel that turns forward; 0x20 shows one that should turn backward. If that wheel is at
+rest, the pose of 0x20 does not change while nothing ticks, and while the other wheel ticks its
+velocity repeats the same speed of this one. A wheel that rolls steadily repeats a speed too, but
+not far above its set-point: there the controller gives it no power, so it would become slower.
+Works on set-points, reports and times.
 """
 
 import math
@@ -17,18 +19,20 @@ from omnibot_driver.core.lois_ecu.board_odometry import rim_speeds
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Ticks
 
 STALLED_S: Final = 2.0
-"""Without a sign of motion. With the firmware's own gains a wheel takes half as long to start."""
+"""Time in s without a sign of motion; with the firmware's own gains a wheel starts in half of
+it."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""A wheel that rolls backward is up to 10 % and one RPM faster than its set-point."""
+"""Limits above a set-point, as a factor and in RPM, beyond which a repeated speed is a kept one: a
+wheel that rolls backward is up to 10 % and one RPM faster than its set-point."""
 AT_LEAST: Final = 4
-"""This many groups must agree: on a bad line few arrive."""
+"""Number of groups that must agree, because few arrive on a bad line."""
 
 
 class StallWatch:
-    """``looks_stalled`` once for each ``STALLED_S`` that a commanded wheel stands."""
+    """Watch of both wheels; ``looks_stalled`` once for each ``STALLED_S`` that one is at rest."""
 
     def __init__(self, track_m: float = 0.47, rim_mps_per_rpm: float = 0.0136) -> None:
         self._track_m, self._rpm_mps = track_m, rim_mps_per_rpm
@@ -41,7 +45,7 @@ class StallWatch:
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """A set-point went out. Under duty there is no controller that could hold a wheel."""
+        """Record a set-point. A duty bypasses the controller, so it cannot stall a wheel."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]
@@ -53,7 +57,7 @@ class StallWatch:
         self._targets = targets
 
     def heard(self, report: Ticks | BoardOdometry, now: float) -> None:
-        """A wheel that is to turn forward ticks; of one to turn backward the pose tells."""
+        """Process a report: ticks show a forward wheel's motion, and odometry a backward one's."""
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
             told = rim_speeds(report, self._track_m)
@@ -73,7 +77,7 @@ class StallWatch:
                     self._note(wheel, now, turns=ticked[wheel])
 
     def looks_stalled(self, now: float) -> bool:
-        """Whether one of them has not turned for too long."""
+        """Return whether a commanded wheel has not turned for ``STALLED_S``; restart the time."""
         stalled = any(
             now - seen_at >= STALLED_S and quiet >= AT_LEAST
             for seen_at, quiet in zip(self._seen_at, self._quiet, strict=True)
@@ -84,8 +88,10 @@ class StallWatch:
         return stalled
 
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
-        """Whether this wheel has the same speed as before, and the other one another, or this one
-        is far too fast."""
+        """Return whether this wheel's reported speed is one that the board keeps.
+
+        It is if it repeats, and the other wheel's speed has changed or this one is far too fast.
+        """
         if told is None or self._told is None:
             return False
         same = [abs(a - b) < SAME_MPS for a, b in zip(told, self._told, strict=True)]

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Into a terminal mode and out of it, and the standstill that any change of mode waits for.
+"""Changes into a terminal mode and out of it, and the standstill that any change of mode waits for.
 
-In a terminal mode the board passes a sensor's lines through and is silent itself. It still obeys
-set-points, but it shows no motion, and the public firmware reports no press of its button. So the
-robot is stopped first, and is not driven before the protocol is heard again. Whatever is written is
-sent again until its effect is seen. Knows modes and times, no lines.
+In a terminal mode the board passes a sensor's lines through and silences its protocol. It still
+obeys set-points, but it does not show motion, and the public firmware does not report presses of
+its button. So the robot is stopped first, and is not driven before the protocol is received again.
+Whatever is written is repeated until its effect is seen. Works on modes and times.
 """
 
 import math
@@ -15,56 +15,57 @@ from omnibot_driver.core.lois_ecu.messages import TerminalMode
 
 SENSORS: Final = (TerminalMode.GPS, TerminalMode.COMPASS)
 UNPROVED_S: Final = 2.0
-"""How long a robot is stopped that cannot be seen to stand."""
+"""Time in s for which a robot is stopped that cannot be seen at rest."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""What the board says of itself so soon after a change of the mode may have been on its way."""
+"""Time in s after a change of the mode in which a report may have been sent before it."""
 
 
 class ModeChange:
-    """``reason``: why the robot is not driven now, in a sentence; empty where it may be.
+    """Changes of the terminal mode.
 
-    ``wanted`` may be changed at any time, and ``stop_first`` be called.
+    ``reason``: why the robot may not be driven now, as a sentence; empty if it may. ``wanted``: the
+    requested mode. ``want`` and ``stop_first`` may be called at any time.
     """
 
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """The sensor whose lines the board was asked for, until its own are heard again."""
+        """Sensor's mode that was written to the board, until its protocol is received again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
         self._stopping_since_s: float | None = None
         self.left = False
-        """The protocol is heard again after a terminal mode; to be taken back by who reads it."""
+        """Whether the protocol is received again after a terminal mode; the reader clears it."""
 
     def connect(self) -> None:
-        """The line is new, and the board may be in any mode."""
+        """Begin a new connection: the board may be in any mode."""
         self._told = None
 
     def want(self, mode: TerminalMode) -> None:
-        """Another mode; a sensor's begins when the robot stands."""
+        """Request a mode; a sensor's mode begins when the robot is at rest."""
         if mode in SENSORS and mode is not self.wanted:
             self.stop_first(f"terminal_mode becomes {mode.name.lower()}")
         self.wanted = mode
         self._again_at_s = -math.inf
 
     def stop_first(self, why: str) -> None:
-        """The robot is stopped, and driven again when it stands."""
+        """Stop the robot, and refuse motion until it is at rest; ``why`` begins the reason."""
         self._stopping, self._stopping_since_s = why, None
 
     @property
     def terminal(self) -> bool:
-        """Whether lines of a sensor are to be expected."""
+        """Whether lines of a sensor are expected."""
         return self._told is not None
 
     @property
     def sensor_wanted(self) -> bool:
-        """Whether the board's own silence is wanted."""
+        """Whether a sensor's mode is wanted, in which the protocol is silent."""
         return self.wanted in SENSORS
 
     @property
     def reason(self) -> str:
-        """The reason why motion is refused."""
+        """Reason why motion is refused; empty if it is allowed."""
         if self.sensor_wanted:
             return (
                 f"terminal_mode is {self.wanted.name.lower()}, and the board reports no motion;"
@@ -83,7 +84,7 @@ class ModeChange:
         return self._again_at_s if waits else math.inf
 
     def stops(self, now: float, *, stands: bool) -> bool:
-        """Whether Stop is to be said now, as the robot has to stand first."""
+        """Return whether to send Stop now, because the robot must be at rest first."""
         if not self._stopping:
             return False
         if self._stopping_since_s is None:
@@ -96,7 +97,7 @@ class ModeChange:
         return True
 
     def due(self, now: float, *, settled: bool) -> TerminalMode | None:
-        """The mode to write now. ``settled``: no other settings are on their way."""
+        """Return the mode to write now, or None. ``settled``: other settings are not waiting."""
         if self._stopping or now < self._again_at_s:
             return None
         if self.sensor_wanted:
@@ -111,9 +112,9 @@ class ModeChange:
         return TerminalMode.HOST
 
     def protocol_heard(self, now: float) -> None:
-        """The board spoke for itself: it is in no terminal mode, or not yet."""
+        """Note a report of the protocol: the terminal mode has ended, or has not begun yet."""
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return
         if not self.sensor_wanted:
             self.left = True
-        self._told = None  # a sensor is asked for again
+        self._told = None  # a sensor's mode is requested again

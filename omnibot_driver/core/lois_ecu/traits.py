@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a LOIS ECU has and can do, and what to check when a robot with one does not obey."""
+"""Capabilities of a LOIS ECU, and what to check when a robot with one does not obey."""
 
 from typing import Final
 
@@ -10,19 +10,19 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
 STANDS_AFTER_S: Final = 0.6
-"""Without a tick. The slowest wheel that turns, at 2 RPM, ticks each half second."""
+"""Time in s without a tick that shows a wheel at rest; the slowest, at 2 RPM, ticks each 0.5 s."""
 TRAITS: Final = Traits(
     imu_period_s=None,
     authorities=frozenset({Authority.BASE, Authority.WHEELS}),
     requests=frozenset({Request.RESET}),
     wheels=("left", "right"),
-    unheard_s=1.0,  # groups come each 0.2 s, and may be lost
+    unheard_s=1.0,  # groups come every 0.2 s, and may be lost
     silence_s=1.5,
     own_odometry=True,
     stands_after_s=STANDS_AFTER_S,
     unproved_s=2.0,
     slack_mps=0.15,  # a tick in 0.2 s is 0.07 m/s
-    slack_radps=1.2,  # with its gains the wheels do not speed up alike
+    slack_radps=1.2,  # with the board's own gains the wheels do not speed up alike
     advice={
         Fault.WRONG_WAY: "check `inverted`, and the wiring of motors and encoders",
         Fault.WRONG_TURN: "check `inverted`, and the wiring of motors and encoders",

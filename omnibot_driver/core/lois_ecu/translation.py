@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From what a LOIS ECU reports to readings in SI units. Knows reports, not lines.
+"""Translation of a LOIS ECU's reports to readings in SI units.
 
-Also finds out that the board has restarted: its ticks are zero again, or its clock is behind.
+It also detects a restart of the board: its ticks are near zero again, or its clock is behind. Works
+on reports, without lines.
 """
 
 import math
@@ -38,11 +39,15 @@ DAY_S: Final = 86400
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""Counts that are nearer to zero by this much are a new beginning, not wheels that roll back."""
+"""Fall of the counts towards zero, in ticks and in ticks per s, beyond which the board has
+restarted: wheels do not roll back that fast."""
 
 
 class Translation:
-    """``settings`` may be replaced at any time. ``restarts``: of the board, as far as is known."""
+    """Translation of reports; ``settings`` may be replaced at any time.
+
+    ``restarts``: number of restarts of the board, as far as is known.
+    """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._settings = settings
@@ -51,12 +56,12 @@ class Translation:
         self.restarts = 0
         self.last_ticks_at_s = -math.inf
         self.ticked_at_s = -math.inf
-        """When ticks were last seen to change."""
+        """Time in s at which ticks were last seen to change."""
         self._connect()
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """What the wire does not tell."""
+        """Settings that cannot be read from the board."""
         return self._settings
 
     @settings.setter
@@ -85,7 +90,7 @@ class Translation:
         clock_unit: ClockUnit | None,
         now: float,
     ) -> list[LoisReading]:
-        """In the order of the line; ``times``: when each of them arrived."""
+        """Return the readings of the reports, in order; ``times``: when each report arrived."""
         found: list[LoisReading] = []
         for at, report in zip(times, reports, strict=True):
             found += self._readings(report, clock_unit, at)
@@ -115,7 +120,7 @@ class Translation:
                 self._time.sent(1)
                 clock = (report.hours, report.minutes, report.seconds)
                 if clock < self._clock:
-                    self._date = None  # past midnight it is another one
+                    self._date = None  # after midnight the date is another one
                 self._clock = clock
                 return [TimeReading(self._utc_s(report))]
             case Heading(heading_deg):
@@ -137,7 +142,7 @@ class Translation:
         ways = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
         if any(ways):
             self.ticked_at_s = now
-        self._unit = clock_unit or self._unit  # it is forgotten when the board begins anew
+        self._unit = clock_unit or self._unit  # the decoder forgets the unit at a restart
         late = self._unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
         rolled = RESTARTED_TICKS_PER_S * duration_s
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
@@ -145,7 +150,7 @@ class Translation:
         if late or fewer > RESTARTED_TICKS:
             self.restarts += 1
             age_s = ticks.time_counts * UNIT_S["ms"] if self._unit == "ms" else None
-            self.odometry.restarted(now, age_s)  # ns wrap each 4.3 s
+            self.odometry.restarted(now, age_s)  # a clock in ns wraps every 4.3 s
             self._time.begin()
             self.headings.forget()
             return [DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)]
@@ -153,7 +158,7 @@ class Translation:
 
     @property
     def ticks(self) -> Ticks | None:
-        """The last ones; None since the line is new, or a reset was said."""
+        """Last ticks; None since the line is new, or a reset was sent."""
         return self._ticks
 
     def _displaced(self, estimates: list[FusedOdometry]) -> list[LoisReading]:
@@ -197,8 +202,10 @@ class Translation:
 
 
 def _days_since_1970(year: int, month: int, day: int) -> int:
-    """In the Gregorian calendar; the year is taken to begin in March, so that it ends with the
-    leap day."""
+    """Return the days since 1970 in the Gregorian calendar.
+
+    The year is taken to begin in March, so that it ends with the leap day.
+    """
     year, month = (year, month - 3) if month > 2 else (year - 1, month + 9)
     leap_days = year // 4 - year // 100 + year // 400
     return 365 * year + leap_days + (153 * month + 2) // 5 + day - 1 - 719468

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is written to a LOIS ECU besides motions and requests, and when: its settings, its mode, a
-record, RPM 0/0 after a Stop, and what fetches it back where it is silent or obeys nothing.
+"""Everything that is written to a LOIS ECU besides motions and requests, and when.
 
-Composes the parts that know each of these; must not know what is read.
+That is its settings, its mode, a record, RPM 0/0 after a Stop, and the recovery of a board that is
+silent or ignores commands. Composes the parts that know each of these; must not know what is read.
 """
 
 import math
@@ -18,7 +18,10 @@ from omnibot_driver.core.lois_ecu.terminal import ModeChange
 
 
 class Upkeep:
-    """``due`` what to write now. ``heard_at_s``: when the board was understood last."""
+    """Scheduler of these writes; ``due`` returns what to write now.
+
+    ``heard_at_s``: when valid lines of the board last arrived.
+    """
 
     def __init__(self, settings: LoisEcuSettings, points: SetPoints) -> None:
         self._points = points
@@ -28,14 +31,14 @@ class Upkeep:
         self.connect()
 
     def connect(self) -> None:
-        """The line is new; the settings are written again."""
+        """Begin a new connection; the settings are written again."""
         self.opened = False
         self.change.connect()
         self.request = RecordRequest()
         self.heard_at_s = self._recovered_at_s = -math.inf
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """Other settings: what is new of them is written; another mode stops the robot first."""
+        """Use other settings: changed ones are written; another mode stops the robot first."""
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
             self.change.stop_first(f"drive_mode becomes {settings.drive_mode}")
@@ -45,7 +48,10 @@ class Upkeep:
             self.opened = False
 
     def due(self, now: float, *, stands: bool) -> bytes:
-        """Call it at ``wake_at``. ``stands``: the robot is seen to stand."""
+        """Return the bytes to write now; call it at ``wake_at``.
+
+        ``stands``: the robot is seen at rest.
+        """
         if not self.opened:
             self.opened = True
             self.writer.begin(now)
@@ -65,7 +71,7 @@ class Upkeep:
 
     @property
     def wake_at(self) -> float:
-        """The time at which ``due`` must be called again."""
+        """Time at which ``due`` must be called again."""
         if not self.opened:
             return -math.inf
         return min(
@@ -77,7 +83,7 @@ class Upkeep:
         )
 
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
-        """Stop, or the terminal mode, while either of them is to be said."""
+        """Return Stop or the terminal mode, while one of them has to be sent."""
         change, with_sum = self.change, self.writer.settings.with_sum
         if change.stops(now, stands=stands):
             return outbound.lines(outbound.STOP, with_sum=with_sum)

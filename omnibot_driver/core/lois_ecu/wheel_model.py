@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What one wheel is commanded, when that takes effect, and what the firmware then counts.
+"""Model of one wheel's commands: when they take effect, and what the firmware then counts.
 
 The public firmware keeps an RPM target for each wheel. Its sign decides whether ticks count, and
-which sign the measured speed gets. Knows set-points and times; no measurement and no pose.
+which sign the measured speed gets. Works on set-points and times.
 """
 
 import math
@@ -12,17 +12,20 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 HEARD_S: Final = 0.008
-"""From our writing until the board has read the line."""
+"""Time in s from our writing until the board has read the line."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""Of the speed controller, by the manual and of the public firmware."""
+"""Periods of the speed controller in s, by the manual and of the public firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 
 
 @dataclass(frozen=True, slots=True)
 class _Effect:
-    """``halts``: the target is zero until the next step; else this is carried out."""
+    """What happens to a wheel's command at ``at_s``.
+
+    ``halts``: the target is zero until the next step; otherwise this command is carried out.
+    """
 
     at_s: float
     halts: bool
@@ -31,10 +34,10 @@ class _Effect:
 
 
 class WheelModel:
-    """Advanced by ``carry_out``. Speeds are of the rim, as commanded.
+    """The command of one wheel, advanced by ``carry_out``. Speeds are of the rim, as commanded.
 
-    kind, target_mps: the motor's command. hidden_mps: the firmware's RPM target; in duty mode it
-    stays as it was, but ticks under negative duty lower it.
+    ``kind``, ``target_mps``: the motor's command. ``hidden_mps``: the firmware's RPM target; in
+    duty mode it stays as it was, but ticks under negative duty lower it.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -42,7 +45,8 @@ class WheelModel:
         self.target_mps = 0.0
         self.hidden_mps = 0.0
         self.step_s = step_s
-        """What was heard takes effect with the controller's next step, half of this on average."""
+        """Period of the controller in s. A command takes effect with its next step, after half a
+        period on average."""
         self._effects: deque[_Effect] = deque(maxlen=128)
         self._heard: tuple[CommandKind, float] = ("rpm", 0.0)
         self._rpm_mps = 0.0
@@ -54,16 +58,16 @@ class WheelModel:
 
     @property
     def measured_sign(self) -> int:
-        """The sign that the public firmware gives this wheel's speed; 0: it measures none."""
+        """Sign that the public firmware gives this wheel's speed; 0 if it does not measure one."""
         return (self.hidden_mps > 0.0) - (self.hidden_mps < 0.0)
 
     @property
     def waiting(self) -> bool:
-        """Whether something else was commanded that did not take effect yet."""
+        """Whether a command has not taken effect yet."""
         return bool(self._effects)
 
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
-        """This was written then."""
+        """Record that this command was written at ``at_s``."""
         if (kind, speed_mps) == self._heard and not (kind == "rpm" and not speed_mps):
             return
         halts = kind == "rpm" and (not speed_mps or speed_mps * self._rpm_mps < 0)
@@ -77,11 +81,14 @@ class WheelModel:
             self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
     def next_change_s(self) -> float:
-        """When the next effect is due; infinity without any."""
+        """Return when the next effect is due; infinity without any."""
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:
-        """All effects until now. Whether the measured speed was cleared, and the target changed."""
+        """Carry out all effects until ``now``.
+
+        Return whether the measured speed was cleared, and whether the motor's command changed.
+        """
         cleared = False
         before = self.kind, self.target_mps
         while self._effects and self._effects[0].at_s <= now:

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a wheel moves by what it is commanded, as a step of the motion filter.
+"""Motion of a wheel under its commands, as a step of the motion filter.
 
-Three ways: it coasts without power, it follows a duty, or the board's speed controller drives it.
-The controller sees the speed that was measured last. With the public firmware a wheel that stands
-keeps that speed: it may get little power, or none. Gains and motors are the user's, so much of
-this is noise. Knows commands and the states of one wheel; no measurement and no pose.
+A wheel coasts without power, follows a duty, or is driven by the board's speed controller. The
+controller sees the speed that was measured last. With the public firmware a wheel at rest keeps
+that speed, so it may get little power, or none. The user's gains and motors are unknown, therefore
+the noise is large. Works on commands and the states of one wheel.
 """
 
 import math
@@ -16,31 +16,34 @@ from omnibot_driver.core.lois_ecu.wheel_model import WheelModel
 
 WAY, SPEED, PUSH, COUNT, HELD = range(5)
 PER_WHEEL: Final = 5
-"""States of a wheel: m rolled, m/s, m/s², m of ticks, m/s that were measured last."""
+"""Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², counted ticks in
+m, and the speed in m/s that was measured last."""
 X, Y, TURN, ALONG, BIAS = 10, 11, 12, 13, 14
-"""Of the body: place, what 0x20 should show as turned and as rolled; then a bias of each wheel."""
+"""States of the body: position, and the turn and distance that 0x20 should show; then a bias of
+each wheel."""
 STATES: Final = 16
 
 CONTROL_RATE: Final = 2.0
-"""Per second: how fast the controller reaches its target, as a critically damped system."""
+"""Rate in 1/s at which the controller reaches its target, as a critically damped system."""
 PUSH_PER_SPEED: Final = 2.2
-"""Per second: standard deviation of the acceleration after a change of speed."""
+"""Standard deviation of the acceleration after a change of speed, per m/s of it, in 1/s."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
-"""In (m/s)² per second: what the ground does to a speed."""
+"""Variance that the ground adds to a speed, in (m/s)² per s."""
 WINDUP_M: Final = 0.08
-"""A wheel that stands starts when it lacks about this way: the controller winds up by it."""
+"""Distance in m that a wheel at rest lacks when it starts: the controller winds up by it."""
 DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
 DRY_MPS2: Final = 0.7
-"""Without power: time constant and dry friction."""
+"""Time constant in s, and dry friction in m/s², of a wheel without power."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
-"""After a change of sign no wheel goes on for longer in the old direction."""
+"""Longest time in s for which a wheel rolls on in the old direction after a change of sign."""
 UNSETTLED_S: Final = (0.06, 0.27)
-"""With gains that are set, and with the board's own: with the public firmware's a wheel swings."""
+"""``MotionFilter.unsettled_s`` with gains that are set, and with the board's own: with those of the
+public firmware a wheel swings."""
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
 
@@ -49,7 +52,7 @@ Terms = list[tuple[int, float]]
 
 @dataclass(slots=True)
 class Step:
-    """One step of the filter: ``new`` means, rows of the transition, and noises.
+    """One step of the filter by ``dt`` s: ``new`` means, rows of the transition, and noises.
 
     ``unsure_mps``: standard deviation of the speed that each wheel's controller sees.
     """
@@ -64,7 +67,7 @@ class Step:
 class Wheel:
     """What is known of one wheel besides the filter's states, which begin at ``base``.
 
-    blind: it moved, or should have, while no ticks counted, since this was last cleared.
+    ``blind``: it moved, or should have, while its ticks did not count, since this was last cleared.
     """
 
     def __init__(self, base: int) -> None:
@@ -73,30 +76,30 @@ class Wheel:
         self.begin_again()
 
     def begin_again(self) -> None:
-        """The board has just started."""
+        """Forget all commands and history, as the board has just started."""
         self.course = WheelModel(self.course.step_s)
         self.restless_mps = 0.0
-        """Size of the last changes of speed, fading."""
+        """Size of the last changes of speed in m/s, fading."""
         self.unsettled_mps = 0.0
-        """The same of the last set-point alone, until the wheel is halted."""
+        """Size of the last set-point's change alone in m/s, fading, until the wheel is halted."""
         self.wound_m = 0.0
-        """What it lacked of its way since its controller began anew."""
+        """Distance in m that the wheel has lacked since its controller was reset."""
         self.cut = False
-        """Without power until the controller has wound up."""
+        """Whether the wheel is without power until the controller has wound up."""
         self.rolls_on = False
-        """The reported speed may be that from before the target changed its sign."""
+        """Whether the reported speed may be that from before the target changed its sign."""
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """The speed when the controller began anew, and how long ago that was."""
+        """Speed in m/s when the controller was reset, and the time in s since then."""
         self.locked = False
-        """It stands, and the speed that it keeps is more than its target: it gets no power."""
+        """Whether it is at rest without power, as the speed that it keeps exceeds its target."""
         self.rests = False
-        """It stands, as the speed that it keeps shows."""
+        """Whether it is at rest, as the speed that it keeps shows."""
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:
-        """The controller was set back while the wheel had this speed."""
+        """Note that the controller was reset while the wheel had this speed."""
         self.cut, self.wound_m = True, 0.0
         self.rests = False
         self.rolled_mps, self.rolled_s = speed_mps, 0.0
@@ -104,7 +107,7 @@ class Wheel:
             self.rolls_on, self.rolls_on_s = True, ROLLS_ON_S
 
     def counts(self, speed_mps: float, *, signed: bool) -> float:
-        """Change of the count, in m, for each m rolled forward."""
+        """Return the change of the count, in m, for each m rolled forward."""
         if signed:
             return 1.0
         if not self.course.counting:
@@ -113,7 +116,10 @@ class Wheel:
         return -1.0 if rolls_back else 1.0
 
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
-        """One step. ``holds``: the measured speed is kept; ``signed``: ticks count both ways."""
+        """Add one step of this wheel to ``step``.
+
+        ``holds``: the measured speed is kept at rest. ``signed``: ticks count in both directions.
+        """
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]
         self.rolled_s += dt

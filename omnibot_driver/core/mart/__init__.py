@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART motion controller: datagrams, one request at a time. Bytes and times, nothing else."""
+"""The MART motion controller: one request at a time, in UDP datagrams.
+
+The package knows bytes and times only; sockets and ROS are elsewhere.
+"""
 
 from omnibot_driver.core.mart.replies import Fail, MartDecoder, Ok, Other, parse
 from omnibot_driver.core.mart.settings import MartSettings

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""After the stop port was used for a motion that is not known: what may be said then.
+"""What to ask the server after the stop port was used for an unknown motion.
 
-SL ends RM and B in a way that SM and SRM hang the server for good. So neither is said before the
-server has shown that no motion is in progress, or that the robot moves: it tells its name, and
-refuses RST IMU while a motion is in progress. Knows words and replies. Time is an argument.
+SL ends RM and B in such a way that a later SM or SRM hangs the server for good. So neither is sent
+before the server has shown that no motion is in progress, or that the robot moves: the server gives
+its name, and refuses RST IMU while a motion is in progress. This module knows commands and replies.
+Time is an argument.
 """
 
 import math
@@ -21,16 +22,19 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packets
 
 STOP_AGAIN_S: Final = 3.0
-"""A controlled move keeps the server silent; SL or SS ends it once it arrives."""
+"""Time in s after which SL and SS are sent again.
+
+A controlled move keeps the server silent until one of them arrives and ends it.
+"""
 APART_S: Final = 0.4
-"""Two counts so far apart tell whether the robot moves."""
+"""Time in s between two counts that show whether the robot moves."""
 
 
 class Asking(Stops):
-    """The part of the pilot that asks what is in progress."""
+    """The part of the pilot that finds out which motion is in progress."""
 
     def _ask_what_moves(self, now: float) -> None:
-        """From now on."""
+        """Begin to ask the server what is in progress."""
         self._stopping = None
         self.conversation.give_up(now)
         self.state, self.motion = State.ASKING, Motion.UNKNOWN
@@ -51,11 +55,11 @@ class Asking(Stops):
         if now < self._stop_again_s:
             return self._greet(now)
         self._stop_again_s, self._name_from_s = now + STOP_AGAIN_S, now + 2 * self._delay_s
-        self._conflict, self._asked_count = False, None  # it may have ended what moved before
+        self._conflict, self._asked_count = False, None  # SL, SS may have ended a motion
         return self._send(LAST_HALTS[Motion.UNKNOWN], now) + self._greet(now)
 
     def _asked(self, answer: Answer, now: float) -> None:
-        """One of the two was answered."""
+        """Evaluate the answer to RST IMU or ENC."""
         reply = answer.reply
         if answer.word is words.RESET:
             self._conflict = isinstance(reply, Fail) and reply.reason == words.CONFLICT
@@ -74,7 +78,7 @@ class Asking(Stops):
             self._lose(now, "the stop port has ended a motion that the server still believes in")
 
     def _sweep(self, now: float) -> None:
-        """SRM and SM do no harm now."""
+        """Stop with SRM and SM, which cannot hang the server in this situation."""
         if self._lost_told:
             self._lost_told = False
             self._notice("the server answers again; it is stopped first", halt=True)
@@ -82,5 +86,5 @@ class Asking(Stops):
         self._halt(now)
 
     def _unanswered(self, word: Word) -> None:
-        """The server may have gone again."""
+        """Note a missing reply: ask for the server's name again, as it may be gone."""
         self._named_s = -math.inf

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller as a board of the driver: its pilot, in the words of the seam.
+"""The MART controller as a ``Board`` of the driver, backed by its pilot.
 
-Nothing streams. Whatever is known was asked for, so the pilot's polls are the board's voice, and a
-controlled move is a silence that is expected.
+The controller sends nothing by itself: each measurement is the reply to a query of the pilot.
+During a controlled move it answers nothing, so that silence is expected.
 """
 
 import math
@@ -41,12 +41,15 @@ TRAITS: Final = Traits(
     slack_radps=0.6,
 )
 UNREAD_S: Final = 0.5
-"""A robot that drives is measured more often."""
+"""Time in s without a reading after which any other reply is reported as NOTHING_MEASURED.
+
+A robot that drives is measured more often than this.
+"""
 EXPECTED_EVERY_S: Final = 0.2
 
 
 class MartBoard(Board):
-    """One controller. ``settings`` may be replaced at any time."""
+    """One MART controller. ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -57,7 +60,7 @@ class MartBoard(Board):
 
     @property
     def settings(self) -> MartSettings:
-        """What the wire does not tell."""
+        """The sizes and scales that the controller does not report."""
         return self._pilot.settings
 
     @settings.setter
@@ -67,12 +70,12 @@ class MartBoard(Board):
 
     @property
     def mode(self) -> Mode:
-        """Nominal once the server has answered to its name and to the first stop."""
+        """The mode: nominal once the server has given its name and answered the first stop."""
         return self._mode
 
     @property
     def figures(self) -> BoardFigures:
-        """With the motor board's state by name."""
+        """The counters and states for diagnostics, with the motor board's state by name."""
         pilot = self._pilot
         return BoardFigures(
             rates_hz={},
@@ -92,7 +95,7 @@ class MartBoard(Board):
 
     @property
     def refusal(self) -> str:
-        """Why the robot is not to be driven."""
+        """The reason why the robot must not be driven, with a remedy; empty if it may be."""
         return self._pilot.refusal
 
     # Inbound
@@ -103,7 +106,7 @@ class MartBoard(Board):
         self._mode = Mode.UNKNOWN
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """What a datagram tells."""
+        """Return the readings that follow from a datagram of this channel."""
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
         readings = self._pilot.take()
@@ -117,12 +120,12 @@ class MartBoard(Board):
         return readings
 
     def silence(self) -> None:
-        """The server has not answered for long: it may have been started again."""
+        """Forget the mode: the server has been silent for too long and may have been restarted."""
         self._mode = Mode.UNKNOWN
         self._pilot.fell_silent()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Odometry, and that a silence is expected."""
+        """Return the odometry that is due, and NOTHING_MEASURED while a silence is expected."""
         readings = self._pilot.take()
         pilot = self._pilot
         if self._mode is not Mode.NOMINAL:
@@ -137,14 +140,14 @@ class MartBoard(Board):
         return readings
 
     def reset_odometry(self) -> None:
-        """The frame begins where the robot stands."""
+        """Begin the odometry frame at the robot's present pose."""
         self._pilot.odometry.reset()
 
     # Outbound
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` or ``elapse`` have something."""
+        """The time at which ``due`` or ``elapse`` must be called again."""
         if self._pilot.readings or self._pilot.jobs.done:
             return -math.inf
         times = [self._pilot.wake_at]
@@ -155,37 +158,40 @@ class MartBoard(Board):
         return min(times)
 
     def actuator(self, proof: StopProof) -> "Conductor":
-        """What is wanted, as what the pilot says."""
+        """Return the actuator, which passes orders to the pilot and reports to ``proof``."""
         self._pilot.proof = proof
         return Conductor(self._pilot)
 
     def wake(self) -> Packets:
-        """Stop; the pilot says it again, and awaits the reply before anything else."""
+        """Return the stop commands.
+
+        The pilot repeats them, and awaits the reply before anything else.
+        """
         return self.stop()
 
     def stop(self) -> Packets:
-        """What stops the present state of motion."""
+        """Return the commands that stop the present state of motion."""
         said = self._pilot.stop_words
         return tuple((word.channel, word.request().data) for word in said)
 
     def emergency_stop(self) -> Packets:
-        """The same: the controller has no emergency stop."""
+        """Return the same as ``stop``: the controller does not have an emergency stop."""
         return self.stop()
 
     # What only this board has
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin a job; a JobDone answers. Raises RequestRefused."""
+        """Begin a job; a JobDone reports its result. Raises RequestRefused."""
         self._pilot.jobs.ask(job, token, now, *arguments)
 
     @property
     def resting(self) -> bool:
-        """Whether the robot is proved to stand, and the server is free."""
+        """Whether the robot is proved to be at rest and the server is free."""
         return self._pilot.state is State.STILL and self._pilot.proof.proved
 
 
 class Conductor:
-    """The actuator: the policy's wish for the pilot, which says one thing at a time."""
+    """The actuator: passes what is wanted to the pilot, which sends one request at a time."""
 
     rate_hz = 20.0
 
@@ -194,16 +200,16 @@ class Conductor:
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """By the motors' last command; None in a controlled move."""
+        """The body velocity of the last motor command, or None in a controlled move."""
         return self._pilot.commanded
 
     @property
     def wake_at(self) -> float:
-        """When the pilot has something to say."""
+        """The time at which ``due`` must be called again."""
         return self._pilot.wake_at
 
     def is_zero(self, order: Order) -> bool:
-        """What is slower than the controller can drive stands still."""
+        """Return whether the order is slower than the controller can drive; a GoTo never is."""
         if isinstance(order, GoTo):
             return False
         return not isinstance(order, Drive) or not (
@@ -212,15 +218,15 @@ class Conductor:
         )
 
     def connect(self) -> None:
-        """``MartBoard.connect`` has done it."""
+        """Do nothing: ``MartBoard.connect`` has reset the pilot."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """This is wanted from now on."""
+        """Carry out ``wanted`` from now on."""
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """No other client writes."""
+        """Do nothing: no other part of the driver sends requests to this board."""
 
     def due(self, now: float) -> Packets:
-        """What to write now."""
+        """Return the packets to write now."""
         return self._pilot.due(now)

@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One request at a time, and which reply belongs to it.
+"""One request at a time, and the decision which reply belongs to it.
 
-Replies carry no number, and datagrams are lost, doubled and late. So a reply is matched by its
-form, its reason and the least time its command takes; what matches nothing is late, and discarded.
-After a query that was not answered, none with the same form of reply is asked until its reply can
-no longer come. Those that the robot is driven by cannot wait: their answers are marked as doubtful,
-and their reader compares them with what is expected. Time is an argument.
+Replies carry no number, and datagrams are lost, duplicated and late. So a reply is matched by its
+form, its failure text and the least time that its command takes. A reply that does not match is
+regarded as late and discarded. After an unanswered query, no query with the same form of reply is
+sent until the missing reply can no longer come. The queries that are needed for driving cannot
+wait: their answers are marked as doubtful, and the reader compares them with the expected values.
+Time is an argument.
 """
 
 import math
@@ -31,23 +32,29 @@ from omnibot_driver.core.mart.words import (
 from omnibot_driver.core.packets import Packets
 
 QUICKEST_S: Final = 0.1
-"""Less patience than this a query never needs."""
+"""Shortest margin in s on top of a query's own time before it is given up."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
-"""A query that was not answered may have been given up too soon: the next is waited for longer."""
+"""Factor and addend in s by which an unanswered query raises ``trip_s``.
+
+The query may have been given up too soon, so the next one is awaited longer.
+"""
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""A network on which an exchange takes longer, or a datagram is lost or comes twice, may do so
-again: for this time no reply is certain to belong to the last question."""
+"""Duration of an exchange above which the network is disturbed, and for how long, in s.
+
+A network that delays, loses or duplicates a datagram may do so again. For DISTURBED_S, each reply
+may belong to an earlier question.
+"""
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
-"""Asked at once, whatever reply may still come."""
+"""Queries that are sent at once, even if a late reply of the same form may still come."""
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
-"""A check that is refused, or finds no IMU, may be answered before its least time."""
+"""Failure texts that a check may return before its least time: it is refused, or finds no IMU."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """What was asked and not answered yet; given up at ``until_s``."""
+    """A request that is not answered yet; it is given up at ``until_s``."""
 
     request: Request
     sent_s: float
@@ -55,14 +62,16 @@ class Pending:
 
     @property
     def word(self) -> Word:
-        """Its command."""
+        """The command of the request."""
         return self.request.word
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A reply with what it answers. ``took_s``: from the sending to the arrival; ``when``: what it
-    tells was so.
+    """A reply together with the request that it answers.
+
+    ``took_s``: time from the request to the reply in s; ``when``: the time at which the reply was
+    true.
     """
 
     request: Request
@@ -77,8 +86,10 @@ class Answer:
 
 
 class Conversation:
-    """``delay_s``: how long a datagram may be on its way. ``discarded``: late replies so far;
-    ``trip_s``: what a query takes, on average.
+    """The exchange of requests and replies with one server.
+
+    ``delay_s``: longest time that a datagram may be on its way, in s; ``discarded``: number of late
+    replies so far; ``trip_s``: average duration of a query in s.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -87,7 +98,7 @@ class Conversation:
         self.connect()
 
     def connect(self) -> None:
-        """Nothing was asked."""
+        """Begin a new connection: no request is pending."""
         self.pending: Pending | None = None
         self._owed_until_s: dict[Form, float] = {}
         self._copies_until_s: dict[Form, float] = {}
@@ -96,17 +107,17 @@ class Conversation:
         self._disturbed_s = self._doubled_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
-        """Whether nothing is asked, and no late reply can be taken for its own."""
+        """Return whether nothing is pending, and no late reply can be mistaken for its own."""
         if self.pending is not None:
             return False
         return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
 
     def heard(self, form: Form, now: float) -> None:
-        """A reply of this form came; a copy of it may be late."""
+        """Note that a reply of this form came; a duplicate of it may come later."""
         self._copies_until_s[form] = now + self.delay_s
 
     def certain_from_s(self, word: Word) -> float:
-        """From when on the word's own reply cannot be mistaken for a copy of an earlier one."""
+        """Return the time from which no reply to ``word`` can be a duplicate of an earlier one."""
         until = [
             each.get(form, -math.inf)
             for form in word.forms
@@ -115,20 +126,23 @@ class Conversation:
         return max(until) - word.least_s
 
     def disturbed(self, now: float) -> bool:
-        """Whether the network has shown lately that it loses, doubles or delays datagrams."""
+        """Return whether the network has recently lost, duplicated or delayed a datagram."""
         return now < self._disturbed_s + DISTURBED_S
 
     def doubles(self, now: float) -> bool:
-        """Whether replies have come lately that nothing was asked for: copies, or late ones."""
+        """Return whether unexpected replies came recently: duplicates or late ones."""
         return now < self._doubled_s + DISTURBED_S
 
     def owes(self, form: Form, now: float) -> None:
-        """A reply of this form may still be on its way."""
+        """Note that a reply of this form may still be on its way."""
         until_s = now + self.delay_s
         self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def settle(self, now: float) -> None:
-        """The server has answered the latest of all: earlier replies are on their way, or lost."""
+        """Note that the server has answered its last request.
+
+        Earlier replies come within ``delay_s`` or are lost.
+        """
         for form, until_s in self._owed_until_s.items():
             self._owed_until_s[form] = min(until_s, now + self.delay_s)
 
@@ -136,7 +150,7 @@ class Conversation:
         return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
 
     def ask(self, request: Request, now: float, takes_s: float | None = None) -> Packets:
-        """Send a request that is to be answered; ``takes_s``: at most, if not as its word says."""
+        """Send a request that expects a reply within ``takes_s`` (default: its command's limit)."""
         patience_s = self._patience_s(request.word)
         if takes_s is not None:
             patience_s = takes_s + 2 * self.delay_s
@@ -144,7 +158,7 @@ class Conversation:
         return ((request.word.channel, request.data),)
 
     def give_up(self, now: float) -> Word | None:
-        """The pending request is not waited for any more: what it was."""
+        """Stop waiting for the pending request, and return its command."""
         if self.pending is None:
             return None
         word = self.pending.word
@@ -153,7 +167,7 @@ class Conversation:
         return word
 
     def overdue(self, now: float) -> Word | None:
-        """The pending request, where its time is over; it is given up."""
+        """Give up the pending request if its time is over; return its command, else None."""
         if self.pending is None or now < self.pending.until_s:
             return None
         if self.pending.word.kind is Kind.QUERY:
@@ -162,7 +176,7 @@ class Conversation:
         return self.give_up(now)
 
     def hear(self, reply: Reply, now: float) -> Answer | None:
-        """What this answers; None for what is late, or doubled."""
+        """Return the answer that this reply is, or None for a late or duplicate reply."""
         pending = self.pending
         if isinstance(reply, Ok):
             self.heard(reply.form, now)
@@ -189,36 +203,44 @@ class Conversation:
         self._answers[pending.word] = reply, now + self.delay_s
         from_s = pending.sent_s
         if doubtful or self.disturbed(now):
-            from_s = min(from_s, now - self.delay_s)  # an answer to a question before
+            from_s = min(from_s, now - self.delay_s)  # it may answer an earlier question
         when = Moment(now - took_s / 2, from_s, now, doubtful)
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Whether another query was answered so just now, and this one was not before: the reply
-        has come twice, and its own is still to come.
+        """Return whether the reply is a duplicate of the answer to another query.
+
+        That is so if another query was just answered identically, but this one was answered
+        differently the last time. Its own reply is then still to come.
         """
         if word.kind is not Kind.QUERY:
-            return False  # RMCS tells the angle that RMRA has just told
+            return False  # RMCS reports the same angle as RMRA
         before, _ = self._answers.get(word, (reply, now))
         return reply != before and self._has_come(reply, now, but=word, kind=Kind.QUERY)
 
     def _has_come(
         self, reply: Ok | Fail, now: float, *, but: Word | None = None, kind: Kind | None = None
     ) -> bool:
-        """Whether a command was answered so just now."""
+        """Return whether a command was answered identically within the last ``delay_s``.
+
+        ``but``: a command that is left out; ``kind``: the only kind of command to regard.
+        """
         return isinstance(reply, Ok) and any(
             each == reply and until_s > now and word is not but and kind in (None, word.kind)
             for word, (each, until_s) in self._answers.items()
         )
 
     def _owes_until(self, word: Word, sent_s: float) -> None:
-        """The reply to this may still come."""
+        """Note that the reply to a request, sent at ``sent_s``, may still come."""
         until_s = sent_s + word.takes_s + 2 * self.delay_s
         for form in word.forms:
             self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def _patience_s(self, word: Word) -> float:
-        """Queries are short of patience: what drives is not to be blind for long."""
+        """Return how long a reply is awaited, in s.
+
+        Queries and changes have a short limit, so that a robot that drives is soon measured again.
+        """
         longest_s = 2 * self.delay_s
         if word.kind in (Kind.QUERY, Kind.CHANGE):
             longest_s = min(longest_s, max(QUICKEST_S, 3 * self.trip_s))

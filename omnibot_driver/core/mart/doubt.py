@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How far the odometry of a MART robot may be off, and what makes it so.
+"""The uncertainty of a MART robot's odometry, and its sources.
 
-A wheel that slips or has another size, a gyro that drifts, motors that differ where the heading is
-unknown, the ends of motions, and replies whose time is known within the network's delay only. Knows
-metres, rad and seconds; not where they come from.
+The sources are: a wheel that slips or has another size, a gyro that drifts, motors that differ
+where the heading is unknown, the beginning and end of each motion, and replies whose time is known
+only within the network's delay. This module knows metres, rad and seconds; it does not know where
+they come from.
 """
 
 import math
@@ -14,39 +15,45 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.odometry.covariance import Covariance
 
 WAY_STDDEV: Final = 0.004
-"""m after 1 m, growing with its root."""
+"""Standard deviation in m of the distance after 1 m; it grows with the root of the distance."""
 GYRO_WALK: Final = 0.002
-"""rad after 1 s of motion, growing with its root: a gyro that is shaken."""
+"""Standard deviation in rad of the heading after 1 s of motion, as the gyro is shaken.
+
+It grows with the root of the time.
+"""
 WHEEL_HEADING: Final = 0.06
-"""Relative error of a turn that the right wheel alone tells."""
+"""Relative standard deviation of a turn on the spot that only the right wheel measures."""
 END_M, END_RAD = 0.004, math.radians(0.4)
-"""Of each motion: how it begins, and rolls out."""
+"""Standard deviations that each motion adds, in m and rad: how it begins, and rolls out."""
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
-"""Of a turn on the spot that the server tells in whole degrees."""
+"""Standard deviation of a turn on the spot that the server reports in whole degrees.
+
+The first is in rad, the second a part of the turn.
+"""
 PIVOT: Final = 0.01
-"""Part of the track by which the middle of a turn on the spot is off."""
+"""Offset of the centre of a turn on the spot, as a part of the track."""
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
-"""Of a straight controlled move, whose heading the server holds."""
+"""Standard deviation of the heading after a straight controlled move, in rad."""
 BEND_WALK: Final = 0.5
-"""Part of a guessed turn's error that is another's in each step."""
+"""Part of the error of a guessed turn that is independent in each step."""
 ASTRAY: Final = 0.7
-"""For rad² of the heading, part of the way that may lead elsewhere, ahead and aside."""
+"""Part of a distance by which its end may be off, ahead and aside, per rad² of heading variance."""
 SPREAD: Final = 0.3
-"""Standard deviation of a time that lies anywhere between two, as a part of what is between."""
+"""Standard deviation of a time anywhere in an interval, as a part of its length (1/√12)."""
 CLOCK_S: Final = 0.01
-"""A reply of a good network is as old as that, more or less."""
+"""Least uncertainty of a reply's time, in s, as on a good network."""
 Errors = list[tuple[float, float, float, float]]
 
 
 class Doubt:
-    """``settings`` may be replaced. All of it is covariance in the odometry frame."""
+    """The covariance of the pose in the odometry frame. ``settings`` may be replaced."""
 
     def __init__(self, settings: MartSettings) -> None:
         self.settings = settings
         self.reset()
 
     def reset(self) -> None:
-        """The frame begins here."""
+        """Begin a new frame at the present pose, without errors."""
         self._walk = Covariance()
         self._levers = [(0.0, 0.0, 0.0)] * 5
         self._bend_before_rad = 0.0
@@ -62,8 +69,11 @@ class Doubt:
         bend: float,
         aside_m: float,
     ) -> None:
-        """The body moved so far. ``bend``: standard deviation of left over right, where they alone
-        tell of a turn; ``aside_m``: of the way, by a heading of another time.
+        """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
+
+        ``bend``: standard deviation of the ratio of left to right wheel speed if the turn is known
+        from that ratio alone, else 0; ``aside_m``: standard deviation across the direction of
+        motion in m, because the heading was measured at another time.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)
@@ -96,33 +106,38 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """A motion has begun."""
+        """Note that a motion has begun: a guess of its turn may be corrected later."""
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """What was guessed of the turn of this motion is known now; where it led is not."""
+        """Remove the heading error of this motion's guessed turn, as the heading is reported now.
+
+        The error of the position to which the guess has led remains.
+        """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
 
     def add(self, m2: float, rad2: float) -> None:
-        """An error of the place, whichever way, and of the heading."""
+        """Add an independent error of the position in each direction, and one of the heading."""
         self._walk = self._walk.with_errors(_around(m2, rad2))
 
     def end(self) -> None:
-        """A motion has ended."""
+        """Add the errors of the beginning and end of a motion."""
         self.add(END_M**2, END_RAD**2)
 
     def end_straight(self) -> None:
-        """A straight controlled move has ended."""
+        """Add the heading error of a straight controlled move that has ended."""
         self.add(0.0, STRAIGHT_STDDEV_RAD**2)
 
     def end_turn(self, spun_rad: float, told_rad: float | None) -> None:
-        """A turn on the spot has ended."""
+        """Add the errors of a turn on the spot that has ended; arguments as for ``turn``."""
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
-        """Of a turn on the spot so far, by the wheel; ``told_rad``: by the server, if it has told
-        it. The robot walks a little aside where its motors are unequal.
+        """Return the errors of a turn on the spot so far.
+
+        ``spun_rad``: the turn by the wheel; ``told_rad``: the turn that the server has reported, or
+        None. The robot also moves a little aside if its motors are unequal.
         """
         variance = (WHEEL_HEADING * spun_rad) ** 2
         if told_rad is not None:
@@ -131,7 +146,7 @@ class Doubt:
         return anywhere(pivot_m, math.sqrt(variance))
 
     def total(self, more: Errors) -> Covariance:
-        """With what may have been done since."""
+        """Return the covariance, including the further errors ``more`` since the last count."""
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
         size, bias, *others = self._levers
         errors = [(scale, *size), (drift, *bias), *((1.0, *lever) for lever in others)]
@@ -139,7 +154,7 @@ class Doubt:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Within this of the prediction, as standard deviations."""
+    """Return independent errors with these standard deviations, in m (each direction) and rad."""
     return _around(way_m * way_m, turn_rad * turn_rad)
 
 

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""To a pose by controlled moves: turn towards it, drive straight, turn to its heading.
+"""The plan to a goal pose by controlled moves: turn to it, drive straight, turn to its heading.
 
-Each move is whole degrees or inches, and ends a little beside its target, so the way is planned
-anew after each. Knows poses and the words of moves; not when they are said.
+Each move is a number of whole degrees or inches and ends a little beside its target, so the rest is
+planned again after each. This module knows poses and the commands for moves; it does not know when
+they are sent.
 """
 
 import math
@@ -19,29 +20,35 @@ NEAR_M: Final = 0.04
 NEAR_RAD: Final = math.radians(2.5)
 SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""After this many moves this is near enough: each more would turn round for it."""
+"""After ENOUGH_MOVES moves, ENOUGH_M (m) from the goal is near enough.
+
+Each further move would turn the robot round to the goal first.
+"""
 STRETCH: Final = 1.3
-"""Of straight moves, at first: 12 inches were seen to be 15.8."""
+"""Initial ratio of the driven to the requested length of straight moves: 15.8 in for 12 in."""
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
-"""A turn that leaves the robot nearer by less is not made."""
+"""A turn that brings the robot nearer to its heading by less than this is not made."""
 WIDER: Final = 0.5
-"""Part by which each turn in a row widens what is near enough: small turns go beyond."""
+"""Part by which each turn in a row widens the heading tolerance, as small turns overshoot."""
 MOST_MOVES: Final = 9
-"""A goal that is not reached by then is left as it is."""
+"""Largest number of moves to one goal; after them the goal is given up."""
 
 
 LEAST_LIKE: Final = 0.35
-"""A move does what was asked, but for that part."""
+"""Largest part by which a single move differs from what was requested."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
-"""How long a move takes, about; half as fast where it is slow."""
+"""Usual duration of a move: a constant in s, plus s per degree or inch, doubled if SLOW."""
 LONGER: Final = 1.4
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A controlled move that is over: what was asked, what was counted since it began, and how long
-    it lasted. ``quiet_s``: how long a copy of it may have run before it was counted.
+    """A controlled move that has ended, compared with what was measured of it.
+
+    ``request``: what was requested; ``way_m``, ``turned_rad``: what was counted since it began;
+    ``lasted_s``: its duration; ``quiet_s``: longest time that a duplicate of it may have run before
+    the encoder was read.
     """
 
     request: Request
@@ -52,18 +59,20 @@ class Done:
 
     @property
     def is_straight(self) -> bool:
-        """Else it is a turn on the spot."""
+        """Whether the move is straight; else it is a turn on the spot."""
         return self.request.word in (TF, TB)
 
     @property
     def asked(self) -> float:
-        """In m or rad."""
+        """The requested distance in m, or turn in rad."""
         number = float(self.request.data.split()[-1])
         return number * INCH_M if self.is_straight else math.radians(number)
 
     def may_have_run_twice(self, delay_s: float) -> bool:
-        """Whether a copy of it may have come, on a network that doubles datagrams; the count then
-        tells of the copy alone.
+        """Return whether a duplicate of the move may have run after it.
+
+        That happens on a network that duplicates datagrams; the count then covers the duplicate
+        alone.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         number = float(self.request.data.split()[-1])
@@ -75,9 +84,10 @@ class Done:
 
 
 class Surplus:
-    """By how much controlled moves go beyond what was asked, as they were measured.
+    """The measured excess of controlled moves over what was requested.
 
-    Turns by some degrees, straight ones by a part: the controller ends them by time.
+    It is a number of degrees for turns, and a ratio for straight moves, which the server ends by
+    time.
     """
 
     def __init__(self) -> None:
@@ -85,7 +95,7 @@ class Surplus:
         self._stretch = {True: STRETCH, False: STRETCH}
 
     def learn(self, request: Request, way_m: float, turned_rad: float) -> None:
-        """A move is over; both have any sign."""
+        """Learn from a move that has ended; ``way_m`` and ``turned_rad`` may have any sign."""
         parts = request.data.split()
         slow, asked = b"SLOW" in parts, float(parts[-1])
         if request.word in (TF, TB):
@@ -97,23 +107,26 @@ class Surplus:
         self._degrees[slow] = min(MOST_SURPLUS_DEG, max(0.0, before + (beyond - before) / 2))
 
     def degrees(self, wanted: float, *, slow: bool) -> int:
-        """What to ask for, to turn this many degrees; 0 where a turn would leave the robot no
-        nearer, as the least that can be turned is too much.
+        """Return the number of degrees to request for a turn by ``wanted`` degrees.
+
+        It is 0 if a turn would leave the robot no nearer, as even the smallest turn is too large.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
         return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
 
     def inches(self, way_m: float) -> tuple[int, bool]:
-        """What to ask for, to drive so far, and whether slowly."""
+        """Return the inches to request for a distance in m, and whether to drive at SLOW speed."""
         slow = way_m / INCH_M < SLOW_BELOW_IN
         return max(1, round(way_m / INCH_M / self._stretch[slow])), slow
 
 
 @dataclass(slots=True)
 class Move:
-    """The way to one goal. ``said``: moves so far; ``turns``: in a row, of these the last;
-    ``given_up``: it is over, or a move failed.
+    """The progress towards one goal.
+
+    ``said``: number of moves so far; ``turns``: number of turns at the end of these, without a
+    straight move between; ``given_up``: whether the goal is finished, or a move has failed.
     """
 
     place: Pose
@@ -122,13 +135,13 @@ class Move:
     given_up: bool = False
 
     def begin(self, request: Request) -> None:
-        """This move goes out."""
+        """Note that this move is sent."""
         self.said += 1
         self.turns = 0 if request.word in (TF, TB) else self.turns + 1
 
 
 def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) -> Request | None:
-    """What leads on from here; None at the goal, or when it is given up."""
+    """Return the next move from ``pose``, or None at the goal or if the goal is given up."""
     if move.given_up or move.said >= MOST_MOVES:
         return None
     way = pose.way_to(move.place)

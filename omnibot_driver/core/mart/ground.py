@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the parts of the pilot stand on: what is believed of server and robot, and how it is said.
+"""The base of the pilot: the believed state of server and robot, and the sending of commands.
 
-Knows states and words; not why something is said. Time is an argument.
+This module knows states and commands; it does not know why a command is sent. Time is an argument.
 """
 
 import math
@@ -35,11 +35,17 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryRe
 
 STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 ESTOP_REPEAT_S: Final = 0.1
-"""While the e-stop is latched. A server that stands answers ``fail``, and does nothing."""
+"""Interval in s of the stops while the e-stop is latched.
+
+A server whose robot is at rest answers them with ``fail`` and does nothing.
+"""
 
 
 class Ground:
-    """``readings``: what came of the replies, to be taken. ``settings`` may be replaced."""
+    """The state that all parts of the pilot share.
+
+    ``readings``: readings that are still to be taken. ``settings`` may be replaced.
+    """
 
     def __init__(self, settings: MartSettings) -> None:
         self._settings = settings
@@ -60,7 +66,7 @@ class Ground:
 
     @property
     def settings(self) -> MartSettings:
-        """Sizes and scales."""
+        """The sizes and scales of the robot."""
         return self._settings
 
     @settings.setter
@@ -69,7 +75,7 @@ class Ground:
         self.conversation.delay_s = settings.network_delay_s
 
     def connect(self) -> None:
-        """The line is new: the server may be moving the robot."""
+        """Begin a new connection: the server may be moving the robot."""
         self.conversation.connect()
         self.jobs.cancel("the connection was lost; call again when it is back")
         self.jobs.logging = self.jobs.ended = False
@@ -112,13 +118,13 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Since when a controlled move is under way."""
+        """The time since which a controlled move is under way, or None."""
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         return self._started_s if moves and self.state is not State.LOST else None
 
     @property
     def refusal(self) -> str:
-        """Why the robot is not to be driven, and what to do; empty if it may be."""
+        """The reason why the robot must not be driven, with a remedy; empty if it may be."""
         if self.state is State.LOST:
             return (
                 "the server is lost: cut the motor power if the robot moves, then restart the"
@@ -127,11 +133,11 @@ class Ground:
         return self.health.refusal
 
     def told(self, now: float) -> OdometryReading:
-        """The odometry, predicted to this time."""
+        """Return the odometry, predicted to ``now``."""
         return self.odometry.told(now, blind_since_s=self.blind_since_s)
 
     def take(self) -> list[Reading]:
-        """What came of the replies since the last call."""
+        """Return the readings that came since the last call."""
         if self.jobs.done:
             self.readings += map(ExtraReading, self.jobs.done)
             self.jobs.done.clear()
@@ -153,24 +159,28 @@ class Ground:
 
     @property
     def _rolled_out(self) -> bool:
-        """Whether all that the last motion has done is counted."""
+        """Whether the roll-out of the last motion has been counted."""
         odometry = self.odometry
         return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
 
     @property
     def _heading_first(self) -> bool:
-        """After RM the last heading comes before the last count, which ends the motion."""
+        """Whether the heading must be read before the encoder.
+
+        After RM the last heading must come before the last count, because that count ends the
+        motion.
+        """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE
         return by_reference and odometry.heading.from_s < self._rested_s
 
     def _require(self, word: Word) -> None:
-        """Whatever is sent is in the table; anything else is a defect, and is not sent."""
+        """Raise AssertionError, as for a defect, if the present state forbids the command."""
         if not may_say(self.state, word, self.motion):
             raise AssertionError(f"{word.text} must not be said while {self.state.value}")
 
     def _send(self, said: tuple[Word, ...], now: float) -> Packets:
-        """Words that nothing is awaited of."""
+        """Return the packets of commands whose replies are not awaited, and note their times."""
         for word in said:
             self._require(word)
             if word in HARMFUL_LATE:
@@ -195,7 +205,7 @@ class Ground:
 
     @property
     def _late_s(self) -> float:
-        """How late a datagram is, about, on the way there."""
+        """Estimated delay of a datagram on its way to the server, in s."""
         return min(self._delay_s, self.conversation.trip_s)
 
     @property

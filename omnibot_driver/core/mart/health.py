@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What speaks against driving: the motor board's state, the IMU, obstacles, a wrong server.
+"""The reasons not to drive: the motor board's state, the IMU, obstacles, a wrong server.
 
-Knows the slower measurements and their limits; not what is done about them. Time is an argument.
+This module knows the slower measurements and their limits; it does not know what follows from them.
+Time is an argument.
 """
 
 import math
@@ -33,25 +34,30 @@ BITS: Final = {
 NO_READ: Final = 255
 HALTING: Final = 4 | 8 | 16 | 32
 FRONT_IN, REAR_IN = 19, 15
-"""An obstacle nearer than this stops the controller."""
+"""Distances in inches; the controller stops for an obstacle that is nearer."""
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
-"""V and inches: two readings that are so near are alike."""
+"""Largest difference of two readings that are regarded as alike, in V and inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
 """Number of similar readings in a row that are believed, where a reply may be to another query."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 REFERENCE_FAILS: Final = 2
-"""RM may fail once after a stop that took long, and the robot stands."""
+"""Number of bare ``fail`` replies to RM in a row that show a defective server.
+
+RM may fail once after a stop that took long, while the robot is at rest.
+"""
 
 
 class Health:
-    """``imu``: what its checks have found; ``stranger``: what another server answers;
-    ``heading_told``: motions besides RM in which RMRA was seen to change, and ``heading_changes``
-    how often in the present one; ``reference_fails``: how
-    often in a row RM was answered by a bare ``fail``.
+    """The health of robot and server.
+
+    ``imu``: the results of the IMU's checks; ``stranger``: the name that another server gives, or
+    empty; ``heading_told``: motions besides RM in which RMRA was seen to change;
+    ``heading_changes``: number of such changes in the present motion; ``reference_fails``: number
+    of bare ``fail`` replies to RM in a row.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -60,7 +66,7 @@ class Health:
         self.connect()
 
     def connect(self) -> None:
-        """Nothing was measured."""
+        """Begin a new connection: nothing is measured yet."""
         self.heading_told: set[Motion] = set()
         self.heading_changes = 0
         self.stranger = ""
@@ -76,8 +82,10 @@ class Health:
     def measured(
         self, word: Word, reply: Ok, now: float, *, uncertain: bool = False
     ) -> list[Reading]:
-        """A reply to one of the slower queries. ``uncertain``: it may be that to another question,
-        so it is reported when it has come again.
+        """Return the readings from a reply to one of the slower queries.
+
+        ``uncertain``: the reply may be to another query, so its value is reported only when it was
+        repeated.
         """
         if word is VOLTS:
             self._voltages.append(reply.number)
@@ -106,16 +114,22 @@ class Health:
         return []
 
     def _is_of_another(self, word: Word, inches: float) -> bool:
-        """What the other sonar has told too, and 0, is as likely another's answer."""
+        """Return whether the distance is as likely the answer to another query.
+
+        That is so for 0, and for the value that the other sonar has reported.
+        """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
 
     def is_voltage(self, number: float) -> bool:
-        """Whether the battery has told just that lately."""
+        """Return whether the battery voltage was recently reported as this number, in V."""
         return any(abs(number - volts) < SAME_V for volts in self._voltages)
 
     def _status(self, bits: int) -> None:
-        """It counts when it is reported twice: a late reply to ENC looks the same."""
+        """Note the motor board's status; a nonzero one is believed when it is repeated.
+
+        A late reply to ENC looks the same.
+        """
         if not 0 <= bits <= NO_READ:
             return
         before, self._status_before = self._status_before, bits
@@ -123,31 +137,31 @@ class Health:
             self.status = bits
 
     def encoder_failed(self) -> None:
-        """ENC was answered by ``fail``."""
+        """Note that ENC was answered by ``fail``."""
         self._encoder_fails += 1
 
     def encoder_answers(self) -> None:
-        """ENC was answered."""
+        """Note that ENC was answered by a count."""
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
-        """RMRA has, within this motion: one change may come of a late reply."""
+        """Note that RMRA has changed in this motion; a single change may come from a late reply."""
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
 
     def reference_moves(self) -> None:
-        """The robot moves after an RM that failed."""
+        """Note that the robot moves after an RM that failed, which is a defect of the server."""
         if self.reference_fails:
             self.reference_fails = REFERENCE_FAILS
 
     def volts_or(self, nominal: float) -> float:
-        """The battery's."""
+        """Return the battery voltage in V, or ``nominal`` before the first report."""
         return nominal if self.volts is None else self.volts
 
     @property
     def bits(self) -> str:
-        """What MCSTAT tells, by name."""
+        """The faults that MCSTAT reports, by name."""
         if self.status is None:
             return "unknown"
         if self.status == NO_READ:
@@ -156,14 +170,14 @@ class Health:
 
     @property
     def tripped(self) -> str:
-        """Why the motors must not be driven, by the motor board; empty if they may."""
+        """What the motor board reports against driving the motors; empty if they may be driven."""
         if self._encoder_fails >= ENCODER_FAILS or self.status == NO_READ:
             return "nothing (ENC or MCSTAT is not answered by it)"
         return self.bits if (self.status or 0) & HALTING else ""
 
     @property
     def refusal(self) -> str:
-        """Why the robot is not to be driven, and what to do; empty if it may be."""
+        """The reason why the robot must not be driven, with a remedy; empty if it may be."""
         if self.stranger:
             return f"the server is not a motion controller; it calls itself '{self.stranger}'"
         if self.tripped:
@@ -178,7 +192,7 @@ class Health:
         return ""
 
     def obstacle(self, motion: Motion, now: float) -> bool:
-        """Whether a sonar has just seen something too near, that way."""
+        """Return whether a sonar has recently seen an obstacle too near in this direction."""
         side: Side = "rear" if motion is Motion.REVERSE else "front"
         least = REAR_IN if motion is Motion.REVERSE else FRONT_IN
         inches, at_s = self._sonars_in.get(side, (-1, -math.inf))

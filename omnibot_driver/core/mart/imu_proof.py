@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the IMU was proved alive just now, and by which command.
+"""The proof that the IMU is alive, and the command that gives it.
 
-RST IMU proves it without a motion. Where the server has no such command, MCR SLOW 0 has to do. The
-server gives an IMU up when RST IMU fails, so that is repeated before the driver believes it. Knows
-replies and times; not what is started. Time is an argument.
+RST IMU gives the proof without a motion; MCR SLOW 0 is used if the server does not have that
+command. The server closes the IMU when RST IMU fails, so the check is repeated before the driver
+believes it. This module knows replies and times; it does not know what is started. Time is an
+argument.
 """
 
 import math
@@ -22,17 +23,19 @@ from omnibot_driver.core.mart.words import (
 )
 
 PROVED_S: Final = 0.2
-"""So old a proof of the IMU may be when a motion starts."""
+"""Oldest proof of the IMU with which a motion may start, in s."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""A check takes at least about this time; half of what it took longer is the way of its reply."""
+"""Usual duration of a check in s. Half of any excess is regarded as the delay of its reply."""
 FAILS: Final = {RESET: 3, CHECK: 1}
-"""After this many in a row the IMU is dead."""
+"""Number of failures in a row after which the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
 
 
 class ImuProof:
-    """``word``: the command that proves it; ``dead``: the last checks found none; ``again_s``: not
-    checked before.
+    """The result of the last checks of the IMU.
+
+    ``word``: the command that checks it; ``dead``: whether the last checks found no IMU;
+    ``again_s``: earliest time of the next check.
     """
 
     def __init__(self) -> None:
@@ -46,28 +49,28 @@ class ImuProof:
         self._fails = 0
 
     def fresh(self, now: float) -> bool:
-        """Whether a motion may start."""
+        """Return whether the last proof is recent enough for a motion to start."""
         return now <= self._proved_s + PROVED_S
 
     def used(self) -> None:
-        """A motion starts; the next one needs another proof."""
+        """Note that a motion starts; the next one needs another proof."""
         self._proved_s = -math.inf
 
     def lost(self) -> None:
-        """A motion found it dead."""
+        """Note that a motion has found the IMU dead."""
         self.dead = True
 
     @property
     def request(self) -> Request:
-        """The request to send."""
+        """The request that checks the IMU."""
         return RESET.request() if self.word is RESET else CHECK.request(0)
 
     def missed(self, now: float) -> None:
-        """No reply came."""
+        """Note that a check was not answered."""
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Whether the reply is one that this knows."""
+        """Evaluate the reply to a check; return whether the reply is an expected one."""
         if isinstance(reply, Ok):
             self.dead, self._fails = False, 0
             self._proved_s = now - max(0.0, took_s - PROBE_S[word]) / 2
@@ -83,5 +86,5 @@ class ImuProof:
         return True
 
     def retries(self, now: float) -> bool:
-        """Whether a dead IMU is to be tried again, which moves nothing."""
+        """Return whether to check a dead IMU again, with the command that moves nothing."""
         return self.dead and self.word is RESET and now >= self.again_s

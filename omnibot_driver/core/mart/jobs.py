@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is asked of the controller besides motion, one job at a time: gyro bias, dock, log, files.
+"""Requests to the controller besides motion, one job at a time: gyro bias, dock, log, files.
 
-A file comes as a name with a size, then as pieces of 512 bytes without numbers: lost and doubled
-ones show in the size, or as two that are alike. Knows words and replies; not when the command port
-is free. Time is an argument.
+A file comes as a name with a size, then as pieces of 512 bytes without numbers. A lost or
+duplicated piece shows in the size, or as two identical pieces. This module knows commands and
+replies; it does not know when the command port is free. Time is an argument.
 """
 
 import math
@@ -20,13 +20,13 @@ from omnibot_driver.core.mart.words import Form, Request, Word
 
 PIECE: Final = 512
 QUIET_S: Final = 1.0
-"""A file is over when nothing came for this time."""
+"""Time in s without a piece after which a file is regarded as complete."""
 TIMES: Final = 3
-"""A job that may be repeated is asked so often."""
+"""Number of attempts at a job that may be repeated."""
 
 
 class Job(Enum):
-    """What can be asked; the value reads well in a sentence."""
+    """A kind of job; its value is the name used in messages."""
 
     BIAS = "gyro calibration"
     DOCK = "docking"
@@ -49,13 +49,15 @@ WORD_OF: Final[dict[Job, Word]] = {
 WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
 USUAL_S: Final = 20.0
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
-"""Harmless to ask again where no reply came."""
+"""Jobs that may be sent again if the reply is missing."""
 
 
 class Jobs:
-    """``done``: what came of jobs, to be taken. ``logging``: LOG was answered since the connection.
+    """The job that is under way, and the results of those that have ended.
 
-    ``ended``: EXIT was sent, so the server is not there any more.
+    ``done``: results that are still to be taken; ``logging``: whether LOG was answered in this
+    connection; ``ended``: whether EXIT was sent, so that the server has ended; ``moving``: whether
+    the controlled move of the job was sent.
     """
 
     def __init__(self) -> None:
@@ -83,11 +85,11 @@ class Jobs:
 
     @property
     def wake_at(self) -> float:
-        """When ``tick`` has something to do."""
+        """The time at which ``tick`` must be called again."""
         return min(self._until_s, self._piece_s)
 
     def progress(self, now: float) -> str:
-        """What is done, and how far it is."""
+        """Return a text with the present job, its duration and the bytes received."""
         if self.job is None:
             return "none"
         limit_s = WITHIN_S.get(self.job, USUAL_S)
@@ -99,7 +101,10 @@ class Jobs:
         return f"{since}, {sum(map(len, self._pieces))} of {self._size} bytes"
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin. Raises RequestRefused."""
+        """Begin a job.
+
+        Raises RequestRefused while another is under way, and for a log that was not started.
+        """
         if self.job is not None:
             raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
         if job is Job.LOG_FILE and not self.logging:
@@ -112,18 +117,21 @@ class Jobs:
         self._until_s = now + WITHIN_S.get(job, USUAL_S)
 
     def next(self, now: float, *, stands: bool) -> Request | None:
-        """What to send, as soon as the robot is proved to stand."""
+        """Return the request to send, or None.
+
+        ``stands``: whether the robot is proved to be at rest.
+        """
         return self._request if stands and not self._waiting else None
 
     def sent(self, request: Request, now: float) -> None:
-        """It was."""
+        """Note that the job's request was sent."""
         self._waiting = True
         self._tries += 1
         self.moving = request.word in (words.TF, words.TB)
         self.ended |= request.word is words.EXIT
 
     def answered(self, answer: Answer, now: float) -> None:
-        """The reply to it."""
+        """Evaluate the reply to the job's request."""
         job, reply = self.job, answer.reply
         if job is None or self._request is None or answer.word is not self._request.word:
             return
@@ -137,7 +145,7 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """No reply came in time."""
+        """Repeat or end the job, as its reply did not come in time."""
         if self.job is None:
             return
         if self.job in REPEATED and self._tries < TIMES:
@@ -146,7 +154,7 @@ class Jobs:
             self._finish(False, f"{word.text} was not answered")
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
-        """The reply to a controlled move, which may be ours."""
+        """Evaluate the reply to a controlled move, and end the docking job if it was its move."""
         if self.job is not Job.DOCK or not self.moving:
             return
         if isinstance(reply, Fail):
@@ -155,7 +163,7 @@ class Jobs:
             self._finish(True, "the move to the dock is over; `docked` tells whether it is reached")
 
     def piece(self, data: bytes, now: float) -> None:
-        """A datagram, while pieces are awaited."""
+        """Keep a datagram that arrived while pieces of a file are awaited, if its size fits."""
         if len(data) in (PIECE, self._size % PIECE):
             self._pieces.append(data)
             self._piece_s = now + QUIET_S
@@ -163,14 +171,14 @@ class Jobs:
                 self._piece_s = now + QUIET_S / 3
 
     def tick(self, now: float) -> None:
-        """Time passed."""
+        """End a file that is complete, and a job that takes too long."""
         if self.collecting and now >= self._piece_s:
             self._close_file()
         elif self.job is not None and now >= self._until_s:
             self._finish(False, f"the {self.job.value} took too long")
 
     def cancel(self, why: str) -> None:
-        """Something else has ended it."""
+        """End the job as failed, for the reason ``why``."""
         if self.job is not None:
             self._finish(False, why)
 

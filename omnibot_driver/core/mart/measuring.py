@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the answers to queries tell: counts, headings, and a robot that moves unasked.
+"""The evaluation of the answers to queries: counts, headings, and a robot that moves uncommanded.
 
-Knows answers and where they go; not what is asked when. Time is an argument.
+This module knows answers and their recipients; it does not know when a query is sent. Time is an
+argument.
 """
 
 from typing import Final
@@ -19,7 +20,7 @@ STRAY_AGAIN_S: Final = 3.0
 
 
 class Measuring(Starts):
-    """The part of the pilot that hears measurements."""
+    """The part of the pilot that receives measurements."""
 
     def _measured(self, answer: Answer, now: float) -> None:
         word, reply = answer.word, answer.reply
@@ -46,7 +47,7 @@ class Measuring(Starts):
     def _counted(self, count: int, when: Moment, now: float) -> None:
         spun = self.state is State.STILL and self.odometry.motion is Motion.SPIN
         if spun and when.doubtful and now < self._rested_s + self._delay_s:
-            return  # maybe the angle, with which the server answers the stop
+            return  # maybe the angle with which the server answers the stop
         wheel = self.odometry.wheel
         before = None if wheel.may_begin_anew else wheel.last
         reading = self.odometry.counted(count, when)
@@ -71,7 +72,10 @@ class Measuring(Starts):
             self._learn(reading.dyaw_rad, now)
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
-        """A robot that stands is counted: a late copy of a start, another client, or a push."""
+        """Stop a robot that moves although it should be at rest, as its counts show.
+
+        The cause is a late duplicate of a start, another client, or a push.
+        """
         self._counted_at_rest += 1
         if self._counted_at_rest < 2 or now - self._rested_s < 0.3 or before is None:
             return

@@ -1,18 +1,23 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The time at which a reply was true, as far as the network lets it be known. Values only."""
+"""The time at which a reply was true, with the uncertainty that the network adds.
+
+This module holds values only.
+"""
 
 from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""A reply of which no more is known may be one to an earlier question."""
+"""Uncertainty in s from which on a reply may answer an earlier question."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """``at_s``: probably; ``from_s``, ``until_s``: between these. ``doubtful``: the reply may
-    be the answer to another question.
+    """The time at which a reply was true.
+
+    ``at_s``: the most probable time; ``from_s``, ``until_s``: the earliest and the latest one.
+    ``doubtful``: whether the reply may answer another question.
     """
 
     at_s: float
@@ -22,10 +27,10 @@ class Moment:
 
     @property
     def spread_s(self) -> float:
-        """How uncertain it is."""
+        """Width of the interval that contains the time, in s."""
         return self.until_s - self.from_s
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether it may be of an earlier time, or another number."""
+        """Whether the reply may be of an earlier time, or answer another question."""
         return self.doubtful or self.spread_s >= UNCERTAIN_S

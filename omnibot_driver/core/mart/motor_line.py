@@ -1,34 +1,35 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The speed of two motors over their units, as a straight line that is learned.
+"""The speed of two motors as a learned straight line over their command units.
 
 A motor without a regulator needs some units before it turns, so its speed is not in proportion to
-them: a gain that was learned while driving makes a slow turn on the spot too slow. Speeds are given
-in nominal units, those that an ideal motor would need. Knows nothing of wheels or time.
+them. A gain that was learned while driving would make a slow turn on the spot too slow. Speeds are
+given in nominal units: those that an ideal motor would need for the speed. This module knows no
+wheels and no time.
 """
 
 from typing import Final
 
 LOWEST_SLOPE, HIGHEST_SLOPE = 0.4, 2.5
 MOST_DEAD: Final = 20.0
-"""Units that a motor needs before it turns, at most."""
+"""Largest number of units that a motor needs before it turns."""
 SLOPE_SD, OFFSET_SD = 0.3, 4.0
-"""What is known before anything is measured: slope 1, offset 0."""
+"""Initial standard deviations of the slope (around 1) and of the offset (around 0 units)."""
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
-"""Standard deviations of the change from one measurement to the next."""
+"""Standard deviations of the change of slope and offset (units) between two measurements."""
 NOISE, NOISE_PART = 0.3, 0.02
-"""Of a measurement: in units, and as a part of it."""
+"""Standard deviation of a measured speed: in nominal units, plus a part of the commanded units."""
 
 
 class MotorLine:
-    """``slope * units + offset`` is the speed in nominal units; a Kalman filter of both."""
+    """A Kalman filter for the line: ``slope * units + offset`` is the speed in nominal units."""
 
     def __init__(self) -> None:
         self.slope, self.offset = 1.0, 0.0
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """These units made this speed; ``doubt`` multiplies the error that it may have."""
+        """Correct the line by a measured speed; ``doubt`` multiplies its standard deviation."""
         self._ss += SLOPE_DRIFT**2
         self._oo += OFFSET_DRIFT**2
         to_slope = self._ss * units + self._so
@@ -45,5 +46,5 @@ class MotorLine:
         self.offset = min(0.0, max(-MOST_DEAD * self.slope, offset))
 
     def units(self, speed: float) -> float:
-        """What this speed, which is positive, needs."""
+        """Return the command units that a positive speed, in nominal units, needs."""
         return (speed - self.offset) / self.slope

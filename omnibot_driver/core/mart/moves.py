@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Controlled moves, one after the other to a goal, and what is known of one that is over.
+"""Controlled moves towards a goal, one after another, and the evaluation of a finished one.
 
-Knows goals and moves; not when they may be said. Time is an argument.
+This module knows goals and moves; it does not know when a move may be sent. Time is an argument.
 """
 
 import math
@@ -17,11 +17,11 @@ from omnibot_driver.core.mart.words import Request
 
 
 class Moves(Asking):
-    """The part of the pilot that leads to a goal."""
+    """The part of the pilot that drives to a goal."""
 
     @property
     def goal_progress(self) -> str:
-        """How far it is to the goal, and by which move."""
+        """A text with the distance and the turn to the goal, and the number of the present move."""
         move = self._move
         if move is None:
             return "none"
@@ -35,7 +35,7 @@ class Moves(Asking):
             self._move = Move(order.place)
         request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
         if request is None:
-            self._move.given_up = True  # it is over: a robot that is pushed away stays there
+            self._move.given_up = True  # the goal is over, even if the robot is pushed away
             return None
         if request.word in NEEDS_IMU and not self.imu.fresh(now):
             return request
@@ -43,7 +43,7 @@ class Moves(Asking):
         return request
 
     def _moved(self, reply: Ok | Fail, now: float) -> None:
-        """A controlled move is over, by its own reply."""
+        """Note that a controlled move has ended, by its own reply."""
         motion = self.motion
         if motion is Motion.STRAIGHT:
             self.odometry.finish_straight()
@@ -61,7 +61,10 @@ class Moves(Asking):
                 self.imu.lost()
 
     def _doubt_a_copy(self, now: float) -> None:
-        """A copy of a controlled move may have run behind it, and the count begun anew."""
+        """Add uncertainty if a duplicate of the last controlled move may have run after it.
+
+        The encoder count then begins anew, and covers the duplicate alone.
+        """
         move, self._last_move = self._last_move, None
         if move is None or not self.conversation.disturbed(now):
             return

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Where the robot is now: predicted from the last count, with what it may have done since.
+"""The present pose and twist: predicted from the last count, with the uncertainty since then.
 
-Knows poses and speeds; no words. Time is an argument.
+This module knows poses and speeds; it knows no commands. Time is an argument.
 """
 
 import math
@@ -17,25 +17,28 @@ from omnibot_driver.core.readings import OdometryReading
 
 LONGEST_PREDICTION_S: Final = 0.5
 SLOWING_S: Final = 0.12
-"""Time constant of a robot that is being stopped."""
+"""Time constant in s with which a robot that is being stopped slows down."""
 ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
-"""Of a robot that is not heard."""
+"""Standard deviations of the acceleration of a robot since its last count."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
-"""A robot may be faster than its last counts tell by this."""
+"""Standard deviations by which a robot may be faster than its last counts show."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
-"""A robot that starts may be so fast before its speed is counted."""
+"""Standard deviations of the speed of a robot that starts, before its speed is counted."""
 BLIND_RADPS: Final = 1.5
-"""A robot of which nothing is heard turns no faster."""
+"""Standard deviation of the turn rate of a robot during a controlled move, in rad/s."""
 FRESH_S: Final = 0.2
-"""A heading that is older does not tell how the robot turns now."""
+"""Age in s up to which a heading shows how the robot turns now."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03
 
 
 class MartOdometry(Reckoning):
-    """One robot's."""
+    """The odometry of one robot."""
 
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
-        """Predicted to ``now``. ``blind_since_s``: since when a controlled move is under way."""
+        """Return the odometry, predicted to ``now``.
+
+        ``blind_since_s``: time since which a controlled move is under way, or None.
+        """
         speed_mps, rate_radps = self.speeds
         counted_s = self.wheel.told_s
         ahead_s = max(0.0, now - counted_s) if counted_s > -math.inf else 0.0
@@ -60,7 +63,7 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """What may have been done since the last count, and between it and its time."""
+        """Return the errors since the last count, and those of the uncertain time of that count."""
         if blind_since_s is not None:
             blind_s = max(0.0, now - blind_since_s)
             return anywhere(BLIND_MPS * blind_s, min(math.pi, BLIND_RADPS * blind_s))

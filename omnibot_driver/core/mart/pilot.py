@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is said to the server next, by what is wanted and by the state of motion.
+"""The decision which command to send to the server next.
 
-One decision at a time: stop what must not go on, else answer to what is wanted, else poll. Knows
-states, words and measurements; not who commands. Time is an argument.
+One decision at a time: stop a motion that must not continue, else act on what is wanted, else send
+a query. This module knows states, commands and measurements; it does not know who commands. Time is
+an argument.
 """
 
 import math
@@ -28,18 +29,21 @@ from omnibot_driver.core.mart.words import Form, Kind, Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 STOPS_S: Final = 1.0
-"""The answer to a stop takes no longer, as a rule."""
+"""Usual longest time in s until a stop is answered."""
 COPY_S: Final = 0.25
-"""After a controlled move the encoder is answered by then, unless a copy of the move runs."""
+"""Time in s after a controlled move within which the encoder answers, unless a duplicate runs."""
 BLIND_PART: Final = 0.15
-"""A larger change of the motors without an answer or a heading stops the robot."""
+"""Largest unanswered change of the motors, as a part of the units, while the heading is unknown.
+
+A larger one stops the robot.
+"""
 
 
 class Pilot(Measuring):
-    """One server's."""
+    """The pilot of one server."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """The newest replaces what was wanted."""
+        """Replace what was wanted by ``wanted``."""
         if wanted is not None:
             self.jobs.cancel("a command came in meanwhile; call again when the robot is to stand")
         if wanted is not self._wanted:
@@ -54,7 +58,7 @@ class Pilot(Measuring):
 
     @property
     def stop_words(self) -> tuple[Word, ...]:
-        """What stops the present state, for a caller that cannot receive the replies."""
+        """The commands that stop the present motion, for a caller that receives no replies."""
         if self.state in (State.LOST, State.ASKING):
             return LAST_HALTS[self.motion] or LAST_HALTS[Motion.UNKNOWN]
         if self.motion is Motion.NONE:
@@ -64,28 +68,31 @@ class Pilot(Measuring):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """The server cannot answer now, and that is as it should be."""
+        """Return whether the server cannot answer now, as expected."""
         if self._stopping is not None:
             return self.greeted and now < self._stopping.began_s + STOPS_S
         return self.state in (State.MOVING, State.SERVING, State.CHECKING, State.STARTING)
 
     @property
     def ready(self) -> bool:
-        """The server has told its name, and answered the first stop."""
+        """Whether the server has given its name and answered the first stop."""
         return self.greeted and not self.health.stranger and self.state is not State.LOST
 
     def fell_silent(self) -> None:
-        """Nothing came for long, and nothing was awaited: the server may have been restarted."""
+        """Begin a new connection after a long silence, unless the server may be busy.
+
+        The server may have been restarted.
+        """
         if self.state in (State.STILL, State.UNKNOWN):
             self.connect()
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has to be asked again."""
+        """The time at which ``due`` must be called again."""
         return self._next_s
 
     def due(self, now: float) -> Packets:
-        """What to send now."""
+        """Return the packets to send now."""
         self.now_s = now
         packets = self._due(now)
         self._next_s = self._wake(now)
@@ -139,9 +146,9 @@ class Pilot(Measuring):
 
     @property
     def _copy_stop_s(self) -> float:
-        """When to stop a late copy of a controlled move that seems to keep the port silent.
+        """The time to stop a late duplicate of a controlled move that seems to block the port.
 
-        SL and SS would hang a server that drives by RM or B; but the last motion was none of these.
+        SL and SS would hang a server that drives by RM or B, but the last motion was neither.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
         if self.state is not State.STILL or not suspected:
@@ -153,7 +160,7 @@ class Pilot(Measuring):
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def hear(self, data: bytes, now: float) -> None:
-        """A datagram of the command port."""
+        """Evaluate a datagram from the command port."""
         self._next_s = -math.inf
         if self.jobs.collecting:
             self.jobs.piece(data, now)
@@ -189,7 +196,7 @@ class Pilot(Measuring):
         self.health.stranger = ""
         self.conversation.hear(reply, now)
         if self._stopping is not None and self._stopping.asks_name(now):
-            self._stopped(now)  # the command port is free: the move is over, its reply was lost
+            self._stopped(now)  # the port is free: the move is over, its reply was lost
         if self.state is State.ASKING:
             self._named_s = now
         if self.state is State.LOST:
@@ -220,13 +227,13 @@ class Pilot(Measuring):
             self.state = State.SERVING if self.jobs.collecting else State.STILL
 
     def _missed(self, word: Word, now: float) -> None:
-        """No reply came in time."""
+        """React to a reply that did not come in time."""
         if self.state is State.ASKING:
             self._unanswered(word)
         elif word.kind is Kind.START:
             self._halt(now, f"{word.text} was not answered")
         elif word.kind is Kind.MOVE:
-            self._halt(now)  # its reply is lost, or it takes too long; the way is planned anew
+            self._halt(now)  # its reply is lost, or it takes too long; the way is planned again
         elif word.kind is Kind.CHECK:
             self.state = State.STILL
             self.imu.missed(now)
@@ -236,7 +243,7 @@ class Pilot(Measuring):
         elif word.kind is Kind.CHANGE:
             self.loop.missed()
             if self.odometry.left_over_right is not None and self.loop.part > BLIND_PART:
-                self._halt(now)  # nothing would tell how it turns; it begins anew
+                self._halt(now)  # its turn would be unknown; the motion is started again
         else:
             self._polls.press(word)
 

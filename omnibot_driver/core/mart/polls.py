@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is asked when, while nothing else is: each query at its own pace, by the state of motion.
+"""The schedule of queries while no other request is pending, by the state of motion.
 
-Encoder and heading come first, and take turns; a sonar takes 55 ms, so it is asked only
-while the robot stands. Knows queries and states; time is an argument.
+Encoder and heading are the most frequent, and alternate. A sonar takes 55 ms, so it is queried only
+while the robot is at rest. This module knows queries and states; time is an argument.
 """
 
 import math
@@ -31,24 +31,29 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.REVERSING: DRIVING,
     State.TURNING: TURNING,
 }
-"""By state, the most pressing first. In all others the command port is busy."""
+"""Period in s of each query by state, the most urgent first. In other states the port is busy."""
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""Both report the same where nothing is near. A copy of one reply is not to be the other's."""
+"""The two sonars, and the least time in s between their queries.
+
+Both report the same value where nothing is near, so a duplicate of one reply could be taken for the
+other's.
+"""
 
 
 class Polls:
-    """The times of the last queries."""
+    """The times at which each query was last sent."""
 
     def __init__(self) -> None:
         self._asked_s: dict[Word, float] = {}
 
     def connect(self) -> None:
-        """Everything is due."""
+        """Make all queries due."""
         self._asked_s.clear()
 
     def due(self, state: State, now: float) -> list[Word]:
-        """The queries whose time has come, first the one that is late by most of its periods: where
-        an exchange takes longer than a period, each has its turn.
+        """Return the queries that are due, in the order in which they become a full period late.
+
+        Thus each gets its turn where an exchange takes longer than a period.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]
@@ -67,7 +72,7 @@ class Polls:
         self._asked_s.pop(word, None)
 
     def wake_at(self, state: State) -> float:
-        """The time of the next query."""
+        """Return the time of the next query."""
         return min((self._at(word, state) for word in PERIODS.get(state, {})), default=math.inf)
 
     def _at(self, word: Word, state: State) -> float:

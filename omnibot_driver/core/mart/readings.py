@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What only a MART controller measures or answers, in SI units: values only."""
+"""Readings and results that only a MART controller delivers, in SI units: values only."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,14 +10,17 @@ Side = Literal["front", "rear"]
 
 @dataclass(frozen=True, slots=True)
 class BatteryReading:
-    """The main battery."""
+    """The voltage of the main battery, in V."""
 
     volts: float
 
 
 @dataclass(frozen=True, slots=True)
 class SonarReading:
-    """``distance_m`` is infinite where nothing is seen, or the sonar answers -1."""
+    """The distance to an obstacle, in m.
+
+    ``distance_m`` is infinite if nothing is in range, or if the sonar answers -1.
+    """
 
     side: Side
     distance_m: float
@@ -25,14 +28,17 @@ class SonarReading:
 
 @dataclass(frozen=True, slots=True)
 class DockedReading:
-    """Whether the robot stands at its dock."""
+    """Whether the robot is at its dock."""
 
     docked: bool
 
 
 @dataclass(frozen=True, slots=True)
 class JobDone:
-    """The result of a service. ``name``, ``content``: of a file, if one was requested."""
+    """The result of a job.
+
+    ``name``, ``content``: name and bytes of the file, if one was requested.
+    """
 
     token: object
     success: bool

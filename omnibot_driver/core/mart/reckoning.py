@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Where the robot was when it was counted, by the way of its right wheel and the relative heading.
+"""The pose at the last count, from the distance of the right wheel and the relative heading.
 
-The server reports the heading while RM drives; of a turn on the spot the wheel gives it until the
-reply to SM does; of a controlled move nothing is known before its end. Knows counts, degrees and
-metres; no words. Time is an argument.
+The server reports the heading while RM drives. A turn on the spot is measured by the wheel until
+the reply to SM reports it. Nothing is known of a controlled move before its end. This module knows
+counts, degrees and metres; it knows no commands. Time is an argument.
 """
 
 import math
@@ -22,24 +22,29 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 WINDOW_S, SPREADS = 0.35, 4
-"""Speeds are averages over this time, or over this multiple of a reply's uncertainty if longer."""
+"""Window in s over which speeds are averages, or multiple of a reply's uncertainty if longer."""
 LEAST_S: Final = 0.05
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""A reported turn that is further from the wheel's turn is the answer to another question."""
+"""Largest difference of a reported turn from the wheel's: in rad, plus a part of the turn.
+
+A reported turn that differs by more is the answer to another question.
+"""
 BEGIN_RADPS: Final = 0.03
-"""Turn rate of unequal motors that begin alike, before the first heading."""
+"""Turn rate in rad/s of unequal motors with equal units, before the first heading of RM."""
 BLIND_MPS: Final = 0.3
-"""A robot of which nothing is heard is anywhere within this speed."""
+"""Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""What a motion may have done of which the end was not heard."""
+"""Standard deviations of the motion, in m and rad, if its end was not received."""
 ANY_RAD: Final = 1.8
-"""Any heading, as a standard deviation."""
+"""Standard deviation of an unknown heading, in rad."""
 
 
 class Reckoning:
-    """``pose``: at the last count. ``stands``: it was stopped. ``left_over_right``: of the wheels'
-    speeds, where the heading is unknown and the commanded speeds have to do; ``bend``: its standard
-    deviation.
+    """Dead reckoning by count and heading.
+
+    ``pose``: pose at the last count; ``stands``: whether the robot was stopped;
+    ``left_over_right``: ratio of the wheels' speeds as commanded, used where the heading is
+    unknown, else None; ``bend``: standard deviation of that ratio.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -63,7 +68,7 @@ class Reckoning:
 
     @property
     def settings(self) -> MartSettings:
-        """Sizes and scales; may be replaced."""
+        """The sizes and scales of the robot; may be replaced."""
         return self._settings
 
     @settings.setter
@@ -71,12 +76,12 @@ class Reckoning:
         self._settings = self.doubt.settings = settings
 
     def reset(self) -> None:
-        """The frame begins here."""
+        """Begin a new frame at the present pose."""
         self.pose = Pose()
         self.doubt.reset()
 
     def connect(self) -> None:
-        """The server was not heard for long: it may have gone on, or have begun anew."""
+        """Begin a new connection: the server may have continued or restarted during the silence."""
         self.wheel.connect()
         if self.motion is Motion.NONE:
             self.heading.forget()
@@ -85,7 +90,7 @@ class Reckoning:
         self.forget_speeds()
 
     def begin(self, motion: Motion, now: float) -> None:
-        """A motion has begun, and the count with it."""
+        """Note that a motion has begun, and with it the count."""
         self.motion, self.stands = motion, False
         self._began_s, self._stood_s = now, math.inf
         self.slowing_since_s = None
@@ -97,22 +102,25 @@ class Reckoning:
         self.told_rad, self._guessed = None, False
 
     def started(self, now: float, *, sure: bool) -> None:
-        """The server has answered that it has. ``sure``: its answer is not another's."""
+        """Note that the server has acknowledged the start.
+
+        ``sure``: whether the reply certainly belongs to this start.
+        """
         if sure:
             self.wheel.started()
         self.heading.changed_s = now
 
     def stopping(self, now: float) -> None:
-        """A stop was sent to the robot."""
+        """Note that a stop was sent to the robot."""
         if self.slowing_since_s is None:
             self.slowing_since_s = now
 
     def stand(self, now: float) -> None:
-        """It was stopped; how it rolled out is not counted yet."""
+        """Note that the robot was stopped; its roll-out is not counted yet."""
         self.stands, self._stood_s = True, now
 
     def rest(self) -> None:
-        """The motion is over, and how it rolled out is counted."""
+        """Note that the motion is over and its roll-out is counted."""
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:
@@ -126,7 +134,7 @@ class Reckoning:
         self.forget_speeds()
 
     def turned(self, degrees: float, when: Moment) -> bool:
-        """The relative angle; whether it is believed, and has changed."""
+        """Take a relative angle in degrees; return whether it is believed and has changed."""
         if when.from_s < self._began_s:
             return False
         known = self.heading.is_known
@@ -137,13 +145,17 @@ class Reckoning:
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """The sides were changed against each other by this part, some time within this."""
+        """Add the error of a change of the wheels' speed ratio whose time is uncertain.
+
+        ``part``: the change; ``late_s``: the interval in s in which it takes effect.
+        """
         turn_rad = part * abs(self.speeds[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
 
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
-        """The right wheel's count; None for one that cannot be believed, or may be of an earlier
-        motion.
+        """Return the displacement since the last count of the right wheel.
+
+        It is None for a count that is not believed, or that may be of an earlier motion.
         """
         if when.from_s < self._began_s:
             return None
@@ -173,12 +185,12 @@ class Reckoning:
 
     @property
     def maybe(self) -> tuple[float, float]:
-        """In m and rad, what a motion has done that may not have begun."""
+        """What a motion that may not have begun would have done, in m and rad."""
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """The turn on the spot that takes the wheel so far; zero in other motions."""
+        """Return the turn in rad that moves the wheel by ``wheel_m``; zero unless on the spot."""
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property
@@ -186,12 +198,12 @@ class Reckoning:
         return self.motion in (Motion.SPIN, Motion.TURN)
 
     def _turn_rad(self, wheel_m: float, at_s: float, seconds: float) -> float:
-        """Since the last count."""
+        """Return the turn since the last count, in rad."""
         turned_rad = self.heading.turned_rad(at_s, stands=self.stands)
         told_rad = turned_rad - self._motion_rad
         if self.motion is Motion.NONE and not wheel_m:
             self._motion_rad = turned_rad
-            return 0.0  # some servers let the heading of a standing robot drift
+            return 0.0  # on some servers the heading of a robot at rest drifts
         ratio = self.left_over_right
         if not self.on_the_spot:
             if ratio is None:
@@ -206,8 +218,9 @@ class Reckoning:
         return turn_rad if self.told_rad is None else 0.0  # the reported turn includes it
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """Correct the guessed part of this motion's turn when the first heading is reported. The
-        correction is not a motion of the robot. Returns it in rad.
+        """Correct this motion's guessed turn at the first reported heading.
+
+        Return the correction in rad, which is not a motion of the robot.
         """
         if not self._guessed:
             return 0.0
@@ -219,7 +232,7 @@ class Reckoning:
         return wrong_rad
 
     def spin_told(self, degrees: float) -> None:
-        """What the server has measured of a turn on the spot that is over, in the board's sign."""
+        """Take the turn on the spot that the server reports, in degrees of the board's sign."""
         self.told_rad = math.radians(degrees) * self._settings.heading_sign
         self._correct_yaw(self.told_rad - self.spun_rad)
 
@@ -229,7 +242,10 @@ class Reckoning:
         self._yaw_rad += wrong_rad
 
     def _finish_turn(self) -> None:
-        """A turn on the spot is over, and counted. The reported angle may be another number."""
+        """End a turn on the spot that is counted.
+
+        The reported angle is dropped if it may be another number.
+        """
         told_rad = self.told_rad
         wrong_rad = 0.0 if told_rad is None else self.spun_rad - told_rad
         if abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(self.spun_rad):
@@ -239,7 +255,7 @@ class Reckoning:
         self.told_rad = None
 
     def finish_straight(self) -> None:
-        """A straight controlled move is over: its heading was held, as far as the server can."""
+        """End a straight controlled move, in which the server held the heading as far as it can."""
         self.doubt.end_straight()
 
     def _move(self, way_m: float, turn_rad: float, seconds: float, wheel_m: float) -> None:
@@ -269,7 +285,7 @@ class Reckoning:
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """m/s and rad/s over the last ``WINDOW_S``, and over two counts at least; else zero."""
+        """Mean speeds over the window, from at least two counts, in m/s and rad/s; else zero."""
         if len(self._track) < 2:
             return 0.0, 0.0
         newest_s, way_m, yaw_rad = self._track[-1]
@@ -280,7 +296,7 @@ class Reckoning:
 
     @property
     def speed_changes(self) -> tuple[float, float]:
-        """m/s and rad/s by which it was faster or slower between the last two counts."""
+        """Speeds between the last two counts minus the mean speeds, in m/s and rad/s."""
         if len(self._track) < 2:
             return 0.0, 0.0
         (then_s, then_m, then_rad), (at_s, way_m, yaw_rad) = self._track[-2], self._track[-1]
@@ -293,5 +309,5 @@ class Reckoning:
         return max(WINDOW_S, SPREADS * self.spread_s)
 
     def forget_speeds(self) -> None:
-        """What is counted next is another motion."""
+        """Forget the counts for the speeds, as the next ones belong to another motion."""
         self._track.clear()

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How far the robot has turned in a motion, by the relative heading as it is polled.
+"""The turn of the robot within a motion, from polls of the relative heading.
 
-RM sets it to zero, and some servers let it stand in every other motion. Knows rad and times; no
-words. Time is an argument.
+RM resets the heading to zero; some servers do not update it in any other motion. This module knows
+rad and times; it knows no commands. Time is an argument.
 """
 
 import math
@@ -15,20 +15,22 @@ from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
-"""Of a robot that is not heard, as far as an uncertain heading is believed."""
+"""Turn acceleration and rate up to which an uncertain heading is believed."""
 OLD_RAD: Final = 0.01
-"""A first heading of RM that is so near to the last one before is that one."""
+"""A first heading of RM that is this near to the last one before it is regarded as old, in rad."""
 AHEAD_S: Final = 0.3
-"""It is predicted so far, to the time of a count."""
+"""Longest prediction of the heading to the time of a count, in s."""
 ODD_TIMES: Final = 3
-"""What has come so often is so."""
+"""Number of unlikely headings in a row after which they are believed."""
 SPREADS: Final = 4
-"""The turn rate is an average over this multiple of a reply's uncertainty."""
+"""Multiple of a reply's uncertainty over which the turn rate is averaged."""
 
 
 class RelativeHeading:
-    """``told_s``: time of the last reply; ``from_s``: the earliest time it can have, unless it
-    answers another question; ``changed_s``: time of the last change; ``rate_radps``: of the turn.
+    """The relative heading within a motion.
+
+    ``told_s``: time of the last reply; ``from_s``: its earliest possible time, unless it answers
+    another question; ``changed_s``: time of the last change; ``rate_radps``: turn rate in rad/s.
     """
 
     def __init__(self) -> None:
@@ -42,15 +44,15 @@ class RelativeHeading:
 
     @property
     def is_known(self) -> bool:
-        """Whether turns can be measured from now on."""
+        """Whether a heading is known from which turns can be measured."""
         return self._angle_rad is not None
 
     def forget(self) -> None:
-        """The next one may begin anew."""
+        """Forget the heading, as the next one may be relative to another zero."""
         self._angle_rad = None
 
     def begin(self, now: float, *, anew: bool) -> None:
-        """A motion has begun. ``anew``: with a heading of zero."""
+        """Note that a motion has begun. ``anew``: its heading begins at zero."""
         if anew:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
         self._turned_rad = 0.0
@@ -58,11 +60,14 @@ class RelativeHeading:
         self.changed_s = now
 
     def tell(self, angle_rad: float, when: Moment, stood_s: float) -> bool:
-        """Whether it is believed, and has changed. ``stood_s``: since when the robot stands."""
+        """Take a heading; return whether it is believed and has changed.
+
+        ``stood_s``: time since which the robot is at rest, infinite while it is driven.
+        """
         before_rad, before_s, at_s = self._angle_rad, self.told_s, when.at_s
         if before_rad is None:
             old = abs(angle_rad - self._before_rad) < OLD_RAD < abs(self._before_rad)
-            if not old or when.from_s >= stood_s:  # else of before RM, which may have been lost
+            if not old or when.from_s >= stood_s:  # else from before RM, which may be lost
                 self._take(angle_rad, when)
                 self.from_s = when.from_s
             return False
@@ -95,6 +100,6 @@ class RelativeHeading:
             self.rate_radps = (self._turned_rad - then_rad) / max(when.at_s - then_s, CLOCK_S)
 
     def turned_rad(self, at_s: float, *, stands: bool) -> float:
-        """Since the motion began, predicted to this time."""
+        """Return the turn since the motion began, predicted to ``at_s``, in rad."""
         ahead_s = 0.0 if stands else min(max(0.0, at_s - self.told_s), AHEAD_S)
         return self._turned_rad + self.rate_radps * ahead_s

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Datagrams of the MART controller as replies. Never raises on what comes in.
+"""The parser of the MART controller's datagrams; no input makes it raise.
 
-Knows the forms of replies; not what was asked.
+This module knows the forms of replies; it does not know what was asked.
 """
 
 import re
@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.mart.words import Form
 
 LONGEST_REPLY: Final = 300
-"""Bytes; what is longer is a piece of a file."""
+"""Longest reply in bytes; a longer datagram is a piece of a file."""
 _FORMS: Final = (
     (Form.NOTHING, re.compile(r"")),
     (Form.INTEGER, re.compile(r"[-+]?\d{1,10}")),
@@ -25,7 +25,7 @@ _FORMS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Ok:
-    """``ok`` and what follows it."""
+    """A reply that begins with ``ok``; ``text`` is what follows it."""
 
     form: Form
     text: str = ""
@@ -51,7 +51,7 @@ class Fail:
 
 @dataclass(frozen=True, slots=True)
 class Other:
-    """A datagram that is not a reply: a piece of a file, or of another program."""
+    """A datagram that is not a reply: a piece of a file, or data of another program."""
 
     data: bytes
 
@@ -60,13 +60,16 @@ Reply = Ok | Fail | Other
 
 
 class MartDecoder:
-    """Each datagram is a whole, so nothing is held. ``foreign``: those that are not replies."""
+    """The decoder of replies. Each datagram is complete, so nothing is held.
+
+    ``foreign``: number of datagrams that are not replies.
+    """
 
     def __init__(self) -> None:
         self.foreign = 0
 
     def feed(self, data: bytes, now: float) -> list[Reply]:
-        """Parse one datagram; an empty one gives nothing."""
+        """Parse one datagram; return an empty list for an empty one."""
         if not data:
             return []
         reply = parse(data)
@@ -94,5 +97,5 @@ def parse(data: bytes) -> Reply:
 
 
 def signed(count: int) -> int:
-    """A signed number of 32 bits, as some servers omit the sign of a negative count."""
+    """Return the count as a signed 32-bit number; some servers omit the sign of a negative one."""
     return (count + 2**31) % 2**32 - 2**31

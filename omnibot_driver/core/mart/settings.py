@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the wire of a MART controller does not tell: sizes, scales and the network. Values only."""
+"""What a MART controller does not report: sizes, scales and the network. Values only."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,10 +8,13 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MartSettings:
-    """``metres_per_count``: of the right wheel's encoder, negative where forward counts down;
-    ``speed_per_unit``: of a wheel, in m/s for one unit of RM at ``nominal_volts``;
-    ``heading_sign``: 1 where a positive relative angle is to the left; ``network_delay_s``: how
-    long a datagram may be on its way; ``spin_speed``: how R and L are given a speed.
+    """The settings of one robot with a MART controller.
+
+    ``metres_per_count``: distance in m that the right wheel rolls per encoder count, negative where
+    forward counts down; ``speed_per_unit``: speed of a wheel in m/s for one unit of RM at
+    ``nominal_volts``; ``heading_sign``: 1 where a positive relative angle is to the left, else -1;
+    ``network_delay_s``: longest time that a datagram may be on its way, in s; ``spin_speed``:
+    whether R and L turn at the commanded speed (set by SSP) or at the server's own SLOW speed.
     """
 
     wheel_radius_m: float = 0.0625

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a motion begins and is changed: a fresh proof of the IMU, then the one word for it.
+"""The start and adjustment of motions: a fresh proof of the IMU, then the start command.
 
-Knows what is wanted and the words that start; not when a motion must end. Time is an argument.
+This module knows what is wanted and the commands that start; it does not know when a motion must
+end. Time is an argument.
 """
 
 from typing import Final
@@ -26,17 +27,20 @@ from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A heading that has not changed for this time is made to: the robot may just drive straight."""
+"""Time in s after which an unchanged heading is made to change, and the units for it.
+
+The robot may just be driving straight, or the IMU may be dead.
+"""
 AGAIN_S: Final = 1.0
-"""After a start that failed."""
+"""Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Of the slowest controlled moves, with a margin."""
+"""Duration of the slowest controlled moves, in s per inch and degree, with a margin."""
 SLOW_UNITS: Final = 20
-"""Of B SLOW, R SLOW and L SLOW."""
+"""Motor units of B SLOW, R SLOW and L SLOW."""
 
 
 class Starts(Moves):
-    """The part of the pilot that starts, and adjusts."""
+    """The part of the pilot that starts and adjusts motions."""
 
     def _act(self, now: float) -> Packets:
         if self.state is State.STILL:
@@ -46,7 +50,7 @@ class Starts(Moves):
         return NO_PACKETS
 
     def _adjust(self, now: float) -> Packets:
-        """One change of the motors' units, where the measured speed asks for one."""
+        """Change the motors' units once, if the measured speed requires it."""
         if self.state is State.DRIVING and not self.odometry.heading.is_known:
             self._polls.press(words.RMRA)
             return NO_PACKETS
@@ -55,7 +59,7 @@ class Starts(Moves):
         change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
         self.commanded = twist
         if change is None and self._heading_is_told and self._frozen_s > WAG_S:
-            change = (-WAG_UNITS, WAG_UNITS)  # one that lives shows it; the next change undoes it
+            change = (-WAG_UNITS, WAG_UNITS)  # a living IMU shows it; the next change undoes it
         if change is None:
             return NO_PACKETS
         right, left = change
@@ -71,7 +75,7 @@ class Starts(Moves):
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
         if not self._rolled_out:
-            return NO_PACKETS  # how it rolled out is counted before the count begins anew
+            return NO_PACKETS  # the roll-out is counted before the count begins anew
         if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
             self._estop_said_s = now
             self.proof.stopped(now)
@@ -89,7 +93,7 @@ class Starts(Moves):
         if packets := self._prepare_spin(start, now):
             return packets
         if self.odometry.wheel.from_s < self._harmful_s + self._delay_s:
-            return NO_PACKETS  # a late copy of a move would have the port now
+            return NO_PACKETS  # a late copy of a move would block the port now
         if now < self._halted_s + self._delay_s:
             return NO_PACKETS  # a late copy of a stop would end what begins
         if start.word in NEEDS_IMU and not self.imu.fresh(now):
@@ -120,7 +124,7 @@ class Starts(Moves):
         return word.request("CUSTOM")
 
     def _prepare_spin(self, start: Request, now: float) -> Packets:
-        """R and L take their speed from SSP, which has to come before the check of the IMU."""
+        """Set the speed of R and L by SSP, which must come before the check of the IMU."""
         if start.word not in (words.R, words.L) or self._spin_is_fixed:
             return NO_PACKETS
         _, twist = self._wish(now)
@@ -142,7 +146,7 @@ class Starts(Moves):
         )
 
     def _check(self, now: float) -> Packets:
-        """As soon as its reply cannot be mistaken for a late one."""
+        """Check the IMU, as soon as the reply cannot be mistaken for a late one."""
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
             return NO_PACKETS
@@ -198,7 +202,7 @@ class Starts(Moves):
         return self.conversation.ask(start, now, takes_s=_longest_s(start))
 
     def _learn(self, turned_rad: float, now: float) -> None:
-        """What the motors make of their units."""
+        """Learn the effect of the motors' units from the last measurement."""
         speed, rate = self.odometry.speeds
         blind = self.odometry.left_over_right is not None
         self.loop.trip_s = self.conversation.trip_s
@@ -206,7 +210,7 @@ class Starts(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Where RMRA does not tell how the robot turns, the motors' units and gains have to."""
+        """Predict the turn from the motors' units and gains where RMRA does not report it."""
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
             self.odometry.left_over_right = self.loop.left_over_right
@@ -226,12 +230,12 @@ class Starts(Moves):
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        self.odometry.started(now, sure=not answer.when.doubtful)  # else maybe that of RST IMU
+        self.odometry.started(now, sure=not answer.when.doubtful)  # else maybe it answers RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 
     def _start_failed(self, reply: Fail, now: float) -> None:
-        """It may still move."""
+        """Stop the robot after a failed start, as it may move nevertheless."""
         word = self._start
         assert word is not None
         self._again_s = now + AGAIN_S
@@ -248,8 +252,10 @@ class Starts(Moves):
         self._halt(now, f"{word.text} failed ({reply.reason or 'no reason given'}): {why}")
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Some servers give the reason of the last B, whatever RM failed for: an obstacle is only
-        believed where the front sonar sees one, or RM has failed by it twice in a row.
+        """Return whether the failure text of RM may belong to the last B, as on some servers.
+
+        So an obstacle is believed only if the front sonar sees one, or if RM has failed by one
+        twice in a row.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False
@@ -277,7 +283,7 @@ class Starts(Moves):
 
 
 def _longest_s(start: Request) -> float:
-    """How long the server may take to answer it."""
+    """Return how long the server may take to answer a start, in s."""
     if start.word.kind is not Kind.MOVE:
         return start.word.takes_s
     asked = float(start.data.split()[-1])

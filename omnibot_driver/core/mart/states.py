@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What may be said to the MART controller in which state of motion, as data.
+"""The table of commands that may be sent to the MART controller in each state of motion.
 
-Some commands hang the real server for good in the wrong state, with the motors turning. So whatever
-is sent is looked up here first. Knows words; no times but that of the network, no measurements.
+Some commands hang the real server for good in the wrong state, with the motors turning. So each
+command is looked up here before it is sent. This module knows commands and states; it knows no
+times and no measurements.
 """
 
 from collections.abc import Mapping
@@ -48,7 +49,7 @@ from omnibot_driver.core.mart.words import (
 
 
 class State(Enum):
-    """Of the robot's motion, as far as the replies tell."""
+    """The state of the robot's motion, as far as the replies show it."""
 
     UNKNOWN = "not known: the server may be moving the robot"
     STILL = "still"
@@ -65,7 +66,7 @@ class State(Enum):
 
 
 class Motion(Enum):
-    """What the server is, or may be, moving the robot by."""
+    """The command by which the server moves, or may move, the robot."""
 
     NONE = "none"
     REFERENCE = "RM"
@@ -77,7 +78,7 @@ class Motion(Enum):
 
 
 QUICK: Final = frozenset({ENC, RMRA, VOLTS, MCSTAT, DOCKED, HELLO})
-"""Answered at once, in any state in which the command port is free."""
+"""Queries that are answered at once in any state in which the command port is free."""
 
 MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.UNKNOWN: frozenset({HELLO, SRM, SM}),
@@ -95,7 +96,10 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.ASKING: frozenset({HELLO, ENC, RESET, SL, SS}),
     State.LOST: frozenset({HELLO, SRM, SM, SL, SS}),
 }
-"""All that start, and SB, besides only right after a proof of the IMU (RESET or CHECK)."""
+"""The commands that are allowed in each state.
+
+Those in NEEDS_IMU also require that the IMU was proved just before (by RESET or CHECK).
+"""
 
 HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.NONE: (),
@@ -106,7 +110,7 @@ HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SRM, SM),
 }
-"""What stops it. Any other word does nothing, or hangs the server."""
+"""The commands that stop each motion. Any other command has no effect, or hangs the server."""
 
 LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.NONE: (),
@@ -117,7 +121,7 @@ LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SL, SS),
 }
-"""Where the command port is silent: it stops the motors, and may hang the server."""
+"""The commands that stop the motors when the command port is silent; they may hang the server."""
 
 STARTS: Final[Mapping[Word, Motion]] = {
     RM: Motion.REFERENCE,
@@ -129,17 +133,21 @@ STARTS: Final[Mapping[Word, Motion]] = {
     MCR: Motion.TURN,
     MCL: Motion.TURN,
 }
-"""What a word begins."""
+"""The motion that each command begins."""
 
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
-"""With a dead IMU these start the motors and never answer, or go on when it is back. MCR and MCL
-find it out, but some servers turn the robot for half a second first.
+"""Commands that need a living IMU.
+
+With a dead IMU they start the motors and never answer, or begin when the IMU is back. MCR and MCL
+notice the dead IMU, but some servers turn the robot for half a second first.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
-"""A copy of one of these that arrives late does something else than it was meant to do, once
-another motion has begun: no motion begins, and no check is made for one, before no copy can come
-any more."""
+"""Commands that do harm if a duplicate of them arrives late, when another motion has begun.
+
+So after one of these, no motion begins and no check for one is made until a duplicate can no longer
+come.
+"""
 
 WHILE: Final[Mapping[Motion, State]] = {
     Motion.NONE: State.STILL,
@@ -149,11 +157,14 @@ WHILE: Final[Mapping[Motion, State]] = {
     Motion.STRAIGHT: State.MOVING,
     Motion.TURN: State.MOVING,
 }
-"""The state in which it is under way, once it has begun."""
+"""The state of each motion once it has begun."""
 
 
 def may_say(state: State, word: Word, motion: Motion) -> bool:
-    """Whether the server can take it now. ``motion``: which is, or may be, under way."""
+    """Return whether the server can take the command now.
+
+    ``motion``: the motion that is, or may be, in progress.
+    """
     if word not in MAY_SAY[state]:
         return False
     if state in (State.STARTING, State.MOVING):

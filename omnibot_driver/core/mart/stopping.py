@@ -1,13 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stopping one motion: what is said until the server has answered it. The stop never waits.
+"""The stop of one motion: the commands to send until the server has acknowledged it.
 
-The right word goes out at once, over whatever else was asked, and again until it is answered. A
-start may still be on its way, and be overtaken. So a reply counts only where it must answer a stop
-that was sent when no copy of the start could come any more, and a bare ``ok`` only where none is
-owed to the start; a repeated stop brings a plainer one. The stop port comes
-last, alone: right behind SM or SRM it would race with them, and hang a port. Knows words, replies
-and times; not why it is stopped.
+The stop never waits: the right command is sent at once, even if another request is pending, and
+again until it is answered. A start may still be on its way, and be overtaken. So a reply is
+accepted only if it must answer a stop that was sent when no duplicate of the start could come any
+more, and a bare ``ok`` only if the start is not still owed one; repeating the stop brings a clearer
+reply. The stop port comes last and alone: right after SM or SRM it would race with them, and hang a
+port. This module knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
@@ -19,7 +19,7 @@ from omnibot_driver.core.mart.words import NO_MOTION, NOT_IN_MOTION, Form, Word
 
 REPEAT_S: Final = 0.3
 ROUNDS: Final = 3
-"""So often it is said before the stop port is."""
+"""Number of stops on the command port before the stop port is used."""
 STOP_PORT_TIMES: Final = 3
 ANSWERS: Final = {
     Motion.REFERENCE: (Form.NOTHING,),
@@ -27,14 +27,17 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""What follows ``ok`` when the server has stopped it."""
+"""The forms of a reply when the server has stopped the motion."""
 ASK_NAME_S: Final = 0.9
-"""After the first stop of a controlled move, which ends within this time."""
+"""Time in s after the first stop of a controlled move within which the move ends."""
 
 
 class Stopping:
-    """``started_s``: when the start was sent; ``owed``: replies to other requests that look alike;
-    ``move``: the controlled move whose own reply ends it.
+    """The stop of one motion.
+
+    ``began_s``: time of the first stop; ``started_s``: time at which the start was sent; ``owed``:
+    number of expected replies to other requests that look alike; ``move``: the controlled move
+    whose own reply ends it.
     """
 
     def __init__(
@@ -50,12 +53,12 @@ class Stopping:
         self.motion, self.move = motion, move
         self.began_s = now
         self.result: Ok | Fail | None = None
-        """The reply of the motion itself, where there was one."""
+        """The reply of the motion itself, or None."""
         self.began: bool | None = None
-        """Whether the motion had begun; None where the replies do not tell."""
+        """Whether the motion had begun; None if the replies do not show it."""
         self.wake_at = now
         self.last_port = 0
-        """How often the stop port was used as the last resort."""
+        """Number of times that the stop port was used as the last resort."""
         self._delay_s = delay_s
         self._said_s = now
         self._sure_from_s = started_s + delay_s
@@ -69,7 +72,7 @@ class Stopping:
         self._silent_from_s = now + self._patience_s
 
     def due(self, now: float) -> tuple[Word, ...]:
-        """What to say now."""
+        """Return the commands to send now."""
         if now < self.wake_at:
             return ()
         silent = self._rounds >= ROUNDS and now >= self._silent_from_s
@@ -87,27 +90,28 @@ class Stopping:
         return HALTS[self.motion]
 
     def asks_name(self, now: float) -> bool:
-        """Whether the server is asked for its name too: the reply to a move may have been lost,
-        and the one that names it has finished the move.
+        """Return whether to ask for the server's name too, since the reply to a move may be lost.
+
+        A server that gives its name has finished the move.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 
     @property
     def failed(self) -> bool:
-        """Neither port has brought an answer."""
+        """Whether neither port has brought an answer."""
         return self.last_port >= STOP_PORT_TIMES
 
     def hear(self, reply: Reply, now: float) -> bool:
-        """Whether it is over by this reply."""
+        """Return whether this reply ends the motion."""
         if self.move is not None:
             return self._hear_move(reply, self.move, now)
         if self.last_port:
-            return False  # the stop port may have left the server unable to begin or end anything
+            return False  # after the stop port, the server may be unable to begin or end anything
         if not self._is_answer(reply):
             return False
         self._silent_from_s = now + self._patience_s
         none = isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION)
-        if now >= self._own_from_s:  # it answers the start or a stop: all others have come
+        if now >= self._own_from_s:  # it answers the start or a stop: all other replies have come
             if not none and not _is_number(reply):
                 self.began = True
             elif none and self._rounds == 1:

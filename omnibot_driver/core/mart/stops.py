@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When a motion must not go on, and how it is ended. Whatever is in doubt is stopped.
+"""The reasons to stop a motion, and the stop itself. Whatever is uncertain is stopped.
 
-Knows what is wanted, what is measured, and the words that stop; not how a motion begins. Time is an
-argument.
+This module knows what is wanted, what is measured, and the commands that stop; it does not know how
+a motion begins. Time is an argument.
 """
 
 import math
@@ -28,20 +28,24 @@ from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 BLIND_S, TRIPS = 0.8, 3
-"""A robot that drives without counts for this time and this many exchanges is stopped."""
+"""Time in s, plus a number of exchanges, after which driving without measurements is stopped."""
 FROZEN_S: Final = 0.5
-"""A heading that does not change at all while the robot drives for this time, and two exchanges
-more, comes of no living IMU.
-"""
+"""Time in s, plus two exchanges, after which a constant heading while driving shows a dead IMU."""
 NO_START_S: Final = 1.5
-"""A wheel that is driven turns by then."""
+"""Time in s within which a driven wheel turns."""
 SPIN_RATIO: Final = 0.35
-"""A turn on the spot keeps its speed; a command that differs by this part starts it anew."""
+"""Part by which the commanded turn rate must change to restart a turn on the spot.
+
+The rate of such a turn cannot be changed.
+"""
 SPIN_RAD, SPIN_PART = 0.15, 0.4
-"""What a stop tells of a turn on the spot is that near to what was counted and commanded."""
+"""Largest error of the turn that the reply to a stop reports: in rad, plus a part of the turn.
+
+The counted and commanded turn is the reference.
+"""
 LOST_REPEAT_S: Final = 1.0
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
-"""A slower command stands still."""
+"""Commands below both limits, in m/s and rad/s, are regarded as a standstill."""
 NAMES: Final = {
     Motion.REFERENCE: "RM",
     Motion.REVERSE: "B",
@@ -55,7 +59,7 @@ ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
 
 
 class Stops(Ground, ABC):
-    """The part of the pilot that stops."""
+    """The part of the pilot that stops motions."""
 
     def _order(self, now: float) -> Drive | GoTo | None:
         wanted = self._wanted
@@ -65,7 +69,7 @@ class Stops(Ground, ABC):
         return order if isinstance(order, Drive | GoTo) else None
 
     def _wish(self, now: float) -> tuple[Motion, BodyTwist]:
-        """The motion that is wanted, and how fast."""
+        """Return the wanted motion and its twist."""
         order = self._order(now)
         if not isinstance(order, Drive):
             return Motion.NONE, STANDING
@@ -80,7 +84,7 @@ class Stops(Ground, ABC):
         return motion, BodyTwist(speed, 0.0, rate)
 
     def _agrees(self, now: float) -> bool:
-        """Whether the present motion is the one that is wanted."""
+        """Return whether the present motion is the wanted one."""
         motion, twist = self._wish(now)
         if self.motion in (Motion.STRAIGHT, Motion.TURN):
             return self._move is not None or self.jobs.moving or self._rescue
@@ -99,7 +103,10 @@ class Stops(Ground, ABC):
         return self._custom_refused or self._settings.spin_speed == "fixed"
 
     def _why_stop(self, now: float) -> str:
-        """Why what is under way must not go on: a sentence, "wanted", or empty."""
+        """Return why the present motion must not continue: a sentence, "wanted", or empty.
+
+        "wanted" means that another motion is wanted.
+        """
         if self.state not in (State.STARTING, State.MOVING, *ROLLING):
             return ""
         if self.health.tripped:
@@ -130,15 +137,15 @@ class Stops(Ground, ABC):
 
     @property
     def _frozen_s(self) -> float:
-        """For how long of this motion the headings that came have been the same."""
+        """Time in s for which the headings in this motion have been constant."""
         odometry = self.odometry
         return odometry.heading.told_s - max(odometry.heading.changed_s, self._begun_s)
 
     def _halt(self, now: float, why: str = "") -> None:
-        """Stop what is, or may be, under way."""
+        """Begin to stop the motion that is, or may be, in progress; ``why`` is reported."""
         if why:
             self._notice(f"{why}; robot stopped", halt=True)
-            self._custom_units = None  # a server that was started again has forgotten it
+            self._custom_units = None  # a restarted server has forgotten it
         pending = self.conversation.pending
         answers = ANSWERS.get(self.motion, ())
         owed = int(pending is not None and any(form in answers for form in pending.word.forms))
@@ -174,7 +181,7 @@ class Stops(Ground, ABC):
         return packets
 
     def _stopped(self, now: float) -> None:
-        """The server has answered the stop."""
+        """Note that the server has answered the stop."""
         stopping, self._stopping = self._stopping, None
         self._moved_by = None  # it was cut short
         self.conversation.settle(now)
@@ -199,8 +206,9 @@ class Stops(Ground, ABC):
         self._rest(now)
 
     def _may_be_count(self, reply: Reply, now: float) -> bool:
-        """Whether a number that comes while a turn on the spot is stopped is a late encoder count
-        and not the answer to the stop: the robot cannot have turned by this angle.
+        """Return whether a number that comes while a turn on the spot is stopped is not its answer.
+
+        It is a late encoder count, if the robot cannot have turned by this angle.
         """
         stopping = self._stopping
         assert stopping is not None
@@ -231,7 +239,10 @@ class Stops(Ground, ABC):
             self.loop.spun(self._spin_units, steady_radps)
 
     def _lose(self, now: float, why: str = "") -> None:
-        """The server answers no more, or begins nothing any more, and may be moving the robot."""
+        """Regard the server as lost: it does not answer or begin motions.
+
+        It may be moving the robot.
+        """
         self._stopping = None
         self.state = State.LOST
         self._said_lost_s = now if why else -math.inf
@@ -255,17 +266,17 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:
-        """What comes where the stop port was used for a motion that is not known."""
+        """Begin to find out what moves, after the stop port was used for an unknown motion."""
 
     def _obstacle(self, reply: Fail, motion: Motion) -> str:
-        """What a failure within a motion means."""
+        """Return the meaning of a failure within a motion, and block an obstacle's direction."""
         if reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
             return f"the controller reports an obstacle ({reply.reason})"
         return f"the controller has ended the motion ({reply.reason or 'no reason given'})"
 
     def _failed(self, motion: Motion, reply: Fail, now: float) -> None:
-        """How a motion ended, by the reply to its stop."""
+        """Report how a motion ended, by the failure that its stop returned."""
         if reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
         elif reply.reason == words.IMU_LOST:
@@ -275,7 +286,7 @@ class Stops(Ground, ABC):
             self._notice(f"the controller reports: {reply.reason or 'fail'}", halt=True)
 
     def _block(self, motion: Motion, why: str) -> None:
-        """Not that way, until the way is another or the command has ceased."""
+        """Refuse this direction until another one is wanted or the command has ended."""
         if self._blocked is not motion:
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"

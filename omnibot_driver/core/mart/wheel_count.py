@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How far the right wheel has turned, by a count that begins anew with each motion.
+"""The distance rolled by the right wheel, from a count that begins anew with each motion.
 
-A reply may be that to an earlier question, and another number than the count. So a count that does
-not fit is left out; one that comes again and again is taken, as one that tells no way. Knows counts
-and times; no metres per count but the one given. Time is an argument.
+A reply may answer an earlier question, or be another number than the count. So an implausible count
+is left out. If it comes again and again it is accepted; an impossibly large step then adds no
+distance. This module knows counts and times; it knows no metres per count but the argument. Time is
+an argument.
 """
 
 import math
@@ -14,20 +15,25 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""A doubtful count is as near as that to what was expected."""
+"""Largest error of a doubtful count against the expected one: in m, plus m/s times the time."""
 MOST_M, MOST_MPS = 0.3, 2.0
-"""No wheel goes farther between two counts: one of them is false."""
+"""Largest distance of a wheel between two counts: in m, plus m/s times the time between.
+
+A larger difference shows that one of the counts is false.
+"""
 STRAY_COUNTS: Final = 3
-"""A robot that stands is counted no farther."""
+"""Largest change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""The count of a robot that is driven is not twice that of before: the start was lost."""
+"""Number of counts equal to the one before the start that show that the start was lost."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """``wheel_m``: since the last count, in ``seconds``. ``lost``: what else the robot has done
-    between is not known. ``unsure``: it may be zero as well.
+    """The distance between two counts.
+
+    ``wheel_m``: distance in m; ``seconds``: time between the counts. ``lost``: the robot has also
+    moved by an unknown amount between; ``unsure``: the distance may be zero instead.
     """
 
     wheel_m: float
@@ -37,9 +43,12 @@ class Step:
 
 
 class WheelCount:
-    """``last``: None where nothing was counted; ``told_s``: when, ``from_s``: at the earliest;
-    ``certain``: it cannot be the answer to another question. ``maybe``: the counts of a motion that
-    was not answered, and has begun or not: they are the same as those of the motion before.
+    """The count of the right wheel's encoder.
+
+    ``last``: last count, or None before the first; ``told_s``: its time; ``from_s``: its earliest
+    possible time; ``certain``: whether it cannot be the answer to another question. ``maybe``: the
+    count of a motion that was not acknowledged and whose count equals the one before its start, so
+    it has begun or not; else 0.
     """
 
     def __init__(self) -> None:
@@ -48,34 +57,34 @@ class WheelCount:
         self.certain = False
         self.maybe = 0
         self.may_begin_anew = False
-        """The next count may be from zero on, by the check of the IMU."""
+        """Whether the next count may begin at zero, as after a motion or the check of the IMU."""
         self._raw: int | None = None
         self._before: int | None = None
         self._begins = self._confirmed = self._unseen = False
         self._same = self._odd = 0
 
     def begin(self) -> None:
-        """A motion has begun, and the count with it, if the start has come."""
+        """Note that a motion was started; the count begins at zero if the start has arrived."""
         self._before, self.last = self.last, 0
         self.may_begin_anew = self._begins = True
         self.certain = self._confirmed = False
         self._same = self.maybe = 0
 
     def started(self) -> None:
-        """The server has answered that it has."""
+        """Note that the server has acknowledged the motion."""
         self._confirmed = True
 
     def refused(self) -> None:
-        """It has not, by the reply to its stop: the count goes on."""
+        """Note that the motion did not begin, by the reply to its stop: the count continues."""
         if not self._confirmed:
             self.last, self._begins = self._before, False
 
     def connect(self) -> None:
-        """The server was not heard for long: it may have gone on, or have begun anew."""
+        """Begin a new connection: the server may have continued or restarted during the silence."""
         self.may_begin_anew = self._unseen = True
 
     def rest(self) -> None:
-        """The motion is over."""
+        """Note that the motion is over."""
         self.last, self._begins = self._raw, False
         self.maybe = 0
 
@@ -89,8 +98,10 @@ class WheelCount:
         *,
         rests: bool,
     ) -> Step | None:
-        """None for a count that is not believed. ``expected_mps``: of the wheel; ``stood_s``: since
-        when the robot stands; ``rests``: without a motion since.
+        """Take a count; return the step since the last one, or None if it is not believed.
+
+        ``expected_mps``: expected speed of the wheel; ``stood_s``: time since which the robot is at
+        rest, infinite while it is driven; ``rests``: whether no motion was started since.
         """
         before, before_s = self.last, self.told_s
         self.certain = count == before or not when.doubtful
@@ -105,7 +116,7 @@ class WheelCount:
         if self._confirmed and not self._same and when.from_s >= stood_s and not when.doubtful:
             unsure = False
         if unsure and (not self._confirmed or self._same or driven):
-            # as before the start, which may have been lost
+            # the count from before the start, which may have been lost
             self._same += driven and not when.doubtful
             self.maybe = count if self._same < SAME_TIMES else 0
             self._raw, self.told_s, self.from_s = count, when.at_s, when.from_s
@@ -126,7 +137,7 @@ class WheelCount:
         return Step(wheel_m, seconds, lost, unsure)
 
     def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
-        """One that has come too often to be chance is so, whatever it was."""
+        """Discard an implausible count, but accept it if it has come too often to be chance."""
         self._odd += 1
         if self._odd < ODD_TIMES:
             return None
@@ -134,7 +145,7 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Whether it is less than before in this motion: of an earlier time, or another number."""
+        """Return whether the count has decreased in this motion: an older or another number."""
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:
             return False

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every command of the MART controller, as a table: its port, its replies, its times.
+"""The table of all commands of the MART controller: port, replies and times of each.
 
-One command is one datagram of ASCII, without an end, and case matters. Knows words and times; not
-in which state a command may be said (``states``), nor when one is sent (``conversation``).
+One command is one ASCII datagram without a terminator, and it is case-sensitive. This module does
+not know in which state a command is allowed (see ``states``) or when it is sent (see
+``conversation``).
 """
 
 from dataclasses import dataclass, field
@@ -11,9 +12,9 @@ from enum import Enum
 from typing import Final
 
 COMMAND, STOP = 0, 1
-"""The channels: port P, and the stop port P+1, which never answers."""
+"""The channels: the command port P, and the stop port P+1, which never answers."""
 LONGEST_REQUEST: Final = 49
-"""Bytes. A datagram without any shuts the server down."""
+"""Longest request in bytes. An empty datagram shuts the server down."""
 
 
 class Form(Enum):
@@ -28,7 +29,7 @@ class Form(Enum):
 
 
 class Kind(Enum):
-    """What a command does."""
+    """The effect of a command."""
 
     QUERY = "asks"
     CHECK = "proves that the IMU is alive"
@@ -41,11 +42,12 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """One command.
+    """One command of the server.
 
-    ``takes_s``: how long the server takes at the most; ``least_s``: at least, so that an earlier
-    reply belongs to another command; ``fails``: texts after ``fail`` that it has; a text that is in
-    no row may come with any.
+    ``forms``: the forms of a successful reply; ``takes_s``: longest time in s that the server
+    needs; ``least_s``: shortest time in s, so that an earlier reply belongs to another command;
+    ``fails``: the texts after ``fail`` that this command can return. A text that no command lists
+    is accepted with every command.
     """
 
     text: str
@@ -57,7 +59,7 @@ class Word:
     fails: frozenset[str] = field(default_factory=frozenset)
 
     def request(self, *arguments: object) -> "Request":
-        """What to send. Raises ValueError where the server could not take it."""
+        """Return the request with these arguments. Raises ValueError if it is too long."""
         data = " ".join([self.text, *map(str, arguments)]).encode("ascii")
         if not 0 < len(data) <= LONGEST_REQUEST:
             raise ValueError(f"a request has 1 to {LONGEST_REQUEST} bytes, not {len(data)}")
@@ -66,7 +68,7 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One datagram to be sent."""
+    """One datagram to be sent, and its command."""
 
     word: Word
     data: bytes
@@ -85,7 +87,7 @@ OBSTACLES: Final = frozenset(
         "insufficient clearance",
     }
 )
-"""In all the server's spellings."""
+"""The failure texts for an obstacle, in all the server's spellings."""
 STARTING: Final = frozenset({CONFLICT, UNSUPPORTED, "", "start timedout"})
 STOPPING: Final = frozenset({"stop timedout", "stop time out", "start timedout"})
 GYRO: Final = "excessive gyro correct"
@@ -119,9 +121,15 @@ TD = _word("TD", Kind.QUERY, _INTEGER, 0.05, {"in progress"})
 
 NO_IMU: Final = "could not init"
 RESET = _word("RST IMU", Kind.CHECK, _OK, 0.3, {NO_IMU, CONFLICT, UNSUPPORTED}, least_s=0.09)
-"""Proves the IMU without a motion, and leaves it closed where that fails: it is repeated then."""
+"""The check of the IMU without a motion.
+
+If it fails, the server closes the IMU, so the driver repeats the check before it believes it.
+"""
 CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
-"""With 0 degrees, where the server has no RST: some servers start the motors by it."""
+"""The check of the IMU for servers without RST, sent with 0 degrees.
+
+Some servers start the motors on it.
+"""
 SSP = _word("SSP", Kind.SERVICE, _OK, 0.05, {"command missing parameter", UNSUPPORTED})
 
 RM = _word("RM", Kind.START, _OK, 1.2, STARTING | OBSTACLES | {"improper command format"})
@@ -155,7 +163,7 @@ WORDS: Final = (
     *(RM, B, R, L, RMCS, CS),
     *(SRM, SM, SL, SS, TF, TB, MCR, MCL, SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT),
 )
-"""All that this driver ever says."""
+"""All commands that this driver ever sends."""
 KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if text)
 
 NEVER_SAID: Final = {
@@ -181,4 +189,4 @@ NEVER_SAID: Final = {
     "SMCST": "undocumented; a test that moves the motors",
     "STPMCST": "undocumented",
 }
-"""Commands of the server that the driver does not use, and why."""
+"""Commands of the server that the driver does not use, each with the reason."""

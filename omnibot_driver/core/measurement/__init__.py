@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From readings to measurements: stamped, checked, counted."""
+"""Measurements from readings: stamped, checked for plausibility, and counted."""

@@ -1,19 +1,19 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings that no robot can have made: what framing cannot see, because no byte is missing.
+"""The outlier filter: rejects readings that a robot cannot have made, without any missing byte.
 
-Two things are impossible. A displacement faster than the robot can go; and a leap of a single
-reading, away from all before it and back again with the next. A leap that lasts, or goes on
-leaping, is a shock, and true. So what leaps waits for the next reading of its kind, and comes out
-with it unless it is refused; nothing else ever waits.
+Two things are impossible: a displacement faster than the robot can go, and a leap of a single
+reading, away from all before it and back again with the next. A leap that lasts, or is followed by
+more leaps, is a shock, and true. So a reading that leaps waits for the next one of its kind, and is
+released with it unless it is rejected; nothing else ever waits.
 
-A knock may move one axis of an accelerometer for one reading, and then it is true. There a leap is
-impossible only if it has the size of a bit: a changed bit moves a word by its full scale, a half
-of it, a quarter, and by nothing in between.
+A knock may move one axis of an accelerometer for one reading, and then the reading is true. There a
+leap is impossible only if it has the size of a bit: a changed bit moves a word by its full scale, a
+half of it, a quarter, and so on, and by nothing in between.
 
-Of a board's own odometry, only what is not a number is refused. A refused displacement is as if it
-had been lost on the line. This module knows readings and the robot's limits; it knows no bytes and
-no clock.
+Of a board's own odometry, only readings that are not finite are rejected. A rejected displacement
+is treated like one that the line has lost. This module knows readings and the robot's limits; it
+knows no bytes and no clock.
 """
 
 from collections.abc import Iterator, Sequence
@@ -36,26 +36,29 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""Ratio of a spike to the largest recent step."""
+"""Least ratio of a spike to the largest recent step."""
 CALMING: Final = 0.95
-"""What a reading leaves of the largest step before it: after 20 of them a third."""
+"""Factor by which each reading reduces the largest recent step: 20 of them leave a third."""
 STILL: Final = 0.08
-"""Part of a leap by which the sensor's other words may move, and all of them when it is over."""
+"""Part of a leap by which the sensor's other words may move during it.
+
+By the same part all words may differ when the leap is over.
+"""
 END_OF_SCALE: Final = 0.99996
-"""Part of full scale, just below the largest positive word."""
+"""Part of full scale that is just below the largest positive word."""
 MOST_HELD: Final = 10
-"""Poses that may follow a displacement that leaps; then no other displacement will come."""
+"""Number of poses held after a leaping displacement before the next one is given up."""
 BACK: Final = 0.25
-"""Part of a leap that may be left when a robot that drives is back where it was."""
+"""Part of a leap of the motion that may be left when the leap is over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
-    """What the robot can never exceed, pushed by hand too.
+    """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    ``force_step_mps2``: the least change of specific force, from one reading to the next, that is
-    looked at twice; ``full_scale_mps2``: of the accelerometer;
-    infinite where its readings are not integers.
+    ``force_step_mps2``: least change of specific force between two readings that is checked;
+    ``full_scale_mps2``: full scale of the accelerometer, infinite where its readings are not
+    integers.
     """
 
     fastest_mps: float = 2.0
@@ -76,10 +79,11 @@ class Refused:
 
 
 class OutlierFilter:
-    """``limits`` may be replaced at any time; ``tick_s`` is the time between two ImuReadings.
+    """Rejects implausible readings, and holds those that leap until the next one decides.
 
-    ``corrected``: displacements are steps of an estimate, which leaps where it is put right; what
-    no robot can do is then no motion that was measured.
+    ``limits`` may be replaced at any time; ``tick_s``: time between two ImuReadings in s.
+    ``corrected``: displacements are steps of an estimate that leaps when it is corrected; an
+    impossible step is then passed on as not measured.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -96,7 +100,7 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """The readings that are sure now, each kind in the order in which it came."""
+        """Return the readings that are certain now, each kind in the order in which it came."""
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):
@@ -118,7 +122,7 @@ class OutlierFilter:
         return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
-        """The readings that waited, as no later one can contradict them."""
+        """Return the readings that waited, as no later one can contradict them."""
         released = [*self._held_imu, *self._held_motion]
         self._held_imu, self._held_motion = [], []
         self._imu_leaps.forget()
@@ -126,7 +130,7 @@ class OutlierFilter:
         return released
 
     def admit_imu(self, reading: ImuReading, stamp_s: float) -> list[tuple[ImuReading, float]]:
-        """Filter an IMU reading, as ``admit`` does others."""
+        """Return the IMU readings that are certain now, as ``admit`` does for all kinds."""
         force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
@@ -145,7 +149,7 @@ class OutlierFilter:
 
     def _admit_displacement(self, reading: DisplacementReading, stamp_s: float) -> list[Stamped]:
         before_s, self._displaced_at_s = self._displaced_at_s, stamp_s
-        seconds = reading.duration_s or None  # two that arrive at once tell of no time
+        seconds = reading.duration_s or None  # two that arrive at once show no time
         if seconds is None:
             self._motion_leaps.forget()
             seconds = None if before_s is None else (stamp_s - before_s) or None
@@ -189,14 +193,17 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """A pose includes what was refused before it."""
+        """Return the reading; a pose gets the rejected displacements before it as losses.
+
+        A pose includes them.
+        """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
         lost, self._lost = self._lost, 0
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """This displacement, with the losses of the rejected ones added."""
+        """Return this displacement with the losses of the rejected ones added."""
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,
@@ -209,10 +216,10 @@ class OutlierFilter:
 
 
 class _Spikes:
-    """Finds single leaps in a row of values, each in units of what it may change by at once.
+    """Finds single leaps in a series of values, each in units of a step that is always allowed.
 
-    ``left``: what may be left of a leap that is over, as a part of it; ``knocked``: the number of
-    first values may leap in a knock and be back; the rest never can.
+    ``left``: part of a leap that may remain when it is over; ``knocked``: number of first values
+    that a knock may move for one reading; it never moves the others.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -229,16 +236,17 @@ class _Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Whether the spike before was a single one, and whether these values jump themselves.
+        """Return whether the leap before was a single one, and whether these values leap too.
 
-        ``topmost_bit``: what it is worth in those that may be knocked.
+        ``periods``: number of periods since the values before; ``topmost_bit``: size of the highest
+        bit of the values that a knock may move.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False
         if leaping is not None and self._sure is not None:
             leapt = max(_steps(self._sure, leaping))
             was_single = max(_steps(self._sure, values)) <= self._left * leapt
-            if was_single:  # the next one is a shock after all, unless it is larger
+            if was_single:  # another leap is a shock, unless it is larger
                 self._restless = max(self._restless, leapt / OUT_OF_PROPORTION)
             else:
                 self._restless = max(self._restless, leapt)
@@ -261,9 +269,11 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """As far as values show it that vary anyway. What ends at the end of the
-        scale was knocked."""
-        if topmost == inf:  # no word of bits is sent
+        """Return whether a step has the size of a bit, as far as the variation of values shows it.
+
+        A value at the end of the scale was moved by a knock.
+        """
+        if topmost == inf:  # the readings are not integers
             return False
         slack = OUT_OF_PROPORTION * self._restless
         bit = topmost if value < END_OF_SCALE * topmost else 0.0
@@ -280,5 +290,5 @@ def _is_finite(reading: OdometryReading) -> bool:
 
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> Iterator[float]:
-    """The change of each value."""
+    """Return the absolute change of each value."""
     return map(abs, map(sub, after, before))

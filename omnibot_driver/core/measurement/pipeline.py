@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From readings to measurements: stamped, checked, integrated, corrected, counted.
+"""The measurement pipeline: readings are stamped, checked, integrated, corrected and counted.
 
-Composes the board's clock, plausibility, odometry and the IMU. Knows no commands and no modes.
-Readings of the IMU are measured with the read that brings them (``hear``), so that no reader waits
-for what else is made of it (``flush``).
+It combines the board's clock, the outlier filter, odometry and the IMU. It does not know commands
+or modes. IMU readings are measured with the read that brings them (``hear``), so that they need not
+wait for the measurements from other readings (``flush``).
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ from omnibot_driver.core.timing.device_clock import DeviceClock
 
 Estimate = ImuEstimate | OdometryEstimate | Extra
 Measured = tuple[Reading, Sequence[Estimate]]
-"""A reading that is sure, and what came of it."""
+"""A reading that is certain, and the estimates that follow from it."""
 
 
 class MeasurementPipeline:
@@ -54,9 +54,9 @@ class MeasurementPipeline:
             settings.motion, period_s or 0.0, corrected=board.traits.own_odometry
         )
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
-        """Of each read the readings, and how old the newest was."""
+        """Reads that are not counted yet: the readings, and the age of the newest one in s."""
         self.undigested: list[Stamped] = []
-        """What is heard, but for ``flush``."""
+        """Stamped readings that wait for ``flush``."""
 
     def configure(self, settings: SessionSettings) -> None:
         """Use new settings from the next reading on."""
@@ -66,7 +66,7 @@ class MeasurementPipeline:
 
     @property
     def refused(self) -> Refused:
-        """Readings rejected as implausible."""
+        """Numbers of readings rejected as implausible."""
         checked = self._outliers
         return Refused(
             checked.refused_imu, checked.refused_displacements, self.odometry.refused_poses
@@ -74,23 +74,24 @@ class MeasurementPipeline:
 
     @property
     def refused_displacements(self) -> int:
-        """The number of displacements that were rejected as impossible."""
+        """Number of displacements rejected as impossible."""
         return self._outliers.refused_displacements
 
     @property
     def skew_ppm(self) -> float:
-        """How much faster the board's clock is than the host's."""
+        """How much faster the board's clock is than the host's, in ppm."""
         return self._clock.skew_ppm
 
     def restart(self) -> None:
-        """Forget the stream so far, as the board begins another."""
+        """Forget the clock of the stream so far, as the board begins another stream."""
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """What is sure of the IMU by these, which came in at ``now``; the rest is for ``flush``.
+        """Return the IMU estimates that are certain with these readings, which arrived at ``now``.
 
-        A reading does not overtake one of another kind. Most reads of any board with an IMU bring
-        one reading of it and nothing else: that is measured without the lists that more need.
+        Other readings wait for ``flush``, and so do IMU readings behind them, to keep the order.
+        Most reads of a board with an IMU bring one IMU reading and nothing else: that is measured
+        without the lists that more readings need.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge
@@ -114,14 +115,14 @@ class MeasurementPipeline:
 
     @property
     def tally(self) -> StreamStatistics:
-        """Statistics of everything that was received so far."""
+        """Statistics of all readings received so far."""
         for readings, delay_s in self._uncounted:
             self._tally.read(readings, delay_s)
         self._uncounted.clear()
         return self._tally
 
     def flush(self) -> list[Measured]:
-        """The other measurements that follow from the received bytes."""
+        """Return the measurements from the readings that waited for this call."""
         measured: list[Measured] = []
         for reading, stamp_s in self.undigested:
             for sure, at_s in self._outliers.admit(reading, stamp_s):
@@ -130,7 +131,7 @@ class MeasurementPipeline:
         return measured
 
     def release(self) -> list[Measured]:
-        """The measurements that waited for readings that will not come."""
+        """Return the measurements that waited for readings that will not come."""
         measured, released = self.flush(), self._outliers.release()
         return measured + [(sure, self._estimates(sure, at_s)) for sure, at_s in released]
 

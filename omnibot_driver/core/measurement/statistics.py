@@ -1,7 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What came in, in figures: counts that only grow. Knows readings and times, not what to make of
-them.
+"""Statistics of the received readings: counts, losses and delays.
+
+This module knows readings and times; it does not judge them.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,10 @@ from omnibot_driver.core.readings import (
 
 @dataclass(slots=True)
 class StreamStatistics:
-    """Since the driver began; nothing but ``last_gap`` and the two of the sensor ever shrinks."""
+    """Counts and sums since the driver began.
+
+    They only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
+    """
 
     imu: int = 0
     displacements: int = 0
@@ -27,17 +31,17 @@ class StreamStatistics:
     lost_imu: int = 0
     lost_displacements: int = 0
     gaps: int = 0
-    """Stretches of lost displacements."""
+    """Number of stretches of lost displacements."""
     last_gap: int = 0
-    """How many the last one lost."""
+    """Number of displacements lost in the last such stretch."""
     reads: int = 0
-    """That ended with a sample."""
+    """Number of reads that ended with a sample."""
     delay_s: float = 0.0
-    """Sum over the reads of how old the newest sample was; the least that ever happens is 0."""
+    """Sum over these reads of the age of the newest sample in s; the least possible age is 0."""
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0
-    """How often in a row each sensor has said exactly the same."""
+    """Number of times in a row that each sensor has repeated exactly the same values."""
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
 

@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the robot moves as it is commanded."""
+"""The motion monitor: checks whether the robot moves as it is commanded."""

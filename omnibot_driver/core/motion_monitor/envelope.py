@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The velocities that a robot may have under recent set-points, and how far outside one is.
+"""The envelope: the velocities that a robot may have under its recent set-points.
 
-A robot follows its set-points late and smoothly, so its velocity lies in the convex hull of the
-recent ones and of standing still: it may always be slower. Around that hull is a margin for scales,
-wheels and noise. Pure geometry, in the board's own axes; no time.
+A robot follows its set-points late and smoothly, so its velocity is in the convex hull of the
+recent ones and of rest: it may always be slower. Around that hull is a margin for scales, wheels
+and noise. Pure geometry, in the board's own axes, without time.
 """
 
 import math
@@ -15,37 +15,44 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 
 STRETCH: Final = 1.2
-"""Part of a set-point that may be reached: scales are set by hand, controllers overshoot."""
+"""Factor of a set-point that may be reached: scales are set by hand, controllers overshoot."""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""Encoder counts, rounding, a slope that a slow controller gives way to."""
+"""Noise in m/s and rad/s that is always allowed.
+
+It covers encoder counts, rounding, and a slope to which a slow controller yields.
+"""
 SIDEWAYS: Final = 0.1
-"""Part of a speed that may go in any direction: the heading is uncertain, wheels are not alike. Of
-a yaw rate too. Independent of the noise, so the two combine by their squares."""
+"""Part of a speed, or of a yaw rate, that is allowed in any direction.
+
+The heading is uncertain, and wheels differ. Independent of the noise, so the squares are added.
+"""
 OVERSHOOT: Final = 0.15
-"""Part of a change by which a robot goes beyond its new set-point, in any direction, when it leaves
-another one that is not rest."""
+"""Part of a change of set-point by which a robot may overshoot, in any direction.
+
+Only where the set-point that it leaves is not rest.
+"""
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""Turning of a robot that drives, and the reverse, by wheels that differ by some per cent."""
+"""Yaw rate per speed, and the reverse, that is allowed for wheels that differ by some per cent."""
 CHANGING_RADPS_PER_MPS: Final = 0.4
-"""The same while its speed changes, by wheels that do not speed up alike."""
+"""Yaw rate per change of speed that is allowed for wheels that do not speed up alike."""
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
-"""What makes a yaw rate comparable to a velocity."""
+"""Factor that makes a yaw rate comparable to a velocity."""
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Sixteen half-planes around a hull; a distance from it is underestimated by 2 % at most."""
+"""Normals of 16 half-planes around a hull; they underestimate a distance by 2 % at most."""
 
 
 def outside(
     motion: BodyTwist, explained: Sequence[Velocity], *, heading_known: bool
 ) -> tuple[float, float]:
-    """Linear and angular speed outside of the envelope, m/s and rad/s; zero or less inside.
+    """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
 
-    ``explained``: of the set-points, the current one first. Where the heading is not known, only
-    the length of the linear velocity counts.
+    ``explained``: velocities by the set-points, that of the current one first. If the heading is
+    unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0
@@ -70,9 +77,9 @@ def outside(
 
 
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
-    """Whether it lies on the way from one set-point to the next: then it is inside, for certain.
+    """Return whether ``motion`` lies between two successive set-points, and so surely inside.
 
-    That is so of nearly all motion, and quick to see.
+    That is true for nearly all motion, and quick to compute.
     """
     x, y, yaw = motion.vx_mps, motion.vy_mps, YAW_MPS_PER_RADPS * motion.yaw_rate_radps
     last = setpoints[0]
@@ -92,17 +99,17 @@ def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
 
 
 def speed_of(twist: BodyTwist) -> float:
-    """The linear speed in m/s."""
+    """Return the linear speed in m/s."""
     return math.hypot(twist.vx_mps, twist.vy_mps)
 
 
 def dot(one: BodyTwist, other: BodyTwist) -> float:
-    """The scalar product of the linear velocities, in m²/s²."""
+    """Return the scalar product of the linear velocities, in m²/s²."""
     return one.vx_mps * other.vx_mps + one.vy_mps * other.vy_mps
 
 
 def _outside_hull(motion: BodyTwist, explained: Sequence[Velocity]) -> float:
-    """Distance from the hull of standing still and the stretched set-points; 0 or less inside."""
+    """Return the distance in m/s from the hull of rest and the stretched set-points, or <= 0."""
     furthest_mps = -math.inf
     for x, y in _DIRECTIONS:
         reached_mps = max([x * vx + y * vy for vx, vy, _ in explained])

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a robot moves outside of its envelope without a break: its unexplained way.
+"""The following error: how far a robot moves outside its envelope without interruption.
 
-One displacement decides nothing, as it may be damaged, and a jerk is over before it adds up. Knows
-velocities in the board's own axes, and times; not what an error means.
+One displacement decides nothing, as it may be damaged, and a jerk is over before it adds up. This
+module knows velocities in the board's own axes, and times; it does not know what an error means.
 """
 
 from typing import Final
@@ -14,18 +14,21 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""A robot that is slower than all set-points of this time is held by something."""
+"""Time in s; a robot slower than all set-points within it is held by something."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Part of these limits that one displacement adds at the most: it takes three in a row, or two long
-ones."""
+"""Largest part of the limits above that one displacement adds, or a long one.
+
+So it takes three displacements in a row, or two long ones, to exceed a limit.
+"""
 
 
 class FollowingError:
-    """``slack_mps``, ``slack_radps``: what is not an error on top of the envelope.
+    """The sum of a robot's motion outside its envelope.
 
-    ``outside``: whether the robot was outside of the envelope by the last displacement.
+    ``slack_mps``, ``slack_radps``: speeds outside the envelope that are not an error; ``outside``:
+    whether the last displacement was outside the envelope by more than them.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
@@ -33,7 +36,7 @@ class FollowingError:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the differences so far."""
+        """Forget all motion so far."""
         self._wind_up = WindUp()
         self._stands = True
         self.outside = False
@@ -41,12 +44,12 @@ class FollowingError:
 
     @property
     def exceeded(self) -> bool:
-        """Whether the excess has reached its limit, linear or angular."""
+        """Whether the linear or the angular excess is beyond its limit."""
         return self.way_exceeded or self._turn_rad > UNEXPLAINED_RAD
 
     @property
     def way_exceeded(self) -> bool:
-        """Whether the linear excess has reached its limit."""
+        """Whether the linear excess is beyond its limit."""
         return self._way_m > UNEXPLAINED_M
 
     def update(
@@ -58,9 +61,9 @@ class FollowingError:
         *,
         heading_known: bool,
     ) -> None:
-        """``motion`` from ``begun_s`` on, for this time.
+        """Add ``motion``, which began at ``begun_s`` and lasted ``seconds``.
 
-        Where the heading is not known, only the length of the linear velocity counts.
+        If the heading is unknown, only the magnitude of the linear velocity is checked.
         """
         newest = history.since(begun_s - RISING_S)
         way_mps = turn_radps = 0.0

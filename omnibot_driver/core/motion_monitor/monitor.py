@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the robot moves as it is commanded, by its displacements against its set-points.
+"""The motion monitor: compares the robot's displacements with its set-points.
 
-All velocities are in the board's own axes; time is that of its displacements. This module knows
+All velocities are in the board's own axes; time is that of the displacements. This module knows
 neither bytes nor how a robot is stopped. docs/internals/motion_monitor.md has the thresholds.
 """
 
@@ -22,26 +22,26 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""After this time without a set-point a robot is not driven any more."""
+"""Time in s without a set-point after which a robot is not driven any more."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-"""A robot that is commanded to move faster than this is seen to move."""
+"""Commanded speeds in m/s and rad/s above which a robot must be seen to move."""
 MOVING_MPS: Final = 0.02
 MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""A robot that has stood for this time has obeyed: later motion has another cause."""
+"""Time in s at rest after which a robot has obeyed: later motion has another cause."""
 STOPS_S: Final = 5.0
-"""How long a stop is repeated by itself while the robot moves."""
+"""Time in s for which one Stop is repeated automatically while the robot moves."""
 
 REFUSED_IN_A_ROW: Final = 4
 COSINE_60: Final = 0.5
 
 
 class Fault(Enum):
-    """The faults; each value is the beginning of a sentence."""
+    """The faults of a robot's motion; each value is the beginning of a sentence."""
 
     WRONG_WAY = "robot moves in the wrong direction"
     WRONG_TURN = "robot turns in the wrong direction"
@@ -64,7 +64,7 @@ STOPPED: Final = frozenset(
         Fault.BEYOND_LIMITS,
     }
 )
-"""Faults of a robot that is driven, and must be stopped."""
+"""Faults of a robot that is driven, which must then be stopped."""
 ADVICE: Final[Mapping[Fault, str]] = {
     Fault.WRONG_WAY: "check the wiring of the wheels",
     Fault.WRONG_TURN: "check the wiring of the wheels",
@@ -78,11 +78,11 @@ ADVICE: Final[Mapping[Fault, str]] = {
     Fault.BLOCKED: "check motor power, and whether the wheels are blocked",
     Fault.HELD_BY_ESTOP: "check whether the board holds the stop itself",
 }
-"""What to check on any board; ``Traits.advice`` names the parameters of the one there is."""
+"""Advice for any board; ``Traits.advice`` of a board names its own parameters."""
 
 
 class MotionMonitor:
-    """Compares motion with commands. ``commanded``, ``measured``: of the last fault."""
+    """Compares motion with commands. ``commanded``, ``measured``: twists at the last fault."""
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
         self.commanded = self.measured = AT_REST
@@ -101,26 +101,33 @@ class MotionMonitor:
         self._stood_s = self._moved_s = self._blocked_s = self._stop_again_s = 0.0
 
     def set_point(self, setpoint: CommandedTwist, now: float) -> None:
-        """This is commanded from now on; None: a goal, the way to which is the board's own."""
+        """Note that ``setpoint`` is commanded from ``now`` on.
+
+        None stands for a goal, to which the board chooses its own path.
+        """
         if setpoint is self._history.current:
             return
         if setpoint == AT_REST:
-            setpoint = AT_REST  # itself, by which the history knows it
+            setpoint = AT_REST  # the object by which the history recognises rest
         self._history.add(setpoint, now)
         if setpoint is not AT_REST:
             self._has_stood = False
 
     def release(self) -> None:
-        """Note the release of the e-stop; the robot has not moved since."""
+        """Note that the e-stop is released; the robot has not moved since."""
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Whether to report this fault: once, until the robot has obeyed again."""
+        """Return whether to report this fault: once, until the robot has obeyed again."""
         told, self._told = self._told, self._told | {fault}
         return fault not in told
 
     def count_refused(self, count: int, now: float) -> Fault | None:
-        """``count``: displacements, since the driver began, that no robot can have made."""
+        """Return the fault that implausible displacements show, or None.
+
+        ``count``: number of displacements since the driver began that were rejected because a robot
+        cannot have made them.
+        """
         self._refused = count
         if count < self._refused_before + REFUSED_IN_A_ROW:
             return None
@@ -131,9 +138,10 @@ class MotionMonitor:
     def check(
         self, motion: BodyTwist, seconds: float, stamp_s: float, *, heading_known: bool
     ) -> Fault | None:
-        """What the displacement that ended at ``stamp_s`` shows: ``motion`` for this time.
+        """Return the fault that a displacement shows, or None.
 
-        Where the heading is not known, only the length of the linear velocity counts.
+        ``motion``: its mean twist during the ``seconds`` before ``stamp_s``. If the heading is
+        unknown, only the magnitude of the linear velocity is checked.
         """
         self._refused_before = self._refused
         begun_s, current = stamp_s - seconds, self._history.current
@@ -154,13 +162,16 @@ class MotionMonitor:
         return self._blocked(motion, seconds, heading_known=heading_known)
 
     def _blame(self, fault: Fault, now: float) -> Fault:
-        """The robot is going to be stopped: how it rolls out is not another fault."""
+        """Return ``fault`` and judge nothing for now: rolling out is not another fault."""
         self._error.reset()
         self._history.add(None, now)
         return fault
 
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
-        """Whether any of these has about the direction of the measured motion."""
+        """Return the fault by whether any of these velocities has about the measured direction.
+
+        ``explained``: velocities by the set-points. Linear directions may differ by 60°.
+        """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
             right = any(yaw * rate > 0.0 for _, _, yaw in explained)
@@ -172,9 +183,10 @@ class MotionMonitor:
         return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
 
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
-        """A robot that is to stand moves: the times at which Stop is said again.
+        """Return UNCOMMANDED when Stop is to be sent again to a robot that moves without a command.
 
-        For one that has stood since it was commanded, and so may be pushed, these get rarer.
+        These times become rarer for a robot that was at rest after its last command, as it may be
+        pushed.
         """
         if not self._error.outside:
             self._stood_s += seconds
@@ -192,7 +204,7 @@ class MotionMonitor:
         return Fault.UNCOMMANDED
 
     def _blocked(self, motion: BodyTwist, seconds: float, *, heading_known: bool) -> Fault | None:
-        """A robot that is driven and does not get anywhere; one that does has obeyed."""
+        """Return the fault of a driven robot that does not move; one that does move has obeyed."""
         current = self._history.current
         assert current is not None
         wanted, turning = speed_of(current), current.yaw_rate_radps

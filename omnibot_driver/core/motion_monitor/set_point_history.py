@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What was commanded when, and how much motion it explains now.
+"""The history of set-points, and the velocities that they still explain.
 
-A robot follows a set-point late, and leaves it smoothly. So one that another has replaced explains
-all of its velocity for ``HELD_S``, and then less and less. Knows velocities in the board's own
-axes, and times; not how the robot moves.
+A robot follows a set-point late, and leaves it smoothly. So a set-point that was replaced explains
+its full velocity for ``HELD_S``, and then less and less. This module knows velocities in the
+board's own axes, and times; it does not know how the robot moves.
 """
 
 import math
@@ -14,26 +14,29 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 CommandedTwist = BodyTwist | None
-"""A body velocity that was commanded; None: any motion is possible."""
+"""A commanded body velocity; None: any motion is possible."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]
-"""What a BodyTwist holds; many are made, and a plain tuple is made quickly."""
+"""The values of a BodyTwist; many are made, and a plain tuple is made quickly."""
 
 HELD_S: Final = 0.3
-"""The line, a repetition that was lost, and a controller's dead time."""
+"""Time in s for which a replaced set-point explains its full velocity.
+
+It covers the line, a lost repetition, and a controller's dead time.
+"""
 FADING_S: Final = 0.2
-"""Time constant afterwards; a robot whose own is 0.35 s stays within it."""
+"""Time constant in s of the decay afterwards; robots of up to 0.35 s stay within it."""
 FADED_S: Final = 1.1
-"""After this time a replaced set-point explains nothing: 2 % are left."""
+"""Time in s after which a replaced set-point explains nothing: 2 % are left."""
 UNKNOWN_S: Final = 0.8
-"""Motion of which nothing is known is over by then."""
+"""Time in s after which motion with an unknown cause has ended."""
 HISTORY_S: Final = 3.0
-"""A computer that reads displacements later than this has stalled."""
+"""Length of the history in s; a computer that reads displacements later has stalled."""
 
 
 class SetpointHistory:
-    """The recent set-points. ``current`` holds since the last ``add``."""
+    """The recent set-points. ``current``: the one that was added last."""
 
     def __init__(self) -> None:
         self.clear()
@@ -45,7 +48,7 @@ class SetpointHistory:
         self._known_from_s = math.inf
 
     def add(self, setpoint: CommandedTwist, at_s: float) -> None:
-        """``setpoint`` holds from this time on; at rest it is ``AT_REST`` itself."""
+        """Add a set-point that holds from ``at_s`` on; rest must be ``AT_REST`` itself."""
         before, self.current = self.current, setpoint
         if setpoint is None:
             self._entries.clear()
@@ -60,11 +63,11 @@ class SetpointHistory:
             self._entries.popleft()
 
     def known(self, at_s: float) -> bool:
-        """Whether set-points explain the robot's motion at this time."""
+        """Return whether set-points explain the robot's motion at this time."""
         return at_s >= self._known_from_s
 
     def since(self, start_s: float) -> list[BodyTwist]:
-        """All that held at this time or later, the newest first."""
+        """Return the set-points that held at ``start_s`` or later, the newest first."""
         found = []
         for at_s, setpoint in reversed(self._entries):
             found.append(setpoint)
@@ -73,12 +76,13 @@ class SetpointHistory:
         return found
 
     def driven(self, at_s: float) -> bool:
-        """Whether any set-point at this time or later is motion."""
+        """Return whether any set-point at ``at_s`` or later commands motion."""
         return any(each is not AT_REST for each in self.since(at_s))
 
     def explained(self, at_s: float) -> list[Velocity]:
-        """The velocities that the robot may have at this time, by the current set-point (first) and
-        those before it.
+        """Return the velocities that the robot may have at ``at_s``, by its set-points.
+
+        The first one is that of the current set-point.
         """
         found: list[Velocity] = []
         age_s = 0.0

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The wind-up of wheel controllers that somebody works against, and the way that it explains.
+"""The wind-up of wheel controllers while a robot is held or pushed, and the motion it explains.
 
-They integrate: what a robot loses against its set-point while it is held, or is moved while it is
-to stand, they make good when it is released; faster than commanded, or back, also by a command
-that has changed meanwhile, and also when it is to stop. Knows velocities; not what is inside the
-envelope.
+The controllers integrate. A robot loses distance against its set-point while it is held, or is
+moved while its set-point is rest; once released, it makes up for that distance. It then moves
+faster than commanded or backwards, even if the command has changed meanwhile or is a stop. This
+module knows velocities; it does not know what is inside the envelope.
 """
 
 import math
@@ -17,32 +17,46 @@ from omnibot_driver.core.motion_monitor.envelope import STRETCH, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 
 MOST_M: Final = 0.6
-"""More than the integrators hold at full effort is not made good."""
+"""Largest distance in m that is made up for: what the integrators hold at full effort."""
 LONG_S: Final = 0.06
-"""One displacement of this length proves no hold: the robot may have turned round within it."""
+"""Length in s of a long displacement.
+
+One alone does not prove a hold: the robot may have turned round within it.
+"""
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
-"""A robot that is to stand, and stands, may still be held: nothing unwinds."""
+"""Time constants in s with which the wind-up is forgotten, in motion and at rest.
+
+A robot whose set-point is rest may still be held while it is at rest: then nothing unwinds.
+"""
 HELD_PART: Final = 0.7
-"""A robot that does not reach this part of its set-points is held by something..."""
+"""Part of its set-points that a robot does not reach while something holds it."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""... but not one that goes the other way faster than this: that explains nothing."""
+"""Speeds in m/s and rad/s against the set-point above which a robot is not regarded as held.
+
+Such motion explains nothing.
+"""
 LEVER_M: Final = 0.15
-"""About the distance of the wheels from the centre: what a turn is worth at a rim."""
+"""Approximate distance in m of the wheels from the centre: converts a turn to rim motion."""
 
 
 class WindUp:
-    """``way_m``: what is to be made good, at a rim."""
+    """The wind-up of a robot's wheels. ``way_m``: distance at a rim still to make up for, in m."""
 
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Lost in a first long displacement, until the next one; None: not held in the last one."""
+        """Distance in m lost in a first long displacement, until the next one; else 0.
+
+        None: the robot was not held in the last displacement.
+        """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Whether motion outside of the envelope, by this amount and for this time, is
-        explained."""
+        """Subtract motion outside the envelope from the wind-up; return whether that explains it.
+
+        ``way_mps``, ``turn_radps``: speeds outside the envelope, for ``seconds``.
+        """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
         explained = outside_m < self.way_m
@@ -50,7 +64,7 @@ class WindUp:
         return explained
 
     def carry(self, motion: BodyTwist, seconds: float) -> None:
-        """Note that a robot without a command is being moved by hand."""
+        """Add the motion of a robot that is moved by hand while its set-point is rest."""
         moved_mps = speed_of(motion) + LEVER_M * abs(motion.yaw_rate_radps)
         self.way_m = min(MOST_M, self.way_m + moved_mps * seconds)
 
@@ -62,7 +76,7 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Move inside of the envelope, held or not.
+        """Add what a held robot loses by motion inside the envelope; if not held, forget gradually.
 
         ``newest``: the set-points that the robot may not have reached yet, the current one first.
         """

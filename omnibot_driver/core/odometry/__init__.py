@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From displacements and the board's own poses to the pose of the robot."""
+"""Odometry: from displacements and the board's own poses to the pose of the robot."""

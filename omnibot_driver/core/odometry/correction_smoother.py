@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pose that is given out: moves with the robot, and nears the truth no faster than it could.
+"""The published pose: it approaches the corrected pose, no faster than the robot could move.
 
-Knows poses and speeds; not how the truth is found.
+Knows poses and speeds; not how the corrections are found.
 """
 
 from typing import Final
@@ -10,11 +10,15 @@ from typing import Final
 from omnibot_driver.core.geometry.se2 import Pose
 
 SPREAD_S: Final = 0.2
-"""Time over which a correction is spread: that from one pose of the board to the next."""
+"""Time over which a correction is spread, in s: the period of the board's poses."""
 
 
 class CorrectionSmoother:
-    """``pose`` follows ``target``. What the robot could have moved and did not is room for it."""
+    """The published ``pose``, which follows the best known pose, ``target``.
+
+    Each step leaves some room: the motion that was possible in its time, minus the robot's own.
+    Corrections of ``pose`` are limited to this room.
+    """
 
     def __init__(self) -> None:
         self.pose = self.target = Pose()
@@ -23,16 +27,19 @@ class CorrectionSmoother:
 
     @property
     def wrong(self) -> Pose:
-        """The known error of ``pose``."""
+        """Known error of ``pose``, to be added to it."""
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """Move the target by this displacement, in its own axes."""
+        """Correct the target by a displacement in its own axes, spread over ``spread_s``."""
         self.target = self.target.moved(chord)
         self._settling_s = spread_s
 
     def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move the robot, in its own axes; ``room`` is the most that it can have moved."""
+        """Move both poses by a displacement of the robot in its own axes.
+
+        ``room_m``, ``room_rad``: the most that the robot can have moved in this step.
+        """
         pose, target = self.pose, self.target
         self.target = target.moved(chord)
         self.pose = self.target if pose is target else pose.moved(chord)
@@ -40,14 +47,14 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """The same, but what exceeds the limit is applied later."""
+        """Move both poses, but ``pose`` by no more than the room; it catches up later."""
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
         self.move(chord.times(linear, linear, angular), room_m, room_rad)
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Approach the target by this step's share, as far as there is room."""
+        """Move ``pose`` towards the target by the share of ``seconds``, as far as there is room."""
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0
         self._settling_s = max(0.0, self._settling_s - seconds)
@@ -61,5 +68,5 @@ class CorrectionSmoother:
 
 
 def _part(wanted: float, room: float) -> float:
-    """The part of the wanted correction that fits."""
+    """Return the part of the wanted correction that fits into the room, from 0 to 1."""
     return min(1.0, max(0.0, room) / wanted) if wanted else 1.0

@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How far the odometry may be off: what it does not know, kept apart by where it comes from.
+"""The uncertainty of the odometry: its sources of error, kept separately.
 
-* What the wheels do not tell: the slip of every metre (a random walk), and wheels that are larger
-  or smaller than believed or slip all the time (the same error in every turn of a wheel, so it
-  grows with the way itself, and a way back undoes it).
-* ``gap`` is unreported motion; a later pose of the board reveals it.
-* What is known to be wrong and still being put right counts in full.
+* Errors of the wheels: slip on every metre, a random walk; and a wrong wheel size or constant slip,
+  the same error in every turn of a wheel, which grows with the distance and is undone on the way
+  back.
+* ``gap``: unreported motion, which a later pose of the board reveals.
+* Known errors that are still being corrected; they are added at their full size.
 
-Knows covariances and the wheels' geometry; no time, no frames, no board.
+Knows covariances and the wheels' geometry; not times, frames or boards.
 """
 
 import math
@@ -23,17 +23,19 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.values import value
 
 INITIAL_VARIANCE: Final = 1e-6
-"""(1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
+"""Initial variances of (1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
-    """How uncertainty grows. Each wheel goes wrong by itself, and the body with it.
+    """The growth of the uncertainty. Each wheel has errors of its own, which move the body.
 
-    ``wheel_drift``: standard deviation in m of a random walk after 1 m of rim; ``wheel_scale``: of
-    a wheel's relative size error; ``wheel_slip``: the mean part of the way that slip takes from all
-    wheels alike; ``wheels``: their geometry, at a radius of 1 m; ``unheard_mps2``,
-    ``unheard_radps2``: acceleration of a robot during a gap.
+    * ``wheel_drift``: standard deviation, in m, of a random walk after 1 m of motion at the rim.
+    * ``wheel_scale``: standard deviation of the relative size error of one wheel.
+    * ``wheel_slip``: mean part of the distance that slip takes from all wheels alike.
+    * ``wheels``: their geometry, at a wheel radius of 1 m.
+    * ``unheard_mps2``, ``unheard_radps2``: assumed accelerations of a robot during a gap, in m/s²
+      and rad/s².
     """
 
     wheel_drift: float = 0.0035
@@ -46,7 +48,7 @@ class OdometryNoise:
 
 @value(frozen=True, slots=True)
 class Covariance:
-    """A covariance of (x, y, yaw) in the odometry frame: m², m·rad, rad²; symmetric."""
+    """Covariance of (x, y, yaw) in the odometry frame, in m², m·rad and rad²; symmetric."""
 
     xx: float = INITIAL_VARIANCE
     xy: float = 0.0
@@ -57,11 +59,11 @@ class Covariance:
 
     @classmethod
     def diagonal(cls, m2: float, rad2: float) -> "Covariance":
-        """A covariance of independent errors."""
+        """Return the covariance of independent errors, with the same variance in x and y."""
         return cls(m2, 0.0, 0.0, m2, 0.0, rad2)
 
     def __add__(self, other: "Covariance") -> "Covariance":
-        """The covariance of the sum of two independent errors."""
+        """Return the covariance of the sum of two independent errors."""
         return Covariance(
             self.xx + other.xx,
             self.xy + other.xy,
@@ -72,8 +74,10 @@ class Covariance:
         )
 
     def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
-        """Add independent errors along lines in (x, y, yaw), each with a variance along its
-        own."""
+        """Return the covariance with more independent errors, as (variance, x, y, yaw).
+
+        Each error lies along the line (x, y, yaw), with a variance in units of that vector.
+        """
         xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
         for variance, x, y, yaw in errors:
             along_x, along_y = variance * x, variance * y
@@ -93,8 +97,9 @@ class Covariance:
         )
 
     def carried(self, dx_m: float, dy_m: float) -> "Covariance":
-        """The covariance after a displacement, in the odometry frame; a yaw error moves the
-        position.
+        """Return the covariance after a displacement given in the odometry frame.
+
+        The error of the yaw moves the position.
         """
         return Covariance(
             xx=self.xx - 2 * dy_m * self.x_yaw + dy_m * dy_m * self.yaw_yaw,
@@ -110,19 +115,19 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 
 
 class Uncertainty:
-    """The uncertainty of the odometry. ``noise`` may be replaced at any time."""
+    """The uncertainty of one odometry. ``noise`` may be replaced at any time."""
 
     def __init__(self, noise: OdometryNoise) -> None:
         self.noise = noise
         self.gap = NOTHING
         self._walk = Covariance()
         self._levers: list[tuple[float, float, float]] = []
-        """What the pose is off by, in m, m, rad, per relative size error of each wheel."""
+        """Error of the pose in m, m and rad, per relative size error of each wheel."""
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
-        """Move the body along this tangent from this heading.
+        """Move the body along this tangent from this heading, and add the errors of its wheels.
 
-        In plain numbers: with a Pose for each it would be a third of all an odometry message costs.
+        Computed with plain numbers: Pose objects would cost a third of an odometry message.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return
@@ -153,10 +158,11 @@ class Uncertainty:
             self.gap = self.gap.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
-        """Add a time without reports; the speeds before and after it are known.
+        """Add a gap in the reports; ``fastest_mps`` and ``fastest_radps`` limit the motion in it.
 
-        A robot that speeds up and brakes again meanwhile is a quarter of a·t² away from the even
-        way, and never further than its speed allows.
+        The speeds before and after the gap are known. A robot that accelerates and brakes again in
+        between deviates by at most a·t²/4 from constant speed, and never by more than its speed
+        allows.
         """
         square = duration_s * duration_s / 4
         self.gap += Covariance.diagonal(
@@ -169,11 +175,11 @@ class Uncertainty:
         self.gap = NOTHING
 
     def give_up(self) -> None:
-        """Close all gaps, as their motion will never be known."""
+        """Close all gaps, as their motion will remain unknown."""
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
-        """The covariance of a pose with the error ``open_error`` in addition to its best."""
+        """Return the covariance of a pose that also has the known error ``open_error``."""
         noise, levers = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
         slip = noise.wheel_slip * noise.wheel_slip
@@ -187,7 +193,7 @@ class Uncertainty:
 
 @cache
 def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
-    """The effect of one metre of rim of each wheel alone on the body."""
+    """Return the motion of the body for one metre at the rim of each wheel alone."""
     count = len(wheels.joints)
     rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
     return tuple(

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From displacements and the board's own poses to pose, twist and covariance.
+"""The odometry estimator: from displacements and the board's own poses to pose, twist, covariance.
 
-One idea: ``_board`` is where the board believes to be, told by displacements at once and by its
-poses for certain; the follower's target is the same place in the odometry frame. Both always move
-together, by the same tangent in the body's axes, so motion that was lost on the line is found again
-with the next pose. This module knows SE(2); it knows no bytes, no clock and no ROS.
+The main idea: ``_board`` is the robot's pose in the board's frame. Displacements update it at once,
+and the board's poses correct it. The target of the ``CorrectionSmoother`` is the same place in the
+odometry frame. Both always move by the same tangent in the body's axes, so motion that was lost on
+the line is recovered with the next pose. This module knows SE(2); it knows no bytes, no clock and
+no ROS.
 """
 
 import math
@@ -23,24 +24,28 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
-"""Board time without any pose after which heading 0 is assumed."""
+"""Board time without any pose after which heading 0 is assumed, in s."""
 LONG_GAP_S: Final = 1.0
-"""After more lost board time the next ones wait for the pose, which tells what was lost."""
+"""Lost board time, in s, above which the next displacements wait for a pose that shows the lost
+motion."""
 POSE_DUE_S: Final = 0.24
-"""Board time within which a pose comes, unless it is lost as well."""
+"""Board time within which a pose arrives, unless it is lost too, in s."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Standard deviation of a heading that open gaps have made uncertain."""
+"""Largest standard deviation of a well-known heading, from open gaps."""
 UNKNOWN_S: Final = 0.5
-"""Time in which a robot rolls out: motion that may be unreported after a gap of unknown length."""
+"""Time in which a robot rolls to a halt, in s: duration of the motion that may be unreported in a
+gap of unknown length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:
-    """``fastest_mps``, ``fastest_radps``: what the robot can never exceed, pushed by hand too.
+    """The settings of the odometry.
 
-    Without ``use_board_pose`` a pose tells nothing but the heading to begin with, which earth
-    displacements mean nothing without. ``linear_scale``, ``angular_scale``: true way and turn over
-    those that the board tells, which knows its wheels by their nominal sizes.
+    * ``use_board_pose``: whether the board's poses correct the odometry. Without it they only give
+      the initial heading, which displacements in the earth frame need.
+    * ``fastest_mps``, ``fastest_radps``: speeds that the robot can never exceed, even if pushed.
+    * ``linear_scale``, ``angular_scale``: true distance and turn, divided by those that the board
+      reports by the nominal sizes of its wheels.
     """
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)
@@ -55,10 +60,12 @@ class OdometrySettings:
 class OdometryEstimate:
     """The odometry at ``stamp_s``: pose and covariance in its frame, twist in the body's.
 
-    ``twist`` is None where the time that the displacement took is not known. ``rolled`` is what
-    the wheels have made of the robot since the driver began, as one tangent in the board's own
-    axes; ``rolling`` its rate. ``twist_variances``: of speed and turning, where they are known
-    better than by the parameters.
+    * ``twist``: None if the duration of the displacement is unknown.
+    * ``rolled``: all motion by the wheels since the driver began, as one tangent in the board's
+      axes.
+    * ``rolling``: rate of ``rolled``; None if unknown.
+    * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s²; None to use
+      those of the parameters.
     """
 
     stamp_s: float
@@ -71,15 +78,17 @@ class OdometryEstimate:
 
 
 class Odometry:
-    """``axis_signs`` turn x, y and yaw of the board's body axes into REP-103's; the board's earth
-    frame and heading are its own affair and keep its signs.
+    """The odometry of one robot.
+
+    ``axis_signs`` convert x, y and yaw of the board's body axes to REP-103. They do not apply to
+    the board's earth frame and heading.
     """
 
     def __init__(self, settings: OdometrySettings, axis_signs: Signs = (1, 1, 1)) -> None:
         self.heading_assumed = False
-        """True once a board sent no pose and its heading had to be taken for 0."""
+        """Whether heading 0 was assumed because the board sent no pose."""
         self.alignments = 0
-        """How often the odometry frame has come to lie otherwise in the board's."""
+        """How often the odometry frame has changed its place in the board's frame."""
         self._track = PoseTracker(axis_signs)
         self.configure(settings)
         self._board: Pose | None = None
@@ -92,7 +101,7 @@ class Odometry:
 
     @property
     def refused_poses(self) -> int:
-        """Poses that are not possible, or that the next one did not confirm."""
+        """Number of poses that were impossible, or that the next pose did not confirm."""
         return self._belief.refused
 
     def configure(self, settings: OdometrySettings) -> None:
@@ -105,19 +114,19 @@ class Odometry:
         )
 
     def reset(self) -> list[OdometryEstimate]:
-        """The odometry frame begins where the robot stands; the estimates that were still due."""
+        """Begin the odometry frame at the robot's present pose; return the estimates still due."""
         self.alignments += 1
         due = []
         if self._board is not None:
             due = self._release()
             if self._track.uncertainty.gap != NOTHING:
-                self._belief.proved = None  # what the next pose corrects was before the reset
+                self._belief.proved = None  # the next pose would also correct the old motion
         self._backlog = PendingDisplacements()
         self._track.begin()
         return due
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
-        """The estimates that this displacement completes: none while a pose must tell first."""
+        """Return the estimates that a displacement completes: none while it waits for a pose."""
         estimates = []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
@@ -142,7 +151,7 @@ class Odometry:
         return estimates + self._release()
 
     def settle(self, reading: PoseReading) -> list[OdometryEstimate]:
-        """Take what the board's pose tells; releases the displacements that waited for it."""
+        """Use a pose of the board; return the estimates of the displacements that waited for it."""
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
         if not self._belief.possible(told):
             return []
@@ -161,9 +170,9 @@ class Odometry:
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:
-        """A place in the odometry frame as the board would call it, by the shorter turn from here.
+        """Return a pose of the odometry frame in the board's frame, by the shorter turn from here.
 
-        None while it is unknown: no pose of the board says where the frames lie.
+        None if unknown: no pose of the board shows yet how the frames lie.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -178,16 +187,15 @@ class Odometry:
 
     @property
     def _settles(self) -> bool:
-        """Whether a pose may settle lost motion."""
+        """Whether a pose may reveal lost motion."""
         return self._settings.use_board_pose and self._belief.proved is not None
 
     # The board's frame
 
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
-        """Whether the board's frame is another one than before, if there was one.
+        """Return whether a pose shows that the board's frame has changed, or is the first one.
 
-        After what looked like a restart, one pose alone is believed where either zero or the past
-        explains it.
+        After a suspected restart, a single pose decides if it fits either zero or the past motion.
         """
         if self._board is None:
             return confirmed
@@ -203,7 +211,7 @@ class Odometry:
         return confirmed and self._restarted is not None
 
     def _attach(self, told: Pose) -> list[OdometryEstimate]:
-        """The board's frame is a new one; the odometry goes on from where it is."""
+        """Adopt a new frame of the board; the odometry continues from its present pose."""
         self._begin_at(self._backlog.before(told))
         estimates = self._release()
         self._belief.believe(told)
@@ -211,7 +219,7 @@ class Odometry:
         return estimates
 
     def _resume(self, told: Pose) -> list[OdometryEstimate]:
-        """The pose tells what was lost before the displacements that wait."""
+        """Recover the motion that was lost before the waiting displacements, from a pose."""
         assert self._board is not None
         seconds = self._backlog.unstamped_s(self._last_stamp_s)
         way = log_of(self._board.way_to(self._backlog.before(told)))
@@ -225,7 +233,7 @@ class Odometry:
         return estimates
 
     def _assume(self) -> None:
-        """No two poses agree: the last one it is, or heading 0 where there is none."""
+        """Assume the last pose as no two poses agree, or heading 0 without any pose."""
         if self._belief.doubted is not None:
             self._begin_at(self._backlog.before(self._belief.doubted))
         else:
@@ -238,7 +246,10 @@ class Odometry:
         self._board, self._restarted, self._belief.doubted = board, None, None
 
     def _judge(self, told: Pose, confirmed: bool) -> None:
-        """Correct by a pose that is reachable and no surprise, or confirmed by the one before."""
+        """Apply a pose that is reachable and as expected, or that confirms the one before.
+
+        A confirmed pose that is out of reach changes the frame instead of the odometry.
+        """
         assert self._board is not None
         way = self._board.way_to(told)
         reachable = self._reachable(told)
@@ -258,7 +269,7 @@ class Odometry:
         settings = self._settings
         return self._belief.reachable(told, waited_s, settings.fastest_mps, settings.fastest_radps)
 
-    # Setpoint
+    # Integration
 
     def _release(self) -> list[OdometryEstimate]:
         return [self._integrate(reading, stamp_s) for reading, stamp_s in self._backlog.take()]
@@ -270,7 +281,7 @@ class Odometry:
         seconds = reading.duration_s
         if seconds is None:
             seconds = 0.0
-            if last_stamp_s is not None:  # else the odometry begins here, and has missed nothing
+            if last_stamp_s is not None:  # otherwise the odometry begins here, without a gap
                 self._track.miss(UNKNOWN_S)
                 seconds = max(0.0, stamp_s - last_stamp_s)
         elif reading.lost:
@@ -290,21 +301,21 @@ class Odometry:
         return OdometryEstimate(stamp_s, follower.pose, twist, covariance, track.rolled, rolling)
 
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
-        """Unreported motion, taken to be this one; the stamps leave this time for it."""
+        """Add assumed motion for a gap; see ``PoseTracker.move`` for ``stamped_s``."""
         if self._board is not None:
             self._board = self._board.moved(roll(tangent))
         self._belief.bridged(roll(tangent))
         self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
-        """Displacements are missing that the pose includes; what follows is unknown."""
+        """Bridge displacements that are missing before a pose; the motion after them is unknown."""
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
             self._track.miss((lost + 1) * period_s)
             self._cross(tangent.times(lost, lost, lost), lost * period_s)
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Along a tangent in the board's body axes, and no further than by the stamps it can be."""
+        """Move along a tangent in the board's body axes; see ``PoseTracker.move``."""
         self._track.move(tangent, seconds, stamped_s)
         self._belief.passed(seconds)
 

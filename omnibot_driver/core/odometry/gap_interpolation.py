@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a gap is taken to have held: motion like that on both sides of it.
+"""Gap interpolation: assumes motion in a gap like that on both sides of it.
 
-Knows displacements and headings; not where the robot is, nor what a guess does to it.
+Knows displacements and headings; not where the robot is, nor how the result is used.
 """
 
 import math
@@ -13,13 +13,14 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Board time that a bridge stands for at the most; a robot that is not heard is soon stopped."""
+"""Longest board time that is interpolated, in s; a robot without data is soon stopped."""
 NO_WAY: Final = Pose()
 
 
 class GapInterpolation:
-    """``last``: the newest tangent in the board's body axes, and the time that it took in s; None
-    where that is not known.
+    """The motion on both sides of a gap.
+
+    ``last``: newest tangent in the board's body axes, with its duration in s; None if unknown.
     """
 
     def __init__(self) -> None:
@@ -28,10 +29,10 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """Tangents in the board's body axes: of the lost displacements, and of this one.
+        """Return the tangents of the lost displacements and of this one, in the board's body axes.
 
-        ``heading_rad``: the board's before all of them; displacements of a board that never told
-        are taken for the body's.
+        ``heading_rad``: heading of the board before all of them. If it is None, the board has never
+        reported a pose, and displacements are taken to be in body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Displacements that wait for a pose of the board, and what they add up to in the board's frame.
+"""Displacements that wait for a pose of the board, and their sum in the board's frame.
 
-Knows how a displacement moves a pose; not why one waits, nor what comes of it.
+Knows how a displacement moves a pose; not why one waits, nor how the result is used.
 """
 
 import math
@@ -13,7 +13,7 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 class PendingDisplacements:
-    """Displacements in order of arrival, each with its stamp."""
+    """The waiting displacements in order of arrival, each with its stamp in s."""
 
     def __init__(self) -> None:
         self._waiting: list[tuple[DisplacementReading, float]] = []
@@ -26,33 +26,37 @@ class PendingDisplacements:
         self._waiting.append((reading, stamp_s))
 
     def take(self) -> list[tuple[DisplacementReading, float]]:
-        """Return all of them and keep none."""
+        """Return all displacements and keep none."""
         waiting, self._waiting = self._waiting, []
         return waiting
 
     def forget_losses(self) -> None:
-        """Forget the losses before the first, which are known by other means."""
+        """Forget the losses before the first displacement, as they are known by other means."""
         if self._waiting:
             reading, stamp_s = self._waiting[0]
             self._waiting[0] = replace(reading, lost=0), stamp_s
 
     @property
     def lost(self) -> int:
-        """The number of displacements that are missing before the first."""
+        """Number of displacements that are missing before the first."""
         return self._waiting[0][0].lost if self._waiting else 0
 
     @property
     def lost_s(self) -> float:
-        """The same in board time."""
+        """Board time of the displacements that are missing before the first, in s."""
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
     @property
     def duration_s(self) -> float:
-        """Board time that they stand for, as far as it is known."""
+        """Board time of the waiting displacements, as far as it is known, in s."""
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
-        """Time between the last stamp and the first displacement, without a report."""
+        """Return the time without a report before the first displacement, in s.
+
+        ``last_stamp_s``: stamp of the displacement before it; the start of the gap if the first one
+        does not give its duration.
+        """
         if not self._waiting:
             return 0.0
         reading, stamp_s = self._waiting[0]
@@ -61,7 +65,11 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """The same, as far as the stamps show it beside what the first one stands for itself."""
+        """Return the part of ``unheard_s`` that the stamps leave for a gap, in s.
+
+        This is at most the time since ``last_stamp_s`` minus the duration of the first
+        displacement.
+        """
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:
             return unheard_s
@@ -71,7 +79,7 @@ class PendingDisplacements:
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
     def before(self, board: Pose) -> Pose:
-        """The pose at which they began if they end at this pose."""
+        """Return the pose at which the displacements began if they end at ``board``."""
         start = Pose(
             yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)
         )
@@ -82,12 +90,12 @@ class PendingDisplacements:
 
 
 def chord(reading: DisplacementReading) -> Pose:
-    """The displacement in its own frame."""
+    """Return the displacement in its own frame."""
     return Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
 
 
 def advanced(board: Pose, reading: DisplacementReading) -> Pose:
-    """A pose in the board's frame after this displacement."""
+    """Return the pose in the board's frame after this displacement."""
     if reading.frame == "earth":
         return Pose(
             board.x_m + reading.dx_m, board.y_m + reading.dy_m, board.yaw_rad + reading.dyaw_rad

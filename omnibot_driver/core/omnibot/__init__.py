@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Neuron OmniBot's STM32 motor board, and nothing else."""
+"""The Neuron OmniBot's STM32 motor board: its protocol, frames and settings."""
 
 from omnibot_driver.core.omnibot.board import OmniBot
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder

@@ -2,8 +2,8 @@
 
 """The OmniBot board as a ``core.board.Board``: its bytes as readings, requests as its bytes.
 
-Source: the board's manual ver. 0.3. ``translation`` explains what the board sends, what it is
-ordered to do in ``command_encoder``.
+Source: the board's manual ver. 0.3. ``translation`` describes the data from the board,
+``command_encoder`` the commands to it.
 """
 
 import math
@@ -46,7 +46,7 @@ TRAITS: Final = Traits(
     requests=frozenset(Request),
     wheels=("A", "B", "C"),
     unheard_s=0.3,  # it may be restarting
-    silence_s=1.5,  # it says something at least once a second
+    silence_s=1.5,  # it sends something at least once a second
     advice={
         Fault.WRONG_WAY: (
             "check `control_method`, `axis_signs`, `delta_frame` and the wiring of the wheels"
@@ -94,7 +94,7 @@ class OmniBot:
 
     @property
     def settings(self) -> OmniBotSettings:
-        """The settings that the wire does not reveal."""
+        """Settings that the driver cannot learn from the board's data."""
         return self._settings
 
     @settings.setter
@@ -104,7 +104,7 @@ class OmniBot:
         self._nothing_begun = SampleBoundary(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
 
     def connect(self) -> None:
-        """Begin a new connection: keep nothing but the board's counters."""
+        """Begin a new connection, and keep only the counters."""
         self._decoder = FrameDecoder(
             self._settings.pose_byte_order,
             ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g],
@@ -113,18 +113,21 @@ class OmniBot:
         )
         self._decoder.statistics = self._statistics
         self._pieces: list[Piece] = []
-        """The beginning of an IMU frame, if it came by itself."""
+        """First bytes of an IMU frame that came by itself, until the rest arrives."""
         self._translation.connect()
         self._modes = self._translation.modes
 
     @property
     def mode(self) -> Mode:
-        """The present belief."""
+        """The mode, as inferred from the board's data."""
         return self._modes.mode
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """The boundary by the IMU frame in hand, complete or begun, and the bytes after it."""
+        """Where the last read ended among the samples; None while that is uncertain.
+
+        It is found from the IMU frame in hand, complete or begun, and the bytes after it.
+        """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
         elif self._decoder.at_rest:
@@ -145,7 +148,7 @@ class OmniBot:
 
     @property
     def figures(self) -> BoardFigures:
-        """Counters over all connections."""
+        """Counters over all connections, and the expected rates in Hz."""
         return BoardFigures(
             rates_hz=self._schedule.rates_hz,
             faults=self._statistics.faults,
@@ -154,16 +157,19 @@ class OmniBot:
         )
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Advice on the accelerometer's range."""
+        """Return advice on the accelerometer's range; empty if ``gravity_mps2`` is near gravity.
+
+        ``gravity_mps2``: specific force at rest in m/s².
+        """
         return gravity_advice(gravity_mps2, self._settings.imu.accel_range_g)
 
     @property
     def advice(self) -> str | None:
-        """A sentence on the parameter that contradicts what the board sends."""
+        """A sentence on a setting that the board's data contradicts; None without one."""
         return self._translation.suspicion.advice
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """The readings that these bytes complete, in the order of the line."""
+        """Return the readings that these bytes complete, in the order of the line."""
         pieces, line = self._pieces, (self._decoder, self._translation)
         single = take_pieces(pieces, data, now, *line) if pieces else take_single(data, now, *line)
         if single:
@@ -177,7 +183,7 @@ class OmniBot:
         return before + self._translation.readings(found, self._decoder.skipped, now)
 
     def _decode_pieces(self) -> list[Reading]:
-        """The pieces that waited for the rest of a frame, one by one."""
+        """Decode the waiting pieces of an IMU frame one by one, and return their readings."""
         pieces, self._pieces = self._pieces, []
         readings: list[Reading] = []
         for data, now in pieces:
@@ -186,7 +192,7 @@ class OmniBot:
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """The line is closed: what was held is all there will be."""
+        """Return the readings that the held bytes still prove, after the line was closed."""
         readings = self._decode_pieces()
         found = self._decoder.flush(now)
         return readings + self._translation.readings(found, self._decoder.skipped, now)
@@ -196,62 +202,65 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
-        """Nothing to do: only the wheels turn, and they are stopped."""
+        """Do nothing: the board switches nothing but the wheels, and they are stopped."""
 
     def due(self, now: float) -> Packets:
-        """No packets: the board sends without polling."""
+        """Return no packets, because the board sends without polling."""
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """No readings: the board sends without polling."""
+        """Return no readings, because the board sends without polling."""
         return []
 
     def reset_odometry(self) -> None:
-        """No effect: the board has no such request."""
+        """Do nothing: the board does not have such a request."""
 
     def leave(self) -> None:
-        """No effect: whatever goes out is a command."""
+        """Do nothing: ``due`` never returns packets that could be left out."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
-        """The stream of repeated frames."""
+        """Return the stream that encodes commands and repeats their frames."""
         return SetpointStream(self._encoder, proof)
 
     def wake(self) -> Packets:
-        """Stop; the zeros before it wake the board."""
+        """Return Stop; the zero bytes before it wake the board."""
         return packed(STOP)
 
     def start(self) -> Packets:
-        """The letter S, which starts the board."""
+        """Return the letter S, which starts the board."""
         self._translation.apply(Happening.SENT_START)
         return packed(transmission(frames.FORCE_START))
 
     def pause(self) -> Packets:
-        """Stop, then P: a toggle, so refused unless the board is known to run."""
+        """Return Stop and the letter P.
+
+        P toggles, so RequestRefused is raised unless the board is known to run.
+        """
         self._translation.apply(Happening.SENT_PAUSE)
         return packed(transmission(frames.encode(frames.STOP), frames.TOGGLE_PAUSE))
 
     def force_pause(self) -> Packets:
-        """Stop, S, P: S makes it run in any case, so that the toggle has one outcome."""
+        """Return Stop, S and P: S makes the board run in any case, so P pauses it."""
         stop = frames.encode(frames.STOP)
         return packed(transmission(stop, frames.FORCE_START, frames.TOGGLE_PAUSE))
 
     def reset(self) -> Packets:
-        """Stop, then R."""
+        """Return Stop and the letter R, which reboots the board."""
         self._translation.apply(Happening.SENT_RESET)
         return packed(transmission(frames.encode(frames.STOP), frames.RESET))
 
     def stop(self) -> Packets:
-        """The manual's Stop, which stands still whatever the board's control switch says."""
+        """Return the manual's Stop, which works in both positions of the board's control switch."""
         return self._encoder.stop()
 
     def emergency_stop(self) -> Packets:
-        """The manual's E-stop."""
+        """Return the manual's E-stop."""
         return self._encoder.emergency_stop()
 
     def switch_off(self) -> Packets:
-        """Nothing."""
+        """Return no packets, because the board drives nothing but the wheels."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """The last words, which do not change."""
+        """Return the packets for Stop and for the emergency stop, which never change."""
         return LAST_WORDS

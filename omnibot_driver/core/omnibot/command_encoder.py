@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Orders as the board's frames. It knows no modes, and not when anything is sent.
+"""The encoder that turns orders into the board's frames; it knows neither modes nor send times.
 
-Velocity and wheel commands are in the firmware's own unit, which ``linear_scale`` and
-``angular_scale`` translate (70 and 500 are the vendor's, found by hand). Commanded poses are taken
-to have the unit of those that are sent, mm and mrad; this is not verified.
+Velocity and wheel commands are in the firmware's own unit, to which ``linear_scale`` and
+``angular_scale`` convert (70 and 500 are the vendor's values, found by hand). Commanded poses are
+assumed to have the unit of the poses that the board sends, mm and mrad; this is not verified.
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,10 @@ EMERGENCY_STOP_PACKETS: Final = packed(EMERGENCY_STOP)
 
 
 class CommandEncoder:
-    """``settings`` may be replaced at any time; ``saturated`` counts commands that did not fit."""
+    """Encodes orders as packets, with the scales of ``settings``.
+
+    ``settings`` may be replaced at any time; ``saturated`` counts commands that did not fit.
+    """
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self.saturated = 0
@@ -44,7 +47,7 @@ class CommandEncoder:
 
     @property
     def settings(self) -> OmniBotSettings:
-        """The scales."""
+        """The settings, of which the scales and radii are used."""
         return self._settings
 
     @settings.setter
@@ -53,7 +56,7 @@ class CommandEncoder:
         self._last: tuple[Order, Packets] | None = None
 
     def encode(self, order: Order) -> Packets:
-        """The frame for an order that is within the limits. Raises CommandRefused."""
+        """Return the packets of an order that is within the limits. Raises CommandRefused."""
         if self._last is not None and self._last[0] is order:
             return self._last[1]
         if isinstance(order, Drive):
@@ -69,28 +72,31 @@ class CommandEncoder:
         return packets
 
     def stop(self) -> Packets:
-        """The manual's Stop, which stands still whatever the board's control switch says."""
+        """Return the manual's Stop, which works in both positions of the board's control switch."""
         return STOP_PACKETS
 
     def emergency_stop(self) -> Packets:
-        """The manual's E-stop."""
+        """Return the manual's E-stop."""
         return EMERGENCY_STOP_PACKETS
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode base vector control; Stop if it rounds to zero."""
+        """Encode a twist for base vector control; return Stop if it rounds to zero."""
         settings = self._settings
         linear, angular = settings.linear_scale, settings.angular_scale
         counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)
         return self._drive(frames.VELOCITY_MODE, counts)
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Independent wheel drive in rad/s: the unit on the wire is that of a rim speed."""
+        """Encode wheel rates in rad/s for independent wheel drive.
+
+        The unit on the wire is that of a rim speed: ``linear_scale`` LSB per m/s.
+        """
         unit = self._settings.linear_scale * self._settings.wheel_radius_m
         a, b, c = rates_radps
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """The motion that the last command frame means, by its mode and words."""
+        """Return the twist that the last command frame means, by its mode and words."""
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])
         linear = settings.linear_scale
@@ -102,7 +108,10 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Encode a goal for positional control; the origin is a pose like any other."""
+        """Encode a goal for positional control; the origin is a goal too, and not replaced by Stop.
+
+        Raises CommandRefused if a coordinate does not fit, or if its bytes could act as a letter.
+        """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
         if not all(abs(count) < MAX_WORD + 0.5 for count in counts):

@@ -1,13 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What speaks for and against a reading of the bytes, in one currency.
+"""The cost of an interpretation of the bytes: all evidence for and against it in one unit.
 
 A cost is about the negative logarithm of a probability: 1 is a factor of three. This module knows
 what a board is likely to send after what it sent before, and how likely a line damages it; it does
-not know how readings are searched (``trellis``) or when one is believed (``decoder``).
+not know how interpretations are searched (``trellis``) or when one is accepted (``decoder``).
 
-Content is soft evidence: all of a frame's together stays below what it costs to call the frame
-damaged, so a true shock between two whole frames is delivered.
+Content is soft evidence: the cost of a frame's content stays below the cost of calling the frame
+damaged, so a true shock between two complete frames is delivered.
 """
 
 from math import ceil, floor
@@ -24,72 +24,86 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
-# What the line does.
+# Damage by the line.
 ONE_BYTE: Final = 5.5
-"""A frame that lost or gained one byte: one in 250, which is a byte in three thousand."""
+"""A frame that lost or gained one byte: one frame in 250, or one byte in three thousand."""
 TWO_BYTES: Final = 8.5
-"""The same twice in one frame: rarer, but both faults come in bad times."""
+"""A frame that lost or gained two bytes: rarer, but both faults come in bad times."""
 BROKEN_OFF: Final = 9.0
-"""A frame of which the last three bytes or more are missing: a burst was lost."""
+"""A frame whose last three or more bytes are missing: a burst was lost."""
 HEADER_BYTE: Final = 7.5
-"""A frame that lost half of its header: two places among the 9 to 15 where it may lose a byte."""
+"""A frame that lost half of its header: two of the 9 to 15 places where it may lose a byte."""
 HEADER_IN_PLACE: Final = 4.0
-"""A frame that gained bytes, though a header stands where it would end without them."""
+"""Added for a frame that gained bytes, if a header is where it would end without them."""
 BAD_RUN: Final = 6.0
-"""A run of unexplained bytes begins: a burst was lost, or noise."""
+"""Beginning of a run of unexplained bytes (a bad run): a burst was lost, or noise."""
 BAD_TAIL: Final = 2.5
-"""... right after a whole frame, with no header of its own: a burst seldom begins just there."""
+"""Added if a bad run begins after a complete frame and without a header, as bursts seldom do."""
 UNKNOWN_START: Final = 1.0
-"""Out of step, the first bytes are a part of a frame: most silences are between frames."""
+"""A start out of step, within a frame: most silences are between frames."""
 BAD_BYTE: Final = 0.35
-"""Each byte of such a run; sooner a frame of odd content than 14 unexplained bytes."""
+"""Each byte of a bad run; 14 of them cost more than a frame of odd content."""
 BAD_HEADER: Final = 0.5
-"""A header within such a run: chance makes few, a gyro at rest some."""
+"""A header within a bad run: few arise by chance, some from a gyro at rest."""
 GAP: Final = 5.0
-"""The line was idle within a frame, though the board sends each without a pause..."""
+"""A frame within which the line was idle, though the board sends frames without a pause."""
 BAD_TEXT: Final = 4.0
-"""A whole text within such a run: nine given letters are not a coincidence."""
+"""A complete text within a bad run: nine fixed letters are not a coincidence."""
 KNOWN_GAP: Final = 11.0
-"""... and so far the pauses of this line have always stood between frames. Too much to believe the
-frame; not enough to forget that it may be the pause that deceives."""
-CUT_SHORT: Final = 6.0
-"""The line was closed within a frame."""
-ENDS_IN_NOISE: Final = 2.0
-"""The line falls silent within a bad run, though it does so behind frames, for about ten bytes."""
+"""A frame within which the line was idle, on a line that so far paused only between frames.
 
-# What the board sends. A true IMU frame adds up to 6.5 at most, a delta or a
-# pose to 4.5.
+Too high to accept the frame; low enough to allow for a pause that misleads.
+"""
+CUT_SHORT: Final = 6.0
+"""A frame within which the line was closed."""
+ENDS_IN_NOISE: Final = 2.0
+"""A line that falls silent within a bad run, though it normally does so after a frame."""
+
+# Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
+# pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""Number of words far from the ones before them. One makes a frame odd, a shock moves several."""
+"""Cost by the number of IMU words that are far from those of the frame before.
+
+One such word makes a frame odd; a shock moves several.
+"""
 AFTERSHOCK: Final = 1.5
-"""All that can be said against an IMU frame after one that was odd already: a shock rings."""
+"""Cost of an odd IMU frame after another odd one, because a shock rings."""
 WEIGHTLESS: Final = 2.5
-"""The accelerometer's norm is below 0.5 g or above 2.5 g: a fall, a shock, or other words."""
+"""An accelerometer norm below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
-"""Weightless, with an IMU header among the accelerations: in a run of IMU frames a gyro that reads
--6 makes a second, shifted run, which has its gyro where the accelerometer should be."""
+"""A norm below 0.5 g, with an IMU header among the accelerations.
+
+In a run of IMU frames a gyro that reads -6 makes a second, shifted run, which has gyro words in the
+place of the accelerometer's.
+"""
 JUMP: Final = 2.5
-"""A counter that is not the next one: something before it was lost."""
+"""A counter that is not the next one: a frame before it was lost."""
 IMPOSSIBLE: Final = 2.0
-"""A movement that no robot of this kind makes."""
+"""A movement that a robot of this kind cannot make."""
 OFF_BEAT: Final = 1.0
-"""Not as many IMU frames to a delta, or deltas to a pose, as the schedule has: four, and five."""
+"""A number of IMU frames per delta, or of deltas per pose, that differs from the schedule's.
+
+With deltas at 25 Hz these are four and five.
+"""
 
 CONTRADICTED: Final = 1.5
-"""A pose that is turned otherwise than by the sum of the deltas since the one before."""
+"""A pose whose turn since the pose before differs from the sum of the deltas between them."""
 
 IMU_HEADER_WORD: Final = -6
 """FF FA, read as a signed word."""
 ROUNDING: Final = 4.0
-"""Of five deltas, in 0.1 mrad."""
+"""Largest rounding error of the sum of five deltas, in 0.1 mrad."""
 LARGEST_DELTA: Final = 4000
-"""Deltas are in 0.1 mm and 0.1 mrad: 10 m/s or 10 rad/s."""
+"""Largest possible delta in 0.1 mm or 0.1 mrad: 10 m/s or 10 rad/s for 40 ms."""
 FARTHEST_POSE: Final = 1e7
-"""Poses are in mm and mrad: beyond 10 km, or 1600 turns, a pose is other bytes misread."""
+"""Limit of a pose in mm or mrad: 10 km, or 1600 turns.
+
+Beyond it, other bytes were misread as a pose.
+"""
 LONGEST_STEP: Final = 2000.0
-"""Between two poses: 10 m/s, or 10 rad/s, for 200 ms."""
+"""Largest possible step between two poses in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""This many IMU frames without a delta, and none is expected."""
+"""Number of missed deltas after which a delta is not expected any more."""
 
 
 class Context(NamedTuple):
@@ -99,16 +113,16 @@ class Context(NamedTuple):
     seq: int | None = None
     pose: PoseFrame | None = None
     imus: int = 0
-    """IMU frames since the last delta."""
+    """Number of IMU frames since the last delta."""
     deltas: int = 0
-    """Deltas since the last pose."""
+    """Number of deltas since the last pose."""
     shaken: bool = False
-    """The last IMU frame was a leap, or weightless."""
+    """Whether the last IMU frame leapt, or its norm was out of range."""
     turned: int | None = None
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
-        """The context after an unknown loss."""
+        """Return the context after an unknown loss."""
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 
@@ -116,7 +130,7 @@ NOTHING_KNOWN: Final = Context()
 
 
 class Expectation:
-    """Judges content by what came before; it learns how much the sensor's words scatter."""
+    """Judges content by the frames before it, and learns how much the sensor's words scatter."""
 
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
         self.imus_per_delta = schedule.imus_per_delta
@@ -128,12 +142,14 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
-        """Between the first two the squared norm of an acceleration costs nothing; nor does a step
-        of less than the third in one of its words, or than the fourth in one of the gyro's. In
-        whole numbers, with which Python compares twice as fast."""
+        """Limits within which an IMU frame costs nothing, in counts.
+
+        Least and greatest squared norm of the acceleration, largest step of an acceleration word,
+        largest step of a gyro word. They are integers, which Python compares twice as fast.
+        """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
-        """The cost of a whole frame's content, and what is known after it."""
+        """Return the cost of a complete frame's content, and the context after it."""
         if type(frame) is ImuFrame:
             last, seq, pose, imus, deltas, shaken, turned = before
             ax, ay, az = frame.accel
@@ -200,7 +216,7 @@ class Expectation:
         return (cost if on_beat else cost + OFF_BEAT), after
 
     def learn(self, frame: ImuFrame, last: ImuFrame) -> None:
-        """Learn from two accepted frames in a row."""
+        """Learn the sensor's scatter from two consecutive accepted frames."""
         (x, y, z), (px, py, pz) = frame.accel, last.accel
         (u, v, w), (pu, pv, pw) = frame.gyro, last.gyro
         d_accel = max(abs(x - px), abs(y - py), abs(z - pz))
@@ -213,7 +229,7 @@ class Expectation:
         self.calm = lightest, heaviest, ceil(self._accel_limit), ceil(self._gyro_limit)
 
     def more_is_due(self, frame: Frame, before: Context) -> bool:
-        """The board may send another frame in the same tick, without a pause."""
+        """Return whether the board may send another frame in the same tick, without a pause."""
         if isinstance(frame, ImuFrame):
             if before.seq is not None:
                 return before.imus >= self.imus_per_delta - 1
@@ -223,7 +239,10 @@ class Expectation:
 
 
 def may_be_lent(frame: Frame, before: Context) -> bool:
-    """Its last byte may be the next header's. Not so if it is what the sensor said before."""
+    """Return whether the last byte of this frame may belong to the next header.
+
+    It hardly does in an IMU frame whose last word is that of the frame before, except for FF.
+    """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT
         said = before.imu is not None and frame.gyro[2] == before.imu.gyro[2]

@@ -1,16 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From a stream of bytes to frames: finding where a frame begins, and proving it.
+"""The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-The protocol has no checksum and its header words are the commonest readings of a gyro at rest, so
-a header alone proves nothing. A frame is believed for what stands around it, in two ways:
+The protocol has no checksum and its header words are the commonest readings of a gyro at rest, so a
+header alone proves nothing. A frame is accepted because of the bytes around it, in two ways:
 
-* *In step* (the byte before it ended a believed frame) a frame comes out with its last byte while
-  nothing speaks against it: what follows in hand begins like a frame, its content is not a spike,
-  the line was not idle within it, and its last byte is not one that the next header may have lent.
-* *In doubt* all readings of the bytes in hand compete (``trellis``), priced by all the evidence
-  (``cost_model``). A frame of the cheapest reading comes out when every reading without it is
-  clearly dearer; where two are close, nothing is said. A doubt waits for ``DOUBT_BYTES``.
+* *In step* (the byte before it ended an accepted frame) a frame is returned with its last byte
+  unless evidence speaks against it. The evidence: what follows in hand does not begin like a frame,
+  its content is a spike, the line was idle within it, or its last byte may belong to the next
+  header.
+* *Uncertain* bytes are interpreted in all possible ways, which compete (``trellis``) by the cost of
+  all the evidence (``cost_model``). A frame of the cheapest interpretation is returned when every
+  interpretation without it costs clearly more; where two are close, nothing is returned. Uncertain
+  bytes wait until ``DOUBT_BYTES`` are held, at most.
 
 This module reads no clock and never raises on input. It holds less than ``DOUBT_BYTES`` between
 calls, and looks at each byte a bounded number of times.
@@ -40,35 +42,36 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""A content of this cost waits for what follows."""
+"""Cost of its content from which a frame waits for the bytes that follow it."""
 DOUBT_BYTES: Final = 170
-"""100 ms of the nominal stream."""
+"""Number of uncertain bytes that force a decision: 100 ms of the nominal stream."""
 SHORTEST_RUN: Final = DELTA_LENGTH
-"""Bytes; fewer hold no frame that the fast path takes. Adapters hand over pieces."""
+"""Least number of bytes in which the fast path finds a frame; adapters deliver small pieces."""
 CALM_S: Final = 10.0
-"""A line that has lost no byte in this time loses few: a frame need not wait until it is sure that
-its last byte is its own."""
+"""Time in s without damage after which a line is regarded as one that loses few bytes.
+
+On such a line a frame need not wait until its last byte is certain to be its own.
+"""
 FRAMES_TO_SETTLE: Final = 3
-"""Number of certain frames behind a doubtful one after which nothing more will be learnt about
-it."""
+"""Number of certain frames after an uncertain one that end the wait for more evidence."""
 
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counters since the decoder was made."""
+    """Counters that a decoder adds to; several decoders in succession may share them."""
 
     frames: int = 0
     discarded_bytes: int = 0
     faults: int = 0
-    """How often bytes in step were not frames."""
+    """How often the bytes after an accepted frame were not a frame."""
 
 
 class FrameDecoder:
-    """Feed it what the line brings, in any chunking; it returns the frames that were in it.
+    """Finds the frames in the bytes of a line, whatever chunks the bytes arrive in.
 
-    ``single_imu`` takes frames past it, and keeps what is known here up to date: ``context`` (the
-    frames before the next one), ``expectation`` (what its content may be), ``pauses`` (where the
-    line was idle) and ``last_arrival_s``.
+    ``single_imu`` decodes some frames without this class, and updates its state: ``context`` (the
+    frames before the next one), ``expectation`` (what the content of the next one may be),
+    ``pauses`` (where the line was idle) and ``last_arrival_s``.
     """
 
     def __init__(
@@ -80,9 +83,9 @@ class FrameDecoder:
     ) -> None:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
-        """For each frame of the last call, how many bytes before it were none."""
+        """Number of bytes before each frame of the last call that were not a frame."""
         self.at_rest = False
-        """All that came was understood, and pauses stand where they should."""
+        """Whether all bytes so far are decoded, and pauses are where they should be."""
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self.expectation = Expectation(accel_counts_per_g, schedule)
@@ -93,9 +96,9 @@ class FrameDecoder:
         self.last_arrival_s = self._damaged_at_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
-        """The frames that are complete with these bytes, in the order of the line.
+        """Return the frames that these bytes complete, in the order of the line.
 
-        ``now``: arrival time of ``data`` in seconds, of any steady clock.
+        ``now``: arrival time of ``data`` in s, of any steady clock.
         """
         found: list[Frame] = []
         self.skipped = []
@@ -115,7 +118,7 @@ class FrameDecoder:
         return found
 
     def flush(self, now: float) -> list[Frame]:
-        """The line is closed, or was silent: return what the held bytes still prove."""
+        """Return the frames that the held bytes still prove, as the line was closed or silent."""
         self.last_arrival_s = now
         found: list[Frame] = []
         self.skipped = []
@@ -126,7 +129,7 @@ class FrameDecoder:
 
     @property
     def begun(self) -> bytes | None:
-        """The received part of the next frame; None while in doubt about it."""
+        """The received part of the next frame; None while the framing is uncertain."""
         held = self._held
         if not self._in_step:
             return None
@@ -136,7 +139,7 @@ class FrameDecoder:
 
     @property
     def fresh(self) -> bool:
-        """Whether bytes of the last frame that came out were in the last call."""
+        """Whether the last call brought bytes of the last accepted frame."""
         return len(self._held) < self._arrived
 
     def _close(self, found: list[Frame]) -> None:
@@ -146,7 +149,7 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Take all that came, if frames were due and they are calm from the first to the last."""
+        """Accept all new bytes if they are calm frames that were due; return whether they were."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
@@ -158,7 +161,7 @@ class FrameDecoder:
         return True
 
     def _settle(self, found: list[Frame], *, closed: bool) -> None:
-        """Take frames from what is held, until nothing is left or more bytes must tell."""
+        """Decode the held bytes until none is left, or until a decision needs more bytes."""
         held = self._held
         while held:
             if not closed and len(held) < self._wait_for:
@@ -172,12 +175,12 @@ class FrameDecoder:
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
-        """Take frames in step until there is a doubt; returns whether there is none."""
+        """Accept frames in step until one is uncertain; return whether none was."""
         held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
         while at < size:
-            paused = gaps and gaps[-1].first > at  # within what follows
+            paused = gaps and gaps[-1].first > at  # within the bytes from here on
             if not paused and size - at >= SHORTEST_RUN:
                 at, context = take_run(held, at, context, expectation, order, walk)
                 if at == size:
@@ -214,30 +217,31 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Whether the last byte in hand may be the first of another frame, as times tell.
+        """Return whether the last byte in hand may be the first of another frame, by arrival times.
 
-        ``start``, ``length``: of the frame in hand; ``due``: another one may follow at once.
+        ``start``, ``length``: of the frame in hand; ``due``: whether another one may follow at
+        once.
         """
         pauses, calm = self.pauses, self.calm
-        if self._arrived >= length:  # what is sent at once begins after a pause
+        if self._arrived >= length:  # in one read: what is sent at once begins after a pause
             return not (pauses.sharp or (calm and pauses.collected and not due))
         in_time = pauses.at_pace or (calm and pauses.in_its_tick(start))
         return due or not (pauses.sharp and in_time)
 
     @property
     def calm(self) -> bool:
-        """Whether no damage has been seen for long."""
+        """Whether no damage was seen for longer than ``CALM_S``."""
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of a run except the last two, which are in doubt; returns False."""
+        """Accept the frames of a run except the last two, which are uncertain; return False."""
         believed = len(walk.frames) - 2
         if believed > 0:
             self._take(walk, believed, walk.known_after(believed, self.expectation), found)
         return False
 
     def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
-        """Accept the first of these frames, this many."""
+        """Accept the first ``count`` frames of ``walk``; ``after``: the context after them."""
         if not count:
             return
         self.statistics.frames += count
@@ -258,7 +262,7 @@ class FrameDecoder:
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
-        """Take what is certain, drop what stays doubtful; returns whether that settled anything."""
+        """Accept certain frames, discard what stays uncertain; return whether either happened."""
         state = self.context, self.expectation, self.pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0
@@ -282,9 +286,9 @@ class FrameDecoder:
     def _settled(
         self, pieces: list[Segment], size: int, until: int, closed: bool
     ) -> Iterator[tuple[Segment, bool]]:
-        """The first pieces, as far as no more will be learnt about them, and whether to take them.
+        """Yield the first pieces that later bytes cannot change, each with whether to accept it.
 
-        What ends before ``until`` has waited long enough.
+        A piece that ends before or at ``until`` has waited long enough, and is yielded too.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
@@ -309,7 +313,7 @@ class FrameDecoder:
             yield piece, sure
 
     def _drop(self, count: int) -> None:
-        """Drop the first held bytes, which are not frames."""
+        """Discard the first ``count`` held bytes, which are not frames."""
         if not count:
             return
         self._damaged_at_s = self.last_arrival_s

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The commonest frames, quickly: those that nothing at all speaks against, and shocks that go on.
+"""The fast path for frames that no evidence speaks against, and for shocks that continue.
 
-It takes what the decoder's own loop would take with the evidence ``weigh`` finds, and nothing else:
-a test holds one against the other. What costs anything else is left to that loop. An IMU frame that
-comes by itself has a quicker way still (``single_imu``).
+It accepts what the decoder's own loop would accept by the evidence from ``weigh``, and nothing
+else: a test compares the two. Frames with any other cost are left to that loop. An IMU frame that
+comes by itself has an even faster path (``single_imu``).
 """
 
 import struct
@@ -44,22 +44,22 @@ _POSE: Final = {
     "little": struct.Struct("<3fB").unpack_from,
 }
 
-# A frozen object is made in a third of the time from one of the same slots that is not frozen yet.
+# A frozen object is made in a third of the time from an unfrozen one with the same slots.
 UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
     type(kind.__name__, (), {"__slots__": vars(kind)["__slots__"]})
     for kind in (ImuFrame, DeltaFrame, PoseFrame)
 )
 
 LEARN_EVERY: Final = 8
-"""Frames; more would teach the expectation nothing new."""
+"""Number of frames per lesson; more lessons would teach the expectation nothing new."""
 
 
 class Walk:
-    """Frames in a row, from the first byte held on, that nothing speaks against.
+    """Consecutive frames, from the first byte held on, that no evidence speaks against.
 
-    ``ends``: of each; ``lessons``: numbers of frames from which the expectation is to learn, each
-    with two readings; ``known``: what was known after that many frames (fields of a Context), never
-    more than a few apart.
+    ``ends``: the end of each frame; ``lessons``: frames from which the expectation is to learn, as
+    the frame's number, the frame and the IMU frame before it; ``known``: a number of frames and the
+    context after them (as fields of a Context), every few frames.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -71,7 +71,7 @@ class Walk:
         self.known: list[tuple[int, Any]] = [(0, context)]
 
     def add(self, end: int, frame: Frame, before: Context) -> None:
-        """Add a frame."""
+        """Add a frame that ends at ``end``; ``before``: the context before it."""
         number = len(self.frames)
         is_lesson = not number % LEARN_EVERY and not before.imus & 3
         if is_lesson and type(frame) is ImuFrame and before.imu is not None:
@@ -81,7 +81,7 @@ class Walk:
         self.ends.append(end)
 
     def known_after(self, count: int, expectation: Expectation) -> Context:
-        """What was known after this many frames."""
+        """Return the context after the first ``count`` frames."""
         place = len(self.known) - 1
         while self.known[place][0] > count:
             place -= 1
@@ -93,7 +93,10 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Whether one or two whole frames follow: then it is a shock, not damage."""
+    """Return whether frames follow at ``at``: then odd content before it is a shock, not damage.
+
+    One complete frame must follow, and the bytes after it must not contradict a second one.
+    """
     if at == len(held):
         return closed
     length = measure(held, at)
@@ -111,9 +114,9 @@ def take_run(
     order: ByteOrder,
     walk: Walk,
 ) -> tuple[int, Context]:
-    """Add the calm frames that begin here; where they end, and what is known then.
+    """Add the calm frames at ``at`` to ``walk``; return their end, and the context there.
 
-    The last one in hand is left out where its last byte may be lent.
+    The last frame in hand is left out if its last byte may belong to the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:
@@ -127,7 +130,7 @@ def take_run(
     size = len(held)
     final = size - 1
     frame: Any
-    x: int  # a struct has no types, and compiled code is quicker with whole numbers
+    x: int  # a struct has no types, and compiled code is faster with integers
     y: int
     z: int
     u: int

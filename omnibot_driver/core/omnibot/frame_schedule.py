@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The order in which a running board sends, and what it tells of bytes that made no frame.
+"""The order in which a running board sends frames, and what it reveals about lost frames.
 
 In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta (with deltas at
-10 Hz every tenth, and every second); in IMU-only mode there are IMU frames alone. So the number of
-bytes between two frames tells which frames they were, also when a few of them are missing. It is
-soft knowledge: SEQ and arrival times correct it.
+10 Hz every tenth, and every second); in IMU-only mode only IMU frames are sent. So the number of
+bytes between two frames shows which frames they were, even if a few of the bytes are missing. This
+is soft knowledge: SEQ and arrival times correct it.
 """
 
 from functools import cache
@@ -20,7 +20,10 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 
 
 class Cycle:
-    """``after[kind][at]``: where a board is that was at ``at`` and now sent this."""
+    """A repeating sequence of frame kinds.
+
+    ``after[kind][at]``: the position of a board that was at position ``at`` and then sent ``kind``.
+    """
 
     def __init__(self, *kinds: Kind) -> None:
         self.kinds = kinds
@@ -54,9 +57,11 @@ class FrameSchedule:
         self._imus = self._lost = 0
 
     def hear(self, kind: Kind, skipped: int) -> int:
-        """How many IMU frames the bytes before this frame were, which made none.
+        """Return how many IMU frames were lost before this frame.
 
-        With those that a pose came after, but not beyond a delta: its SEQ counts what is before it.
+        ``skipped``: number of bytes right before it that were not a frame. IMU frames lost before a
+        pose are returned with the next frame. The count ends with a delta, because its SEQ reports
+        losses.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:
@@ -75,7 +80,7 @@ class FrameSchedule:
         return lost
 
     def hear_imus(self, count: int) -> None:
-        """This many IMU frames arrived, with nothing between them."""
+        """Note that ``count`` IMU frames arrived with nothing between them."""
         self._imus += count
         if self._imus >= self._imus_alone:
             self._cycle, self._next = IMU_ONLY, 0

@@ -3,9 +3,8 @@
 """The wire format: every frame the board sends or obeys, as bytes and as values.
 
 Source: the board's manual ver. 0.3, sections "Serial Command (Rx)", "Serial Data Output (Tx)" and
-"Appendix". This module knows layouts only; what a value means in SI units is known in
-``translation`` and ``board``.
-All words are signed, 16 bit, most significant byte first.
+"Appendix". This module knows layouts only; ``translation`` and ``command_encoder`` know what a
+value means in SI units. All words are signed, 16 bit, most significant byte first.
 """
 
 import re
@@ -23,7 +22,7 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""Last bytes of a frame that may be the first of a header, or its second."""
+"""Values of a frame's last byte that may be the first or second byte of the next header."""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")
@@ -62,7 +61,7 @@ RESET: Final = b"R"
 
 @dataclass(frozen=True, slots=True)
 class ImuFrame:
-    """100 Hz: the MPU6050's registers as they are. Full scale is 32768 counts."""
+    """Raw registers of the MPU6050, sent at 100 Hz. Full scale is 32768 counts."""
 
     accel: Words
     gyro: Words
@@ -70,7 +69,7 @@ class ImuFrame:
 
 @dataclass(frozen=True, slots=True)
 class DeltaFrame:
-    """25 Hz: motion since the last frame of this kind; 0.1 mm, 0.1 mm, 0.1 mrad, counter 0..255."""
+    """Motion since the last delta, in 0.1 mm and 0.1 mrad, sent at 25 Hz; ``seq`` is 0..255."""
 
     dx: int
     dy: int
@@ -80,7 +79,7 @@ class DeltaFrame:
 
 @dataclass(frozen=True, slots=True)
 class PoseFrame:
-    """5 Hz: the board's own pose in its earth frame; mm, mm, mrad, counter 0..255."""
+    """The board's own pose in its earth frame, in mm and mrad, sent at 5 Hz; ``seq`` is 0..255."""
 
     x: float
     y: float
@@ -90,14 +89,14 @@ class PoseFrame:
 
 @dataclass(frozen=True, slots=True)
 class PausedFrame:
-    """1 Hz while the board is initialising or paused; a counter 0..255."""
+    """A text sent at 1 Hz while the board is initialising or paused; ``count`` is 0..255."""
 
     count: int
 
 
 @dataclass(frozen=True, slots=True)
 class CommandFrame:
-    """A frame from the host: a mode byte and three words."""
+    """A command from the host: a mode byte and three words."""
 
     mode: int
     values: Words
@@ -110,18 +109,18 @@ EMERGENCY_STOP: Final = CommandFrame(EMERGENCY_STOP_MODE, (0, 0, 0))
 
 
 def command(mode: int, a: int, b: int, c: int) -> bytes:
-    """The bytes of a CommandFrame whose values fit."""
+    """Return the bytes of a command frame; ``a``, ``b`` and ``c`` must fit into 16 bits."""
     return _COMMAND.pack(COMMAND_HEADER, mode, a, b, c)
 
 
 def last_command(data: bytes) -> tuple[int, int, int, int]:
-    """Mode and words of the command frame that these bytes end with; zeros if it is none."""
+    """Return mode and words of the command frame that ``data`` ends with; zeros without one."""
     header, mode, a, b, c = _COMMAND.unpack(data[-_COMMAND.size :].rjust(_COMMAND.size, b"\0"))
     return (mode, a, b, c) if header == COMMAND_HEADER else (0, 0, 0, 0)
 
 
 def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> bytes:
-    """The bytes of one frame. Raises FrameError when a value does not fit its field."""
+    """Return the bytes of one frame. Raises FrameError when a value does not fit its field."""
     try:
         match frame:
             case ImuFrame(accel, gyro):
@@ -141,9 +140,9 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
 
 
 def measure(data: bytes | bytearray, at: int) -> int:
-    """Length in bytes of the frame the board may have sent here.
+    """Return the length in bytes of the frame that the board may have sent at ``at``.
 
-    INCOMPLETE while it may still become a whole frame, NO_FRAME when no frame begins so.
+    INCOMPLETE while more bytes may complete it, NO_FRAME when a frame cannot begin like this.
     """
     if data[at] == _TEXT_BEGIN:
         return _measure_paused(data, at)
@@ -156,12 +155,12 @@ def measure(data: bytes | bytearray, at: int) -> int:
 
 
 def length_begun(data: bytes | bytearray, at: int) -> int:
-    """The length in bytes of the frame that begins with this header, or NO_FRAME."""
+    """Return the length in bytes of the frame that begins with this header, or NO_FRAME."""
     return _LENGTH_BY_TYPE.get(data[at + 1], NO_FRAME)
 
 
 def is_text(data: bytes | bytearray, at: int) -> bool:
-    """Whether it can only be a text that begins here."""
+    """Return whether a text, and not a frame with a header, may begin here."""
     return data[at] == _TEXT_BEGIN
 
 
@@ -176,7 +175,7 @@ def _measure_paused(data: bytes | bytearray, at: int) -> int:
 
 
 def decode_measured(data: bytes | bytearray, pose_byte_order: ByteOrder = "big") -> Frame:
-    """Decode one frame, from as many bytes as ``measure`` returned."""
+    """Decode one frame from exactly as many bytes as ``measure`` returned."""
     if data[0] == _TEXT_BEGIN:
         return PausedFrame(int(data[len(_PAUSED_WORD) :]))
     if data[1] == IMU_HEADER[1]:
@@ -188,7 +187,7 @@ def decode_measured(data: bytes | bytearray, pose_byte_order: ByteOrder = "big")
 
 
 def decode(data: bytes, pose_byte_order: ByteOrder = "big") -> Frame | CommandFrame:
-    """The one frame that these bytes are. Raises FrameError when they are not exactly one."""
+    """Return the one frame that these bytes are. Raises FrameError unless they are exactly one."""
     if data and measure(data, 0) == len(data):
         return decode_measured(data, pose_byte_order)
     if data[:2] == COMMAND_HEADER and len(data) == _COMMAND.size:

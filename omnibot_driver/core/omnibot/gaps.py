@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Where the line was idle, and how far that may be trusted.
+"""The pauses in which the line was idle, and how far they can be trusted.
 
-A board sends a tick's frames at once, so a pause of its line stands between frames. An adapter that
-collects bytes makes pauses of its own, anywhere, and so does a reader that is scheduled late
-(``late_reads``). Which of the first two a pause is, only frames can tell: this module counts how
-often pauses stood where they should. It knows places and times; not what is in a frame, nor which
-frames are believed (``decoder``).
+A board sends the frames of a tick at once, so a pause of its line is between frames. An adapter
+that collects bytes causes pauses anywhere, and so does a reader that is scheduled late
+(``late_reads``). Only frames can show whether the line or the adapter paused: this module counts
+how often pauses were in the expected places. It knows positions and times; it does not know what a
+frame contains, nor which frames are accepted (``decoder``).
 """
 
 from bisect import bisect_right
@@ -27,27 +27,30 @@ from omnibot_driver.core.omnibot.late_reads import (
 )
 
 LATE_S: Final = 0.011
-"""While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
-collects bytes for longer shows pauses of its own."""
+"""Longest idle time in s of a line, while the board runs and no bytes are lost.
+
+An adapter that collects bytes for longer shows pauses of its own.
+"""
 BYTE_S: Final = 10 / 115200
-"""To send one, by the manual."""
+"""Time in s to send one byte at the default 115200 baud."""
 TICK_BYTES: Final = 14 + 9 + 15
-"""All that one tick can bring. More at once after a pause means that we were late, not the line."""
+"""Most bytes that one tick can bring; more at once after a pause show a late reader."""
 PAUSES_TO_TRUST: Final = 16
-"""Number of pauses in the expected places after which they are taken for the line's own."""
+"""Number of pauses in the expected places after which pauses are attributed to the line."""
 
 _FIRST: Final = attrgetter("first")
 
 
 class InterFrameGaps:
-    """``gaps``: those within the bytes held.
+    """The pauses within the bytes held, and what the pauses of this line normally show.
 
-    ``sharp``: as a rule, the first byte that comes after a pause begins a frame; ``between``: as a
-    rule, a frame begins somewhere in what comes after it. ``certain``: both have held for this time
-    that once more changes nothing. ``at_pace``: the last bytes came without a pause.
-    ``byte_s``: how long the line takes for a byte. ``collected``: the last read brought what had
-    come for longer than a tick, so it ended anywhere in a tick, and hardly just behind the first
-    byte of one.
+    ``gaps``: pauses within the bytes held. ``sharp``: normally, the first byte after a pause begins
+    a frame; ``between``: normally, a frame begins somewhere in the read after a pause; ``certain``:
+    both have held often enough that one more pause changes nothing. ``at_pace``: the last bytes
+    came without a pause. ``collected``: the last read brought bytes of more than a tick, so it
+    ended anywhere in a tick, and hardly right after the first byte of a frame.
+
+    ``byte_s``: time in s that the line takes for a byte.
     """
 
     def __init__(self, byte_s: float) -> None:
@@ -58,12 +61,15 @@ class InterFrameGaps:
         self.doubt()
 
     def doubt(self) -> None:
-        """Forget the pauses, which may have been misleading."""
+        """Stop trusting the pauses so far, which may have been misleading."""
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
-        """Bytes arrived now, to be held from this place on, this time after the last."""
+        """Note that ``arrived`` bytes were read at ``now``, ``pause_s`` after the read before.
+
+        ``place``: position of the first of them among the bytes held.
+        """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
         self.collected = pause_s > LATE_S and arrived <= 2 * TICK_BYTES
@@ -76,23 +82,26 @@ class InterFrameGaps:
         silent = pause_s >= IDLE_S
         sharp, between = self.sharp, self.between
         if pause_s > LATE_S:
-            sharp = sharp or between or silent  # bytes were lost here, and hardly whole frames
+            sharp = sharp or between or silent  # bytes were lost, hardly complete frames
             self._trust(sharp=False, between=False)
         width = 1 if sharp else arrived
         price = cost_model.KNOWN_GAP if between or silent else cost_model.GAP
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Note that the bytes after this pause began and ended with a frame."""
+        """Note that the bytes after this pause are complete frames."""
         if self.stands_out(pause_s, arrived):
             self._trust(sharp=True, between=True)
 
     def stands_out(self, pause_s: float, arrived: int) -> bool:
-        """Whether the line was idle before these bytes for longer than within any frame."""
+        """Return whether the line was idle before these bytes for longer than within any frame."""
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
-        """Do they end where frames begin? Then they are the line's, not the adapter's."""
+        """Learn whether the pauses are between frames, and thus the line's and not the adapter's.
+
+        ``ends``: the ends of the accepted frames among the bytes held.
+        """
         start = 0
         for end in ends:
             for gap in self.gaps:
@@ -102,7 +111,7 @@ class InterFrameGaps:
             start = end
 
     def against(self, data: bytes | bytearray, start: int, end: int) -> float:
-        """The cost of the pauses within these bytes, if they are taken for a frame."""
+        """Return the cost of the pauses within these bytes, if they are taken for a frame."""
         return sum(
             gap.price
             for gap in self._within(start, end)
@@ -110,16 +119,16 @@ class InterFrameGaps:
         )
 
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
-        """Whether later bytes may still explain the pause within this frame."""
+        """Return whether later bytes may still explain the pause within this frame."""
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
 
     def silent_within(self, start: int, end: int) -> bool:
-        """Whether there was a long pause of reading within these bytes."""
+        """Return whether a pause of at least ``IDLE_S`` was within these bytes."""
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Whether these bytes began after a pause, and so lately that the next tick has not."""
+        """Return whether the bytes at ``start`` followed a pause, less than half a tick ago."""
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
                 came = next(read.now for read in self._reads if read.end > start)
@@ -127,7 +136,7 @@ class InterFrameGaps:
         return False
 
     def forget(self, count: int) -> None:
-        """Forget the pauses of the first bytes, which have been decoded."""
+        """Forget the pauses within the first ``count`` bytes, which are not held any more."""
         if not self.gaps or self.gaps[-1].first < count:
             self.clear()
             return
@@ -140,11 +149,11 @@ class InterFrameGaps:
         self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
 
     def clear(self) -> None:
-        """Time tells nothing about the bytes held."""
+        """Forget all pauses, because times prove nothing about the bytes held."""
         self.gaps, self._reads = [], []
 
     def _within(self, start: int, end: int) -> Iterator[Gap]:
-        """The pauses between the first and the last of these bytes."""
+        """Yield the pauses between the first and the last of these bytes."""
         gaps = self.gaps
         for number in range(bisect_right(gaps, start, key=_FIRST), len(gaps)):
             if gaps[number].first >= end:

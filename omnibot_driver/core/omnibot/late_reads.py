@@ -1,13 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Was the line idle, or was the reader late?
+"""The cause of a pause between two reads: an idle line, or a late reader.
 
-A read is not an arrival: it returns when the reader is scheduled, and brings what the adapter has
-handed over by then. So a pause between two reads says little about the line. The board's clock
-says more: it sends an IMU frame with every tick. Where a pause within a frame stands for lost
-bytes, that frame and all that follow are late by whole ticks, for good. A late reader catches up.
+A read does not return when bytes arrive. It returns when the reader is scheduled, with the bytes
+that the adapter has delivered by then. So a pause between two reads proves little about the line.
+The board's clock proves more: the board sends an IMU frame in every tick. If bytes were lost in a
+pause within a frame, that frame and all that follow stay late by whole ticks. A late reader catches
+up.
 
-This module knows lengths, ticks and times; not what is in a frame, nor which one is believed.
+This module knows lengths, ticks and times; it does not know what a frame contains, nor which frame
+is accepted.
 """
 
 from bisect import bisect_right
@@ -28,25 +30,25 @@ from omnibot_driver.core.omnibot.frames import (
 from omnibot_driver.core.omnibot.schedule import TICK_S
 
 IDLE_S: Final = 0.1
-"""Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
+"""Pause in s that exceeds what any adapter causes (16 ms), and is ten of the board's ticks."""
 HALF_TICK_S: Final = TICK_S / 2
-"""A frame that is late by less has not missed its tick."""
+"""Delay in s below which a frame has not missed its tick."""
 GAP_S: Final = 4e-3
-"""No frame is sent with such a pause in it."""
+"""Pause in s that never occurs within a frame as the board sends it."""
 NEAR_S: Final = 2e-3
-"""Lost bytes make a board's frames late by whole ticks, within this tolerance."""
+"""Tolerance in s for delays by whole ticks, which lost bytes cause."""
 INTO_TICK_S: Final = 1e-3
-"""Delay of what follows an IMU frame in its tick, and its tolerance."""
+"""Delay in s of a frame that follows the IMU frame in its tick; the tolerance is as large."""
 PUNCTUAL_S: Final = 1e-3
-"""The delays of a punctual reader differ by less, also those of a USB adapter."""
+"""Limit in s of the differences between a punctual reader's delays, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Bytes that come at the pace of the line are early or late by less."""
+"""Largest deviation in s of bytes that arrive at the pace of the line."""
 FEW_BYTES: Final = 2
-"""Too few to tell the pace."""
+"""Number of bytes that are too few to measure the pace."""
 TICKS_TO_PROVE: Final = 2
-"""Behind a pause, each read by itself and all equally late."""
+"""Number of further ticks, read one by one and equally late, that prove lost bytes."""
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Behind a frame with a pause in it; then it is decided."""
+"""Number of bytes after a frame with a pause in it at which its cause is decided."""
 
 
 class Cause(Enum):
@@ -58,7 +60,7 @@ class Cause(Enum):
 
 
 class Read(NamedTuple):
-    """The bytes before ``end`` had been read at ``now``."""
+    """A read: at ``now`` in s, the held bytes before position ``end`` had been read."""
 
     end: int
     now: float
@@ -68,9 +70,10 @@ _END: Final = attrgetter("end")
 
 
 class Gap(NamedTuple):
-    """Somewhere from ``first`` on, and before ``before``, the line was idle, or the reader late.
+    """A pause right before a byte whose position is at least ``first`` and less than ``before``.
 
-    ``price``: of a frame around it, if the line was idle; ``pause_s``: since the read before it.
+    There the line was idle, or the reader was late. ``price``: cost of a frame around the pause if
+    the line was idle; ``pause_s``: time in s since the read before it.
     """
 
     first: int
@@ -82,17 +85,18 @@ class Gap(NamedTuple):
 def cause(
     gap: Gap, reads: list[Read], data: bytes | bytearray, start: int, end: int, byte_s: float
 ) -> Cause:
-    """Why there was a pause within these bytes, if they are a frame.
+    """Return the cause of a pause between ``start`` and ``end``, if these bytes are a frame.
 
-    ``reads``: all since the gap, with the one that ended it. The reader was late
+    ``reads``: all reads since the pause, from the one that ended it. The reader was late
 
-    * when anything that follows is in time again, unless all of it came at the pace of the line:
-      then the reader was prompt, and the frame begins in the middle of another;
-    * when bytes came faster than the line can send them: they had waited.
+    * if anything that follows is on time again. If all of it came at the pace of the line, the
+      reader may have been prompt and the frame may begin in the middle of another: then the next
+      frame decides;
+    * if bytes came faster than the line can send them, because they had waited;
+    * if the frame is a text or a text follows it, because a paused board is not due to send frames.
 
-    The line was idle when a text stands behind the pause, when the bytes that follow the frame
-    begin none, or when ticks that were read one by one are equally late. While a board is paused
-    nothing is due.
+    The line was idle if a text begins at the pause, if the bytes after the frame do not begin one,
+    or if ticks that were read one by one are equally late.
     """
     if is_text(data, start):
         return Cause.LATE_READER
@@ -148,9 +152,10 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Whether it is in one piece, as a tick's frame is, or parted by the pause of a whole tick.
+    """Return the cause of the pause, decided by the frame that begins at ``start``.
 
-    ``first``: the read that ended the pause; ``start``: where that frame begins.
+    The line was idle if that frame is split by a pause too, whole ticks after the first one. The
+    reader was late if it is in one piece. ``first``: the read that ended the first pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

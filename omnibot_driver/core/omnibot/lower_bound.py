@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the rest of a reading costs at the least, told by the headers alone.
+"""A lower bound for the cost of the remaining bytes, by their headers alone.
 
-From a header frames lead on without damage to a place where none begins. Each damage leads on by
-no more than ``REACH`` bytes and costs no less than ``DAMAGE``; a bad run costs more by the byte. So
-the least number of damages on the way to the end of a stretch is known before anything is weighed.
-This module knows the shapes of frames and the cheapest prices; ``trellis`` knows what is searched.
+From a header, frames without damage lead to a place where none begins. Each damage leads on by at
+most ``REACH`` bytes and costs at least ``DAMAGE``; a bad run costs more per byte. So the least
+number of damages up to the end of a stretch is known before any content is weighed. This module
+knows the shapes of frames and the lowest prices; ``trellis`` knows what is searched.
 """
 
 import re
@@ -16,17 +16,17 @@ from omnibot_driver.core.omnibot.frames import INCOMPLETE, NO_FRAME, measure
 
 DAMAGE: Final = ONE_BYTE
 REACH: Final = 15 + 2
-"""The longest frame, with two bytes added."""
+"""Length in bytes of the longest frame with two bytes added."""
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""A bad run that is about to end is cheaper than another damage."""
+"""Costs of the last bytes of a bad run, where they are less than another damage."""
 
 
 def least_costs(data: bytes) -> list[float]:
-    """For each node of the trellis: the least cost from there to the end, while more may follow.
+    """Return, for each node of the trellis, the least cost from there to the end of ``data``.
 
-    Along an edge it grows by the edge's price at the most.
+    It holds while more bytes may follow. Along an edge it falls by at most the edge's price.
     """
     size = len(data)
     ends = _undamaged(data)
@@ -53,7 +53,10 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """The ends of whole frames that begin here, one after the other; the last one first."""
+    """Return the end of the chain of complete frames that begins at each place.
+
+    Keys are places of first bytes, the last one first.
+    """
     size = len(data)
     ends: dict[int, int] = {}
     for found in reversed([*_BEGINNING.finditer(data)]):

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings that contradict the board's data: reported to the user, never changed.
+"""Checks for settings that contradict the board's data: reported to the user, never changed.
 
-Poses that make sense only in the other byte order; deltas that lead to the next pose only in the
-other frame, or come at another rate. This module knows what the wire says in each setting; not how
-the user is informed.
+They find poses that make sense only in the other byte order, deltas that lead to the next pose only
+in the other frame, and deltas that come at another rate. This module knows what the data means
+under each setting; it does not know how the user is informed.
 """
 
 import math
@@ -18,20 +18,22 @@ from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL,
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
-"""Number of poses against a setting, and none for it: two seconds."""
+"""Number of poses against a setting, without one in its favour, that prove it wrong: 2 s."""
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""Of a coordinate in mm or mrad that is not 0: beyond, it is other bytes misread."""
+"""Limits of a coordinate in mm or mrad that is not 0; beyond them, bytes were misread."""
 MOST_DELTAS: Final = 10
-"""Number of deltas from one pose to the next, one of which was lost; more belong to no two
-poses."""
+"""Largest number of deltas between two poses, one lost pose between them included."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""How far one frame leads away from the pose, and its ratio to the other."""
+"""Least distance in m from the pose, and its least ratio to the distance with the other frame.
+
+Beyond both, a pose speaks against the frame of the deltas.
+"""
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Number and duration of deltas in a row that came at another rate than the settings have."""
+"""Least number, and least duration in s, of deltas in a row at an unexpected rate."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
@@ -39,7 +41,10 @@ _OTHER_FRAME: Final[dict[str, Literal["earth", "body"]]] = {"earth": "body", "bo
 
 
 class MisconfigurationChecks:
-    """``advice``: a sentence for the user, once there is reason for it."""
+    """Compares readings with the settings that were used to read them.
+
+    ``advice``: a sentence for the user; None without a contradiction.
+    """
 
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self.advice: str | None = None
@@ -51,7 +56,7 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Check a delta, as the settings read it."""
+        """Check the frame of a delta; ``reading``: the delta as the settings interpret it."""
         self._moved.append(reading)
         unbroken = not (reading.lost or reading.restarted or reading.duration_s is None)
         if not unbroken or len(self._moved) > MOST_DELTAS:
@@ -60,9 +65,10 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """Check a delta that arrived at ``now``, with this many IMU frames since the one before.
+        """Check the rate of deltas, with a delta that arrived at ``now`` in s.
 
-        The IMU frames, of which some may be lost, tell the period; arrival times confirm it.
+        ``imus``: number of IMU frames since the delta before it, of which some may be lost. They
+        show the period; arrival times confirm it.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:
@@ -84,7 +90,7 @@ class MisconfigurationChecks:
             )
 
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
-        """Check a pose, as the settings read it."""
+        """Check byte order and frame with a pose; ``reading``: as the settings interpret it."""
         values = (frame.x, frame.y, frame.theta)
         makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))
         if makes_sense != swapped:

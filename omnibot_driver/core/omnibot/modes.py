@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's modes as a table: what S, P, R and what is heard do from each of them.
+"""The board's modes as a table: what S, P, R and the board's data do in each of them.
 
-Source: the manual's "Operation State Machine" and "System state command". The board never says
-which mode it is in, so the driver concludes it from what it *hears*. A letter that was sent proves
-nothing: the board may have missed it. After R the mode is unknown. P toggles, so it is allowed
-only where the outcome is known.
+Source: the manual's "Operation State Machine" and "System state command". The board does not report
+its mode, so the driver infers it from the data that it *receives*. A letter that was sent proves
+nothing: the board may have missed it. After R the mode is unknown. P toggles, so it is allowed only
+where the outcome is known.
 """
 
 from enum import Enum
@@ -18,7 +18,7 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 
 class Happening(Enum):
-    """The events of the mode table: heard from the board, or sent to it."""
+    """The events of the mode table: data received from the board, or letters sent to it."""
 
     HEARD_PAUSED = "heard «Paused»"
     HEARD_MOTION = "heard deltas or poses"
@@ -40,19 +40,22 @@ TRANSITIONS: Final[dict[Happening, dict[Mode, Mode]]] = {
     Happening.SENT_PAUSE: {_N: _N, _I: _I},
     Happening.SENT_RESET: {_U: _U, _P: _U, _N: _U, _I: _U},
 }
-"""From what happened and the mode before to the mode after; what is missing is refused."""
+"""Mode after an event, by the event and the mode before; an event without an entry is refused."""
 
 
 class ModeTracker:
-    """Walks the table. Illegal requests raise RequestRefused and change nothing."""
+    """The mode of the board, inferred from events by the table.
+
+    An event that the table does not allow raises RequestRefused and changes nothing.
+    """
 
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self.mode = Mode.UNKNOWN
         self._imus_alone = self.imus_to_come = schedule.imus_alone
-        """Before they tell anything."""
+        """Number of further IMU frames, without a delta between them, that show IMU-only mode."""
 
     def apply(self, happening: Happening) -> None:
-        """Apply one event of the table."""
+        """Apply one event of the table. Raises RequestRefused if the mode does not allow it."""
         try:
             self.mode = TRANSITIONS[happening][self.mode]
         except KeyError:
@@ -62,7 +65,7 @@ class ModeTracker:
         self.imus_to_come = self._imus_alone
 
     def hear(self, frame: Frame) -> None:
-        """Apply what this frame shows of the mode."""
+        """Apply what this frame shows about the mode."""
         if isinstance(frame, ImuFrame):
             self.hear_imus(1)
         elif isinstance(frame, PausedFrame):
@@ -73,7 +76,7 @@ class ModeTracker:
             self.apply(Happening.HEARD_MOTION)
 
     def hear_imus(self, count: int) -> None:
-        """This many IMU frames, and no more than are expected."""
+        """Apply ``count`` IMU frames in a row, at most ``imus_to_come``."""
         self.imus_to_come -= count
         if not self.imus_to_come:
             self.apply(Happening.HEARD_IMU_ALONE)

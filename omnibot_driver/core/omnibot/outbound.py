@@ -1,29 +1,31 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How frames and letters are put on a line that loses bytes, to a receiver with unknown firmware.
+"""The encoding of frames and letters for a line that loses bytes, and for unknown firmware.
 
-The frames are the manual's; this module decides what stands before them, and which of two
-neighbouring values a word takes. It knows bytes, not what is commanded, nor when.
+The frames are the manual's. This module decides which bytes precede them, and which of two
+neighbouring values a word takes. It knows bytes; it does not know what is commanded, nor when.
 
 The argument. A control frame has no checksum, and the board's parser is unknown. The worst one
 counts seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that parser
 takes the missing one from whatever comes next.
 
-1. *Zeros stand before everything.* A zero is neither a letter nor a header, and seven of them end
-any frame that was begun. So a Stop, an emergency stop or a letter that was cut is completed by
-   zeros: it stays a Stop, or becomes a frame in mode 0, which is none. A letter is never
-   swallowed by a frame that was begun, and a header never stands behind an ``FF``. The eighth zero
-   makes up for one that is lost. Before a motion frame four are enough: only one that lost five
-   bytes and more of its payload could swallow the header behind them, and that is motion as well.
-2. *Nothing stands behind.* A motion frame that was cut stays without effect until the next
-   transmission. There the zeros complete it, and the frame behind them replaces it 12 bytes
-   (1.0 ms at 115200 baud) later. Zeros right behind a motion frame would complete it at once, for
-   a whole repetition, and on a parser that gives a cut frame up after a pause for the first time.
-3. *A payload is harmless by itself.* Where its own header is lost, a parser looks for letters and
-   headers in it. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never follows ``FF``:
-   the word takes the nearest value without. It is one LSB away, but where the high byte is the
-   letter.
-4. *What is lost is said again*: everything here is repeated, or answered by what the board shows.
+1. *Zeros precede everything.* A zero is neither a letter nor a header, and seven of them end any
+   frame that was begun. So a Stop, an emergency stop or a letter that was cut is completed by
+   zeros: it remains a Stop, or becomes a frame in mode 0, which is not a command. A letter is never
+   swallowed by a frame that was begun, and a header never follows an ``FF``. The eighth zero makes
+   up for one that is lost. Before a motion frame four are enough: only a frame that lost five or
+   more bytes of its payload could swallow the header behind them, and that frame commands motion as
+   well.
+2. *Nothing follows a motion frame.* A motion frame that was cut has no effect until the next
+   transmission. There the zeros complete it, and the frame behind them replaces it 12 bytes (1.0 ms
+   at 115200 baud) later. Zeros right behind a motion frame would complete it at once, and it would
+   be in force until the next repetition; even a parser that discards a cut frame after a pause
+   would then accept it.
+3. *A payload is harmless by itself.* If its own header is lost, a parser looks for letters and
+   headers in the payload. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never
+   follows ``FF``: the word takes the nearest value without them. It is one LSB away, unless the
+   high byte is the letter.
+4. *What is lost is sent again*: everything here is repeated, or confirmed by the board's data.
 
 What remains: an added or changed byte within a frame can make it another valid frame, until the
 next repetition.
@@ -44,9 +46,9 @@ from omnibot_driver.core.omnibot.frames import (
 MAX_WORD: Final = 32767
 
 ZEROS: Final = bytes(8)
-"""Seven end any frame that was begun; one may be lost. Three wake a board that has booted."""
+"""Zeros before a frame or letter: seven end a begun frame, one may be lost; three wake a board."""
 ZEROS_BEFORE_MOTION: Final = bytes(4)
-"""The fewer, the sooner a motion frame replaces one that lost a byte."""
+"""Zeros before a motion frame; few, so that it soon replaces one that lost a byte."""
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET
 _HARMFUL: Final = re.compile(b"[%s]|%s" % (_LETTERS, re.escape(COMMAND_HEADER))).search
@@ -55,12 +57,12 @@ _WORD_FOLLOWED: Final = struct.Struct(">hB").pack
 
 
 def transmission(*parts: bytes) -> bytes:
-    """Frames and letters as they go out, in this order."""
+    """Return the bytes of frames and letters in this order, with zeros before each."""
     return b"".join([ZEROS + part for part in parts])
 
 
 def harmless(counts: tuple[float, float, float]) -> Words:
-    """The nearest words, within ``MAX_WORD``, whose bytes contain neither a letter nor a header."""
+    """Return the nearest words, up to ``MAX_WORD``, whose bytes hold neither letter nor header."""
     a, b, c = counts
     words = nearest(a, b, c)
     if not _HARMFUL(_WORDS(*words)):
@@ -71,7 +73,7 @@ def harmless(counts: tuple[float, float, float]) -> Words:
 
 
 def nearest(a: float, b: float, c: float) -> Words:
-    """The nearest whole counts; halves away from zero, so that both signs are alike."""
+    """Return the nearest integers; halves are rounded away from zero, alike for both signs."""
     return (
         int(a + 0.5 if a > 0.0 else a - 0.5),
         int(b + 0.5 if b > 0.0 else b - 0.5),
@@ -80,12 +82,15 @@ def nearest(a: float, b: float, c: float) -> Words:
 
 
 def begins_with_a_letter(word: int) -> bool:
-    """Whether the high byte is a letter, which no neighbouring value avoids."""
+    """Return whether the high byte is a letter, which neighbouring values do not avoid."""
     return word >> 8 & 0xFF in _LETTERS
 
 
 def _harmless_word(count: float, word: int, follows: int) -> int:
-    """``word``: the nearest to the count; ``follows``: the byte behind it."""
+    """Return the harmless word that is nearest to ``count``.
+
+    ``word``: the nearest integer to ``count``; ``follows``: the byte after the word.
+    """
     reach = 0
     while True:
         near = [

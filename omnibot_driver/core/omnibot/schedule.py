@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How often a running board sends each kind of frame.
+"""The rates at which a running board sends each kind of frame.
 
-The manual contradicts itself about deltas: 25 Hz in its frame table, 10 Hz in its mode list. All
-else follows from that. This module knows rates; it does not know what is in a frame.
+The manual contradicts itself about deltas: 25 Hz in its frame table, 10 Hz in its mode list. So
+their period is a setting, from which the other numbers follow. This module knows rates; it does not
+know what a frame contains.
 """
 
 from typing import Final
@@ -11,14 +12,17 @@ from typing import Final
 from omnibot_driver.core.board import RateName
 
 TICK_S: Final = 0.01
-"""Of the control loop; an IMU frame comes with each."""
+"""Period of the board's control loop in s; the board sends an IMU frame in each."""
 POSE_PERIOD_S: Final = 0.2
 DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
-"""Whole ticks, a whole number of them to a pose."""
+"""Possible periods of the deltas in s: whole ticks, and a whole number of periods per pose."""
 DELTAS_MISSING: Final = 6
-"""Number of them after which the board is in IMU-only mode."""
+"""Number of missing deltas after which the board is in IMU-only mode."""
 FEWEST_ALONE: Final = 25
-"""IMU frames that tell of it at least, should the board send deltas less often than it is said."""
+"""Least number of IMU frames without a delta that show IMU-only mode.
+
+It holds even if the board sends deltas less often than the setting says.
+"""
 
 _IMU_BYTES_PER_S: Final = 1400
 _POSE_BYTES_PER_S: Final = 75
@@ -33,7 +37,7 @@ class Schedule:
         self.imus_per_delta = round(delta_period_s / TICK_S)
         self.deltas_per_pose = round(POSE_PERIOD_S / delta_period_s)
         self.imus_alone = max(FEWEST_ALONE, DELTAS_MISSING * self.imus_per_delta + 1)
-        """IMU frames without a delta that make IMU-only mode."""
+        """Number of IMU frames without a delta that show IMU-only mode."""
         self.bytes_per_s = _IMU_BYTES_PER_S + _DELTA_BYTES / delta_period_s + _POSE_BYTES_PER_S
         self.rates_hz: dict[RateName, float] = {
             "IMU": 1.0 / TICK_S,

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's counters: how many deltas are missing, and whether it has begun to count anew.
+"""The board's counters: the number of missing deltas, and whether counting began anew.
 
-SEQ is one byte and wraps every 10.24 s at 25 Hz; arrival times tell how often. A pose comes with
-every fifth delta (every second one at 10 Hz) and has a counter of its own, so it can tell of losses
-before the next delta does. This module knows nothing of what is in a frame.
+SEQ is one byte and wraps every 10.24 s at 25 Hz; arrival times show how often it wrapped. A pose
+comes with every fifth delta (every second one at 10 Hz) and has a counter of its own, so it can
+reveal losses before the next delta does. This module does not know what a frame contains.
 """
 
 from typing import Final
@@ -15,20 +15,25 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""How far arrival may differ from the board's count: beyond, the count did not simply go on. A full
-buffer of the host's (4096 bytes, 2.4 s) that lacks one byte in ten is stamped 0.24 s wrong; this is
-twice as much."""
+"""Largest difference in s between arrival time and the board's count without a restart.
+
+If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, times are 0.24 s wrong. The
+limit is twice as much.
+"""
 EARLY_S: Final = 0.2
-"""How far a count from zero may be ahead of the time since the last delta, which was reported late.
-To restart takes longer."""
+"""Time in s by which a count from zero may be ahead of the time since the last delta.
+
+That delta may have been reported late. A restart takes longer.
+"""
 
 
 @value(frozen=True, slots=True)
 class Step:
-    """The step between two deltas: ``lost`` between them that no pose has reported.
+    """The step to a new count of a delta or a pose.
 
-    ``duration_s`` is None where the time is not known; ``restarted``: the counter seems to begin
-    anew, which only the board's pose can prove.
+    ``lost``: number of missing deltas that were not reported before; ``duration_s``: time that the
+    delta covers in s, None where it is unknown; ``restarted``: the counter seems to begin anew,
+    which only the board's pose can prove.
     """
 
     lost: int
@@ -49,13 +54,16 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Five deltas to a pose were seen; only then is a sixth missed."""
+        """Whether the expected number of deltas per pose was seen; only then can one be missing."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
-        """The last count, if it was ahead of the time. The time is believed until the next one goes
-        on from it: a bit flipped, or the framing was deceived."""
+        """The last count if it was ahead of the time, else None.
+
+        The time is trusted until the next delta continues that count: a bit may be flipped, or the
+        frame may be false.
+        """
         self._left: tuple[int, float, int] | None = None
-        """The last count before one that seemed to begin anew, its time, and that one."""
+        """The count before a supposed restart, its time in s, and the first count after it."""
 
     def pause(self) -> None:
         """Note a pause: the next count continues the old one, or restarts."""
@@ -66,7 +74,10 @@ class Sequence:
         self._reconnected, self._pose = True, None
 
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
-        """A delta with this count arrived, with this many IMU frames since the one before."""
+        """Return the step to a delta with this count, which arrived at ``now`` in s.
+
+        ``imus``: number of IMU frames since the delta before it.
+        """
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose
         before, self._delta = self._delta, count
@@ -97,13 +108,13 @@ class Sequence:
         if self._ahead is not None:
             lost, self._delta = in_time, (before + in_time + 1) % WRAP
         elif ahead and lost >= WRAP - per_pose:
-            lost = in_time  # no wrap: one that was false had been counted
+            lost = in_time  # not a wrap: a false delta was counted before
         lost -= min(lost, told)
         self._since_pose += lost + 1
         return Step(lost, period_s)
 
     def pose(self, count: int, now: float) -> Step:
-        """A pose with this count came in: what is missing of the deltas that it includes."""
+        """Return the step to a pose with this count: the missing deltas that the pose includes."""
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
         if before is None or self._delta is None:
@@ -118,12 +129,12 @@ class Sequence:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
         if (self._told + missing) * self._period_s > now - self._delta_at + self._period_s:
-            return Step(0)  # there was no time for that many
+            return Step(0)  # too little time has passed for that many
         self._told += missing
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a restart, if this count continues the one before it."""
+        """Withdraw a supposed restart if this count continues the one before it."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

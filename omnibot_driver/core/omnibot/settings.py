@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user has to say of a board, because its wire does not."""
+"""The settings that only the user of an OmniBot board knows, as its data does not show them."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -11,14 +11,14 @@ from omnibot_driver.core.omnibot.frames import ByteOrder
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OmniBotSettings:
-    """What cannot be known from the wire.
+    """Facts about a board that its data does not show.
 
-    ``baudrate``: at ten bits to the byte; ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per
-    rad/s; ``position_scale`` and ``heading_scale``: LSB per m and rad of a commanded pose;
-    ``delta_frame``: whether deltas are differences of positions in the board's earth frame, motion
-    along its own axes, or (older firmware) encoder counts of the wheels A, B, C;
-    ``delta_period_s``: from one delta to the next, one of ``schedule.DELTA_PERIODS_S``, and the
-    same for as long as the board is there.
+    ``baudrate``: in bits per second, with ten bits per byte; ``linear_scale``: LSB per m/s;
+    ``angular_scale``: LSB per rad/s; ``position_scale`` and ``heading_scale``: LSB per m and rad of
+    a commanded pose; ``delta_frame``: whether deltas are differences of positions in the board's
+    earth frame, motion along its own axes, or (older firmware) encoder counts of the wheels A, B,
+    C; ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``,
+    constant for the life of the ``OmniBot``.
     """
 
     baudrate: int = 115200

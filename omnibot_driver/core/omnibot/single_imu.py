@@ -1,13 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The quick way of what comes most often: one IMU frame by itself, from its bytes to its reading.
+"""The fast path for the most frequent read: one IMU frame by itself, from bytes to reading.
 
-It is decoder and translation in one, for a read that neither has anything to decide about. It says
-what they would say and leaves them in the state that they would be in: a test holds one against the
-other. It knows no other frame, and no evidence but that of a calm frame in its place.
+It replaces decoder and translation for a read in which neither has anything to decide. Its results,
+and the state that it leaves, are theirs: a test compares the two paths. It accepts only a calm IMU
+frame at the time when one is due.
 
-An adapter may deliver the frame in pieces. They wait here, and are decoded at once with the last
-one. If anything but the end of this frame follows, each piece is decoded as it came.
+An adapter may deliver the frame in pieces. They are kept until the last one arrives, and are then
+decoded as one frame. If anything but the rest of this frame follows, the decoder gets each piece
+with its own arrival time.
 """
 
 import struct
@@ -27,15 +28,15 @@ _HEADER: Final = int.from_bytes(IMU_HEADER, "big")
 
 
 Piece = tuple[bytes, float]
-"""Bytes, and when they came."""
+"""Bytes, and their arrival time in s."""
 
 
 def is_begun(
     pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
 ) -> bool:
-    """Whether these bytes, which follow the pieces, go on with the IMU frame that is due.
+    """Return whether ``data``, after the pieces, continues but does not complete a due IMU frame.
 
-    Not where they complete it, or where a pause between them is evidence.
+    False if ``GAP_S`` or more has passed since the first piece, because such a pause is evidence.
     """
     if pieces:
         data = joined(pieces) + data
@@ -50,16 +51,17 @@ def is_begun(
 
 
 def joined(pieces: list[Piece]) -> bytes:
-    """All their bytes."""
+    """Return the bytes of all pieces."""
     return b"".join([piece for piece, _ in pieces])
 
 
 def take_pieces(
     pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
 ) -> ImuReading | None:
-    """``take_single`` of a frame of which the pieces are the first part, and ``data`` the rest.
+    """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
 
-    The last byte may be the next header's where a frame may follow at once, or bytes were lost.
+    None, with nothing changed, in the cases of ``take_single``, and if the last byte may belong to
+    the next header: another frame may follow at once, or bytes were lost lately.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
@@ -85,10 +87,13 @@ def take_single(
     *,
     first: int = IMU_LENGTH,
 ) -> ImuReading | None:
-    """The reading of these bytes, if they are one calm IMU frame and one was due.
+    """Return the reading of these bytes if they are one calm IMU frame and one was due.
 
-    None, and nothing is changed, where anything else is to be considered. The frame came as a
-    whole, so its last byte is its own. ``first``: how many of its bytes came now.
+    None, with nothing changed, in all other cases. A calm frame differs little from the one before
+    it. Its last byte is taken as its own: it arrived as a whole, or ``take_pieces`` has checked
+    that.
+
+    ``now``: arrival time of its first bytes in s; ``first``: number of bytes that arrived then.
     """
     pause_s = now - decoder.last_arrival_s
     if (
@@ -98,7 +103,7 @@ def take_single(
         or pause_s > LATE_S
     ):
         return None
-    x: int  # as in ``fast_path``
+    x: int  # types for compiled code, as in ``fast_path``
     y: int
     z: int
     u: int

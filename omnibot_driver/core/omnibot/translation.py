@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From the frames of one line to readings: in SI units, each at its time, with what was lost.
+"""The translation of frames into readings in SI units, with the number of lost frames.
 
 Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad; poses mm and
 mrad.
@@ -34,16 +34,17 @@ from omnibot_driver.core.readings import (
 )
 
 DELTA_LSB: Final = 1e-4
-"""m, m, rad."""
+"""Size of one count of a delta: 0.1 mm in m, or 0.1 mrad in rad."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
 
 class Translation:
-    """What is made of the frames of a line.
+    """Translates the frames of one line, and infers the board's mode and wrong settings from them.
 
-    ``settings`` may be replaced at any time, but for ``delta_period_s``. ``singles_to_come``: IMU
-    frames that ``single_imu`` may take without a word; ``heard_s``: when the last frame came.
+    ``settings`` may be replaced at any time, except its ``delta_period_s``. ``singles_to_come``:
+    number of IMU frames that ``single_imu`` may take without a call to this class; ``heard_s``:
+    arrival time in s of the last decoded bytes.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -54,20 +55,21 @@ class Translation:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: keep nothing but the board's counters."""
+        """Begin a new connection, and keep only the board's counters and the checks of settings."""
         self.modes = ModeTracker(self._schedule)
         self._rhythm = FrameSchedule(self._schedule)
         self._sequence.reconnect()
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """How many are left, and how many there were."""
+        """Number of such frames that are left, and their number at the start."""
         self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
-        """Frames that one read brought, each after a number of bytes that made none.
+        """Return the readings of the frames that one read brought.
 
-        What a read brings at once did not come at once: each frame has a time of its own.
+        ``skipped``: for each frame, the number of bytes before it that were not a frame. The bytes
+        of one read did not arrive all at once, so each frame is given an arrival time of its own.
         """
         self._catch_up()
         before_s, self.heard_s = self.heard_s, now
@@ -83,12 +85,12 @@ class Translation:
         return readings
 
     def apply(self, happening: Happening) -> None:
-        """One step of the mode. Raises RequestRefused, and then nothing changes."""
+        """Apply an event to the mode. Raises RequestRefused, and then the mode does not change."""
         self._catch_up()
         self.modes.apply(happening)
 
     def _catch_up(self) -> None:
-        """Tell modes and rhythm of the frames that came by themselves."""
+        """Report the IMU frames that ``single_imu`` took to the mode and the frame schedule."""
         singles = self._most_singles - self.singles_to_come
         self.singles_to_come = self._most_singles = 0
         if singles:
@@ -150,7 +152,7 @@ class Translation:
         return displacement
 
     def _rolled(self, counts: Words) -> Vector3:
-        """The body's displacement from the wheels' counts (manual, "Odometry equation")."""
+        """Return the displacement (m, m, rad) by wheel counts (manual, "Odometry equation")."""
         settings = self.settings
         a, b, c = (count * math.tau / settings.counts_per_revolution for count in counts)
         wheels = OmniKinematics(settings.wheel_radius_m, settings.base_radius_m)

@@ -1,18 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""All readings of a stretch of bytes at once, the cheapest of them, and what is sure in it.
+"""The search among all interpretations of a stretch of bytes: the cheapest, and what is sure.
 
-Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run.
-Edges are whole frames, damaged ones, bad bytes. A shortest path is the best reading; a frame of it
-is sure where every path that reads its first byte in another way is dearer by ``SURE``. This module
-knows the shapes that a line gives to frames; prices are in ``cost_model``. Work and memory are
-proportional to the stretch.
+Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run. Edges
+are complete frames, damaged ones, and bad bytes. A shortest path is the best interpretation. A
+frame on it is sure if every path that interprets its first byte in another way costs more by at
+least ``SURE``. This module knows the shapes that a line gives to frames; prices are in
+``cost_model``. Work and memory are proportional to the length of the stretch.
 
-The context of a node (for the price of content) is that of the cheapest way to it.
+The context of a node (for the price of content) is that of the cheapest path to it.
 
-Most edges lie on no path that is nearly as cheap as the best. So the search leaves out what would
-cost more than a limit in all, by the least that the rest can cost (``lower_bound``), and takes a
-higher limit until nothing that matters is beyond it. The outcome is that of searching everything.
+Most edges are on no path that is nearly as cheap as the best. So the search omits edges whose total
+cost would exceed a limit even if the rest cost as little as it can (``lower_bound``), and raises
+the limit until nothing that matters exceeds it. The result is that of searching everything.
 """
 
 from bisect import bisect_left
@@ -33,16 +33,16 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""One reading in thirty as likely as the best is too many."""
+"""Least extra cost of all alternatives to a sure frame: they are 30 times less likely."""
 STEP: Final = 5.5
-"""What the limit is above the bound at first; then twice that, and so on."""
+"""First distance of the limit from the lower bound; it is doubled until a path is found."""
 BEYOND: Final = 0.025
-"""Half the grid of the prices: no sum is at the limit itself, so rounding decides nothing."""
+"""Half the grid of the prices: no sum equals the limit, so rounding decides nothing."""
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
 _HEADERS: Final = tuple(bytes((0xFF, kind)) for kind in _LENGTHS)
 _Shapes = tuple[tuple[int, float], ...]
-"""Lengths, and what each costs."""
+"""Possible lengths of a damaged frame in bytes, each with its cost."""
 
 
 def _misfits(length: int, gained: float) -> _Shapes:
@@ -63,7 +63,7 @@ _HEADLESS: Final = {
     0xFF: ((13, cost_model.HEADER_BYTE), (8, cost_model.HEADER_BYTE), (14, cost_model.HEADER_BYTE)),
     **{kind: ((length - 1, cost_model.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
 }
-"""By the half of the header that is left."""
+"""Shapes of a frame that lost half of its header, by the byte of the header that is left."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
 _BEGINNINGS: Final = (_HEADER, _TEXT)
@@ -71,7 +71,10 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 
 @value(frozen=True, slots=True)
 class Segment:
-    """A whole frame of the best reading; ``sure``: any other reading of it is clearly dearer."""
+    """A complete frame of the best interpretation.
+
+    ``sure``: every other interpretation of its bytes costs clearly more.
+    """
 
     start: int
     end: int
@@ -82,7 +85,7 @@ class Segment:
 
 
 _Edge = tuple[int, int, float, Frame | None, Context | None]
-"""From node, to node, price, the whole frame, context after it."""
+"""Start node, end node, price, the complete frame if it is one, and the context after it."""
 
 
 def read(
@@ -95,9 +98,9 @@ def read(
     in_step: bool,
     closed: bool,
 ) -> list[Segment]:
-    """The whole frames of the best reading of ``data``.
+    """Return the complete frames of the best interpretation of ``data``.
 
-    ``in_step``: a frame ended right before; ``closed``: nothing follows, ever.
+    ``in_step``: a frame ended right before ``data``; ``closed``: more bytes will never follow.
     """
     search = _Search(data, context, expectation, pauses, pose_byte_order)
     search.run(in_step, closed)
@@ -117,7 +120,7 @@ class _Search:
         self._expectation = expectation
         self._pauses = pauses
         self._pose_byte_order = pose_byte_order
-        # Node 2 n: in a bad run before byte n; 2 n + 1: at a boundary there; the last: the end.
+        # Node 2n: in a bad run before byte n; 2n + 1: at a boundary there; last node: the end.
         self._end = 2 * len(data) + 2
         self._start_context = context
         self._least: list[float]
@@ -128,7 +131,7 @@ class _Search:
         self._contexts: dict[int, Context]
 
     def run(self, in_step: bool, closed: bool) -> None:
-        """Find the best reading, and all that are nearly as cheap."""
+        """Find the best interpretation, and all that are nearly as cheap."""
         self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
         step = STEP
         limit = self._least[1] + step + BEYOND
@@ -185,7 +188,7 @@ class _Search:
                 self._edge(node, self._end, price)
 
     def _undamaged(self, at: int, closed: bool) -> None:
-        """Add an edge for the whole frame or text that begins here."""
+        """Add an edge for the complete frame or text that begins here."""
         data, node = self._data, 2 * at + 1
         length = measure(data, at)
         if length == INCOMPLETE:
@@ -198,7 +201,7 @@ class _Search:
         self._edge(node, 2 * end + 1, price + self._idle_within(at, end), frame, after)
 
     def _damaged(self, at: int, closed: bool) -> None:
-        """What may have been a frame that begins here, before the line damaged it."""
+        """Add edges for a frame that may have begun here before the line damaged it."""
         data, size, node = self._data, len(self._data), 2 * at + 1
         spare = self._limit - self._cost[node]
         first = data[at]
@@ -224,7 +227,7 @@ class _Search:
                 self._edge(node, 2 * end + 1, price + self._idle_within(at, end))
 
     def _open(self, at: int, price: float) -> None:
-        """Add an edge for a frame, whole or damaged, whose end is not here yet."""
+        """Add an edge for a frame, complete or damaged, whose end has not arrived yet."""
         self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
 
     def _idle_within(self, start: int, end: int) -> float:
@@ -248,7 +251,7 @@ class _Search:
         self._edges.append(edge)
 
     def _context(self, node: int) -> Context:
-        """What is known on the cheapest way to this node; after damage it is little."""
+        """Return the context on the cheapest path to this node; after damage it holds little."""
         found, damaged, at = self._contexts.get(node), False, node
         while found is None:
             edge = self._by[at]
@@ -261,7 +264,7 @@ class _Search:
         return found
 
     def pieces(self) -> list[Segment]:
-        """Walk the best path back, then ask every edge what the best path through it costs."""
+        """Return the frames of the best path, after pricing the best path through every edge."""
         cost = self._cost
         path: list[_Edge] = []
         edge = self._by[self._end]

@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user learns of it: notices, figures, verdicts."""
+"""Reports to the user about the driver: notices, figures and verdicts."""

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From figures to verdicts: what an operator should know, and do.
+"""The diagnosis: verdicts from figures, each with what an operator should know and do.
 
-Levels are those of diagnostic_msgs. ERROR: the robot cannot be used, or must not be. WARN: it can,
-and something should be looked at. STALE: nothing can be said. Knows figures and times; it does not
-know where they come from.
+Levels are those of diagnostic_msgs. ERROR: the robot cannot be used, or must not be. WARN: it can
+be used, but something should be checked. STALE: nothing can be concluded. This module knows figures
+and times; it does not know where they come from.
 """
 
 import math
@@ -20,37 +20,40 @@ from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
-"""Half a tick: the mean age of what waits for a timer of 10 ms."""
+"""Mean delay in s above which reads are late: half the period of a timer of 10 ms."""
 LARGEST_SKEW_PPM: Final = 115.0
-"""More than two crystals differ by."""
+"""Clock skew in ppm that two crystals do not exceed."""
 SKEW_KNOWN_S: Final = 75.0
-"""How long arrivals count; a skew that lasts less may be that of a computer that was busy."""
+"""Time in s for which an arrival affects the skew.
+
+A skew that lasts less may come from a computer that was busy.
+"""
 
 BUSY_SHARE: Final = 0.1
-"""Of the time that the reader waits for the processor."""
+"""Share of the time waiting for the processor above which the computer is too busy."""
 
 PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
-"""As the board's settings say; the rate of its readings is another one."""
+"""Label of the published rate, which the board's settings give; its readings have another rate."""
 OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "IMU": ("IMU frames lost", "IMU readings refused"),
     "Odometry": ("Odometry frames lost", "Odometry readings refused"),
     "Pose": ("Poses refused",),
 }
-"""Figures that say nothing of a board which does not send this kind of reading."""
+"""Figures that are left out for a board that does not send this kind of reading."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refusals:
-    """Commands that came and were turned away, and why the last one was."""
+    """The number of commands that were refused, and the reason for the last one."""
 
     count: int = 0
     last: str = ""
 
 
 class Diagnosis:
-    """Asked about once a second; remembers what it needs for rates and for what is recent.
+    """The judge of one board, called about once a second; it remembers the recent figures.
 
-    ``to_check``: what may be wrong with a board of which nothing is understood.
+    ``to_check``: what to check on a board whose data is not understood.
     """
 
     def __init__(self, to_check: str) -> None:
@@ -61,7 +64,7 @@ class Diagnosis:
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
     ) -> list[Status]:
-        """All verdicts, of one board always of the same names in the same order."""
+        """Return all verdicts; for one board always with the same names in the same order."""
         self._recent.remember(session, now)
         statuses = [
             self._link(link, now),

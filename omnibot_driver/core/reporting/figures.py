@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""All that is known of the link and the board at one moment: values only."""
+"""The figures of the link and the board at one moment: values only."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,12 @@ from omnibot_driver.core.readings import Vector3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkFigures:
-    """``trouble``: why the port cannot be had, in a sentence; empty while it is open.
+    """The figures of the link to the board.
 
-    ``overruns``: how often the kernel lost bytes since the port was opened; ``waited_s``: how long
-    the reader was ready to run and did not; None where that is not counted.
+    ``trouble``: why the port is not open, in a sentence; empty while it is open; ``opened``: how
+    often it was opened; ``overruns``: how often the kernel has lost bytes since it was last opened;
+    ``waited_s``: how long the reader was ready to run but did not. The last two are None where they
+    are not counted.
     """
 
     port: str
@@ -29,11 +31,12 @@ class LinkFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandFigures:
-    """``source``: the topic that commands, ``age_s`` old by now; None while there is none.
+    """The figures of the commands.
 
-    ``monitored``: whether a robot that does not move as commanded is stopped;
-    ``trips``: how often the motion monitor has stopped the robot; ``interlock``: what motion is
-    refused until, in a sentence; empty while it is allowed.
+    ``source``: the topic that commands, or None; ``age_s``: age of its last command; ``monitored``:
+    whether a robot that does not move as commanded is stopped; ``trips``: how often the motion
+    monitor has stopped the robot; ``interlock``: the condition until which motion is refused, in a
+    sentence; empty while motion is allowed.
     """
 
     source: str | None = None
@@ -47,9 +50,10 @@ class CommandFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuFigures:
-    """``gravity_mps2`` and ``noise_radps`` are of the last standstill; None before the first.
+    """The figures of the IMU.
 
-    ``advice``: which parameter gravity contradicts, in a sentence.
+    ``gravity_mps2`` and ``noise_radps`` are of the last standstill, and None before the first;
+    ``advice``: which parameter contradicts the measured gravity, in a sentence.
     """
 
     bias_radps: Vector3
@@ -60,9 +64,10 @@ class ImuFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionFigures:
-    """``skew_ppm``: how much faster the board's clock runs than ours.
+    """The figures of the board, its readings and its commands.
 
-    ``task``: what is under way that takes the board long, and since when; empty where nothing is.
+    ``skew_ppm``: how much faster the board's clock runs than the host's; ``task``: a task that
+    takes the board long, and since when; empty without one.
     """
 
     state: str

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Notices about the stream: rate-limited, or given once. Each says what to do.
+"""Notices about the stream, each with what to do: given once, or at a limited rate.
 
-Knows counts, times and words; not where they come from.
+This module knows counts, times and texts; it does not know where they come from.
 """
 
 import math
@@ -12,7 +12,7 @@ from omnibot_driver.core.board import Mode
 from omnibot_driver.core.measurement.outlier_filter import Refused
 
 NEWS_S: Final = 10.0
-"""Counters are reported no more often than this."""
+"""Shortest time in s between two notices of a counter."""
 HEADING_ASSUMED: Final = (
     "no valid pose from the board; the driver assumes that its heading was 0 at first"
 )
@@ -37,14 +37,14 @@ STOP_UNHEEDED: Final = (
 
 
 class ThrottledNotice:
-    """What a count has grown by since that was last told."""
+    """A counter whose growth is reported at a limited rate."""
 
     def __init__(self) -> None:
         self._told = 0
         self._told_at = -math.inf
 
     def since_told(self, count: int, now: float) -> int:
-        """0 while there is nothing new, or the last report was a moment ago."""
+        """Return the growth since the last report; 0 if that was less than NEWS_S ago."""
         if count == self._told or now - self._told_at < NEWS_S:
             return 0
         new, self._told, self._told_at = count - self._told, count, now
@@ -52,7 +52,7 @@ class ThrottledNotice:
 
 
 class Notices:
-    """The sentences that are due."""
+    """The notices that are due."""
 
     def __init__(self) -> None:
         self._lost, self._refused = ThrottledNotice(), ThrottledNotice()
@@ -61,7 +61,10 @@ class Notices:
         self._standing = ""
 
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
-        """A notice of losses and rejections since the last one. ``overruns``: of the port."""
+        """Return notices of the losses and rejections since the last ones.
+
+        ``overruns``: number of overruns of the port.
+        """
         news = []
         if more := self._lost.since_told(lost, now):
             overrun, self._overruns = overruns > self._overruns, overruns
@@ -88,7 +91,7 @@ class Notices:
         return [sentence]
 
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
-        """Stop was repeated for its whole time, and nothing showed that the robot stands.
+        """Return the notice that no standstill was seen while Stop was repeated for its full time.
 
         ``measured``: displacements came meanwhile; ``blind``: the board has no way to show it.
         """
@@ -101,13 +104,16 @@ class Notices:
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
-        """What holds now, empty for nothing; told when it begins to hold."""
+        """Return the sentence once, when its condition begins.
+
+        ``sentence`` is empty while the condition does not hold.
+        """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []
 
 
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
-    """Why no data was understood for this time, and what to do."""
+    """Return why no data was understood for this time in s, and what to do."""
     if bytes_came:
         return (
             f"no valid data for {silence_s:g} s; check"

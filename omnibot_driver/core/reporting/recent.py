@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the verdicts are about: the last ten seconds of the figures."""
+"""The recent figures on which the verdicts rest: those of the last ten seconds."""
 
 import math
 from collections import deque
@@ -10,11 +10,11 @@ from omnibot_driver.core.board import RateName
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 
 RECENT_S: Final = 10.0
-"""How long an event is shown."""
+"""Time in s for which an event is shown."""
 
 
 class RecentFigures:
-    """Those of the present state, as far as they are recent; asked about once a second."""
+    """The recent figures of the present state; updated about once a second."""
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, float]] = {}
@@ -22,7 +22,7 @@ class RecentFigures:
         self._waits: deque[tuple[float, float]] = deque()
 
     def remember(self, session: SessionFigures, now: float) -> None:
-        """Note the figures; those of another state are forgotten."""
+        """Add the figures, and forget those of another state."""
         if self._window and self._window[-1][1].state != session.state:
             self._window.clear()
         self._window.append((now, session))
@@ -30,7 +30,7 @@ class RecentFigures:
             self._window.popleft()
 
     def grew(self, name: str, count: int, now: float) -> bool:
-        """Whether this count has grown lately."""
+        """Return whether this count has grown recently."""
         before, at = self._counts.get(name, (count, -math.inf))
         if count != before:
             at = now
@@ -38,7 +38,7 @@ class RecentFigures:
         return now - at < RECENT_S
 
     def waiting_share(self, link: LinkFigures, now: float) -> float:
-        """The part of the recent time in which the reader was ready to run and did not."""
+        """Return the share of the recent time in which the reader was ready to run but did not."""
         if link.waited_s is None:
             return 0.0
         self._waits.append((now, link.waited_s))
@@ -49,11 +49,11 @@ class RecentFigures:
 
     @property
     def span_s(self) -> float:
-        """From the first to the last figures of this state."""
+        """Time in s from the first to the last figures of this state."""
         return self._window[-1][0] - self._window[0][0]
 
     def rates_hz(self) -> dict[RateName, float] | None:
-        """Rates of the readings in this state; None until there was time to count."""
+        """Return the rates of the readings in this state, in Hz, or None if it has just begun."""
         if not self.span_s:
             return None
         old, new = self._window[0][1].tally, self._window[-1][1].tally
@@ -65,7 +65,10 @@ class RecentFigures:
         return {name: count / self.span_s for name, count in counts.items()}
 
     def delay_s(self) -> tuple[float, float] | None:
-        """Mean and standard deviation of the delay of the reads above the least one, if any."""
+        """Return mean and standard deviation of the reads' delay above the least one, in s.
+
+        It is None without recent reads.
+        """
         old, new = self._window[0][1].tally, self._window[-1][1].tally
         reads = new.reads - old.reads
         if not reads:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a verdict is: a level, a sentence, and the figures behind it."""
+"""A verdict: a level, a sentence, and the figures behind it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

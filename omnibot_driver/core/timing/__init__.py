@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From arrival times to sampling times."""
+"""Clocks that stamp readings: sampling times, estimated from arrival times."""

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stamps for boards whose readings carry no time and keep no tick: when they came in.
+"""Arrival times as stamps, for boards whose readings carry no time and keep no regular tick.
 
-It offers what `device_clock.py` does. It reads no clock.
+The class has the interface of the one in `device_clock.py`. It reads no clock.
 """
 
 import math
@@ -12,11 +12,14 @@ from typing import Final
 from omnibot_driver.core.readings import ImuReading, Reading, SampleBoundary
 
 SMALLEST_STEP_S: Final = 1e-6
-"""Between two stamps of readings that came together."""
+"""Step in s between the stamps of two readings that came together."""
 
 
 class ArrivalClock:
-    """A stamp is never later than the arrival, except where the one before it was not earlier."""
+    """Stamps readings with their arrival time, in increasing order.
+
+    A stamp is later than the arrival only if the stamp before it was not earlier than the arrival.
+    """
 
     skew_ppm = 0.0
 
@@ -24,12 +27,12 @@ class ArrivalClock:
         self._stamp_s = -math.inf
 
     def restart(self) -> None:
-        """Begin a new line; stamps still increase."""
+        """Do nothing: stamps do not depend on the board, and still increase."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Stamps in the order of the readings, each later than the one before."""
+        """Return the stamps of the readings in s, in their order, each later than the last."""
         stamps = []
         for left in range(len(readings) - 1, -1, -1):
             at_s = now - left * SMALLEST_STEP_S
@@ -38,5 +41,5 @@ class ArrivalClock:
         return stamps
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """The stamp of one reading, as ``stamps`` gives it."""
+        """Return the stamp of one reading in s, as ``stamps`` does."""
         return self.stamps((reading,), now, edge)[0]

@@ -1,24 +1,28 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When was tick n? A straight line over the ticks, found from the times between which they came.
+"""The time of each tick: a straight line over the ticks, fitted to times between which they came.
 
-A tick's bytes come late, never early: arrivals lie on or above the line, whose slope is the true
-period. And bytes that a read did not bring were sent after it, so the line cannot be much lower
+The bytes of a tick come late, never early: arrivals are on or above the line, whose slope is the
+true period. Bytes that a read did not bring were sent after it, so the line cannot be much lower
 either. Of every block of ticks two points are kept:
 
-*Latest*, the least delayed arrival. It always holds; bursts, stalls and losses only make it loose.
-*Earliest*, told by what a read did not bring. A read that was late itself says too much, so the
-greatest tenth is left out, and what is far below the arrivals says too little and is not kept.
+*Latest*, the least delayed arrival, is an upper bound. It always holds; bursts, stalls and losses
+only make it loose.
 
-Where there are earliest points every pair of a latest and an earliest one bounds the slope, and the
-line runs in the middle of all bounds: a timer that keeps the reads from cutting a sample for
-seconds deceives by half of what it hides at the most. Without them, or if they contradict
-(then reads were late), the line is laid under the latest points as close as it goes: an edge of
-their lower convex hull, under those of cut samples alone if there are any, which have not waited.
-The same where every block had one.
+*Earliest*, from what a read did not bring, is a lower bound. A read that was late itself gives one
+that is too high, so the greatest tenth is left out. A bound far below the arrivals is of little
+use, and is not kept.
 
-Knows ticks and times, in s of the host's steady clock; not what is sampled, nor how ticks are
-counted.
+With earliest points, every pair of a latest and an earliest one bounds the slope, and the line runs
+in the middle of all bounds. A timer that keeps the reads from cutting a sample for seconds then
+causes an error of at most half of what it hides. Without earliest points, or if the bounds
+contradict each other (then reads were late), the line is laid under the latest points as close as
+possible: on an edge of their lower convex hull. If there are points of cut samples, only these are
+used, because cut samples have not waited. The line is laid in the same way if every block has such
+a point.
+
+This module knows ticks and times, in s of the host's steady clock; it does not know what is
+sampled, nor how ticks are counted.
 """
 
 import math
@@ -27,29 +31,40 @@ from itertools import pairwise
 from typing import Final
 
 BLOCK_TICKS: Final = 100
-"""One second."""
+"""Number of ticks in a block: one second of 10 ms ticks."""
 BLOCKS_KEPT: Final = 75
-"""An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
+"""Number of blocks that are kept.
+
+An adapter's timer and the board's tick, within 100 ppm, beat against each other every 20 s.
+"""
 LARGEST_SKEW: Final = 1.2e-4
-"""Of the board's crystal against the host's: 100 ppm, and a little."""
+"""Largest relative deviation of the board's crystal from the host's: 100 ppm, and a little."""
 SUPPORT: Final = 0.75
-"""The line touches the points on both sides of this part of their span: late enough to follow what
-has lately been found out, early enough not to follow the last second's jitter."""
+"""Part of the span of the points at which the line touches their hull.
+
+Late enough to follow what was found out lately, early enough not to follow the last second's
+jitter.
+"""
 FEWEST_READS: Final = 12
-"""In a block, to tell from them which were late."""
+"""Least number of reads in a block that show which of them were late."""
 LATE_PART: Final = 0.1
-"""Of the reads may be later than ``LATE_S``."""
+"""Part of the reads that may be later than ``LATE_S``."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Part of a period between earliest and latest, of which the middle is taken. A 16 ms timer makes
-reads 2 ms apart, as seen from the tick."""
+"""Largest part of a period between earliest and latest points whose middle is used.
+
+A 16 ms timer makes reads 2 ms apart, as seen from the tick.
+"""
 
 Point = tuple[int, float]
-"""A tick, and a time that bounds it."""
+"""A tick, and a time in s that bounds it."""
 
 
 class ClockFit:
-    """The line over the ticks from the first one seen on. ``period_s``: the nominal one."""
+    """The line over the ticks from the first one seen on.
+
+    ``period_s``: the nominal period in s; ``slope_s``: the fitted one.
+    """
 
     def __init__(self, period_s: float, first: Point) -> None:
         self.slope_s = period_s
@@ -63,11 +78,11 @@ class ClockFit:
         self._block_from = first[0]
 
     def at(self, tick: int) -> float:
-        """The time of this tick."""
+        """Return the time of this tick in s."""
         return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
 
     def see(self, latest: Point, *, cut: bool) -> None:
-        """Add a read whose newest tick had arrived by ``latest``; ``cut``: only in part."""
+        """Add a read whose newest tick, or (``cut``) a part of it, had arrived by ``latest``."""
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor
         if arrival < anchor_s + self.slope_s * (tick - anchor_tick):
@@ -80,7 +95,7 @@ class ClockFit:
             self._best, self._not_before, self._block_from = None, [], tick
 
     def not_before(self, earliest: Point) -> None:
-        """Add a read that had not brought this tick by then."""
+        """Add a read that had not brought the tick of this point by the time of this point."""
         self._not_before.append(earliest)
 
     def _end_block(self, best: Point, cut: bool) -> None:
@@ -99,7 +114,7 @@ class ClockFit:
             self._lay_under()
 
     def _height(self, point: Point) -> float:
-        """Height of a point above a line through the origin."""
+        """Return the height in s of a point above the line of this slope through the origin."""
         return point[1] - self.slope_s * point[0]
 
     def _within_skew(self, slope_s: float) -> float:
@@ -107,7 +122,7 @@ class ClockFit:
         return min(max(slope_s, least), most)
 
     def _lay_between(self) -> bool:
-        """Lay the line in the middle of all bounds; if they contradict, forget the earliest."""
+        """Lay the line amid all bounds; if they contradict, forget the earliest, return False."""
         flattest, steepest = -math.inf, math.inf
         above = _hull([at for at, _ in self._latest])
         below = [(tick, -time) for tick, time in _hull([(t, -s) for t, s in self._earliest])]
@@ -128,7 +143,7 @@ class ClockFit:
         return True
 
     def _lay_under(self) -> None:
-        """Under the latest points, as high as it goes over their middle."""
+        """Lay the line under the latest points, as high as it goes at ``SUPPORT`` of their span."""
         cut = [at for at, was_cut in self._latest if was_cut]
         hull = _hull(cut or [at for at, _ in self._latest])
         middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])
@@ -140,7 +155,7 @@ class ClockFit:
 
 
 def _hull(points: list[Point]) -> list[Point]:
-    """The lower convex hull of points in the order of their ticks."""
+    """Return the lower convex hull of points that are sorted by tick."""
     hull: list[Point] = []
     for point in points:
         while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):

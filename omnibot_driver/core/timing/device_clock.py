@@ -1,19 +1,19 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From arrival times to sampling times: the board's clock, as it is seen from the host's.
+"""Sampling times from arrival times: the board's clock, as it is seen from the host's.
 
-The board samples once a tick by a crystal of its own. Its bytes reach us with a delay that is
-unknown and ever changing, but never before they were sent. Two questions follow.
+The board samples once a tick, by a crystal of its own. Its bytes arrive with a delay that is
+unknown and always changes, but never before they were sent. Two questions follow.
 
-*Which tick is it?* IMU readings are counted, with those that the board says were lost. Losses
-without a trace are counted exactly by the displacements' counter; until the next of those, or
-without any, by arrival: a read takes all that has come, so the newest tick in it is hardly older
-than one period, and never from the future.
+*Which tick is it?* IMU readings are counted, together with those that are reported as lost. Losses
+without a trace are counted exactly by the displacements' counter. Until the next displacement, or
+without any, arrival times show them: a read takes all bytes that have come, so the newest tick in
+it is hardly older than one period, and never from the future.
 
-*When was it?* ``ClockFit`` lays a line under the arrivals. What stays in the stamps is the least
-delay that ever happens: one constant.
+*When was it?* ``ClockFit`` lays a line under the arrivals. The error that remains in the stamps is
+the least delay that ever occurs: one constant.
 
-This module knows readings and times. It reads no clock and knows no board's bytes.
+This module knows readings and times. It reads no clock and does not know any board's bytes.
 """
 
 import math
@@ -31,23 +31,34 @@ from omnibot_driver.core.readings import (
 from omnibot_driver.core.timing.clock_fit import ClockFit, Point
 
 LARGEST_LOSS_TICKS: Final = 25
-"""If more are missing that no counter has told, then nothing that was known holds any more."""
+"""Largest number of missing ticks that is corrected by arrival times.
+
+If more are missing, everything known about the clock is forgotten.
+"""
 BEAT_READS: Final = 12
-"""Number of reads of which one is little delayed: a 16 ms adapter's cuts recur after five."""
+"""Number of reads of which at least one has little delay.
+
+The places at which a 16 ms adapter cuts the stream recur after five reads.
+"""
 CALM: Final = 0.45
-"""Part of a period, less than half of it: two reads in a row that came so near the line leave no
-doubt about their ticks."""
+"""Part of a period: two reads in a row this near the line are certain about their ticks.
+
+That needs less than half a period.
+"""
 LARGEST_RISE: Final = 0.02
-"""By this part of a period a stamp follows, each tick, a line that was laid later."""
+"""Largest part of a period that a stamp gains per tick to follow a line that has moved later."""
 SMALLEST_STEP_S: Final = 1e-6
-"""Between two stamps for which even their arrivals leave no room."""
+"""Smallest step in s between two stamps, used if even their arrivals leave no room."""
 
 WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
-"""A read that ended with a whole sample."""
+"""Boundary of a read that ended with a complete sample."""
 
 
 class DeviceClock:
-    """Stamps readings by board time. ``period_s``: the nominal tick, with one ImuReading each."""
+    """Stamps readings by board time.
+
+    ``period_s``: the nominal tick in s; one ImuReading comes in each.
+    """
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -57,7 +68,7 @@ class DeviceClock:
         self.restart()
 
     def restart(self) -> None:
-        """What the board does from here on has nothing to do with what it did before.
+        """Forget all ticks, because the board's next ones are unrelated to them.
 
         Stamps still increase.
         """
@@ -68,27 +79,30 @@ class DeviceClock:
         self._seen_tick: int | None = None
         self._settled = False
         self._calm: ClockFit | None = None
-        """The line, if the last read was near it and cut no sample."""
+        """The line if the last read was near it and cut no sample, else None."""
         self._single_reads = 0
-        """The last reads brought one sample each, so none waited for another."""
+        """Number of last reads that brought one sample each, so none waited for another."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
         self._seen_at = -math.inf
-        """When a new tick was seen last. Soon after a late one come those that waited with it."""
+        """Time in s at which a new tick was seen last.
+
+        Soon after a late tick come those that waited with it.
+        """
         self._awaited: Point | None = None
-        """The next tick, and by when it had not come, unless it was only not read yet."""
+        """The next tick, and a time in s by which it had not come, or at least was not read."""
         self._cut_off: Point | None = None
-        """What a cut sample tells of the line, if it was cut by the read and not by a loss."""
+        """The lower bound by a cut sample; it holds if the read cut it and not a loss."""
 
     @property
     def skew_ppm(self) -> float:
-        """How much faster the board's clock is than the host's, as seen so far."""
+        """How much faster the board's clock is than the host's, in ppm, as seen so far."""
         line = self._line
         return 0.0 if line is None else 1e6 * (self._period_s / line.slope_s - 1.0)
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None = WHOLE
     ) -> list[float]:
-        """When each of these readings, all that one read at ``now`` completed, was sampled.
+        """Return the sampling time in s of each of the readings that one read at ``now`` completed.
 
         ``edge``: where the read ended. From tick to tick stamps increase, and none is later than
         ``now``; a displacement has the stamp of its tick's ImuReading.
@@ -110,7 +124,7 @@ class DeviceClock:
             if came:
                 self._single_reads = self._single_reads + 1 if came == 1 else 0
                 short = self._compare(line, edge, now, counted=DisplacementReading in kinds)
-        # Where a counter took ticks back, the order of the readings must still find room.
+        # If a counter took ticks back, there must still be room for stamps in the readings' order.
         least_s = 0.0 if len(ticks) < 2 or ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
@@ -123,9 +137,10 @@ class DeviceClock:
         return stamps
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """``stamps`` of one that came alone, when due; None, and nothing is changed, otherwise.
+        """Return the stamp of one reading that came alone and when due, else None.
 
-        Most reads of any board with an IMU are such, and need no count of what else they bring.
+        With None nothing is changed. Most reads of a board with an IMU are of this kind, and need
+        no count of what else they bring.
         """
         if reading.lost:
             return None
@@ -137,7 +152,7 @@ class DeviceClock:
     def _due(
         self, tick: int, now: float, edge: SampleBoundary | None, readings: int
     ) -> float | None:
-        """The stamp of one new tick that came as a whole, when it was due; None if it did not."""
+        """Return the stamp of one new tick that came complete and when due; None otherwise."""
         line = self._calm
         if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
             return None
@@ -153,7 +168,7 @@ class DeviceClock:
         return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """The ticks of the readings, by what is known of losses; the counter is right."""
+        """Return the ticks of the readings by the known losses; the displacements' counter wins."""
         ticks: list[int] = []
         for reading in readings:
             if isinstance(reading, ImuReading):
@@ -167,7 +182,7 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """How many ticks the counter is ahead of the count."""
+        """Return how many ticks the displacements' counter is ahead of the count."""
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -175,13 +190,13 @@ class DeviceClock:
         return self._displaced_tick + passed - self._tick
 
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
-        """Hold the newest tick against its arrival; by how many the count was found to be short.
+        """Compare the newest tick with its arrival; return by how many ticks the count was short.
 
-        ``counted``: a counter told this tick.
+        ``counted``: a displacements' counter has confirmed this tick.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
-            return 0  # its beginning has been seen before, and told more
+            return 0  # its beginning was seen before, and showed more
         lag_s = arrival - line.at(tick)
         period_s, lags_s = self._period_s, self._lags_s
         short = 0
@@ -197,7 +212,7 @@ class DeviceClock:
                 and now - self._seen_at > period_s / 2
                 and (0.95 < at_once_s / period_s < 1.05 or 0.95 < later_s / period_s < 1.5)
             ):
-                short = 1  # more at once were sooner kept waiting than lost
+                short = 1  # more than one at once were rather delayed than lost
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
                 lags_s.clear()
@@ -222,7 +237,7 @@ class DeviceClock:
         return short
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
-        """Add a tick. One right behind another had waited with it to be read."""
+        """Add a tick. One that comes right after another had waited with it to be read."""
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
             self._single_reads = 0
@@ -236,7 +251,8 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Stamp by the line's time, without jumps back, and forward only in small steps.
 
-        ``room_s``: how far it may go forward and leave as much to each that comes after it.
+        ``latest_s``: upper limit of the stamp; ``room_s``: largest step that leaves as much to each
+        later stamp of this read.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

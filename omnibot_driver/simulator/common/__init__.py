@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What every simulated board shares: real time, the lines to it, and their faults.
+"""Code that all simulated boards share: real time, the lines to a board, and faults of these lines.
 
-Knows no board.
+Knows no particular board.
 """

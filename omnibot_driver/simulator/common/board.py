@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a simulated board is to everything that runs, carries or chooses one.
+"""Interfaces between a simulated board and the code that runs, connects or selects it.
 
-Values and protocols only. Knows no board.
+Values and protocols only. Knows no particular board.
 """
 
 import argparse
@@ -11,17 +11,17 @@ from dataclasses import dataclass
 from typing import Protocol
 
 Packet = tuple[int, bytes]
-"""Channel and bytes; one whole datagram where the channel carries datagrams."""
+"""Index of the channel, and the bytes; a complete datagram if the channel carries datagrams."""
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
     """One connection between a board and the computer.
 
-    name: of this channel among the board's; empty for the only one.
-    parameter: the driver's parameter that names its port; empty where that follows from another
-        channel's (the next UDP port).
-    datagrams: UDP; otherwise a serial line.
+    name: name of the channel on its board; empty if it is the only one.
+    parameter: the driver's parameter that names the port of the channel; empty if the port follows
+        from that of another channel (the next UDP port).
+    datagrams: True for UDP, False for a serial line.
     """
 
     name: str = ""
@@ -34,43 +34,44 @@ class SimulatedBoard(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The connections of the board; a packet names one by its index."""
+        """Connections of the board; a packet refers to one by its index."""
 
     @property
     def tick_s(self) -> float:
-        """The board time that passes with each ``advance``."""
+        """Board time that passes with each ``advance``, in s."""
 
     def receive(self, data: bytes, now: float, channel: int, /) -> None:
-        """Take what was sent to the board: bytes of a serial line in any chunking, or one datagram.
+        """Receive data that was sent to the board.
 
-        now: when it arrived, in seconds by any steady clock. What the board says to it comes out of
-        the next ``advance``.
+        data: one datagram, or bytes of a serial line, in chunks of any size.
+        now: arrival time in s, by any monotonic clock. The reply comes with the next ``advance``.
         """
 
     def advance(self) -> list[Packet]:
-        """Let one tick pass; what the board sends in it, in its order."""
+        """Advance by one tick; return what the board sends in it, in order."""
 
     def reboot(self) -> None:
-        """Power-cycle the board; the robot stays where it truly is."""
+        """Power-cycle the board; the robot keeps its true pose."""
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """What JSON can say of the robot and the board.
+        """State of the robot and the board, as values that JSON can represent.
 
-        Always with ``x_m``, ``y_m`` and ``yaw_rad``, the true pose since construction, unwrapped.
+        Always contains ``x_m``, ``y_m`` and ``yaw_rad``: the true pose relative to that at
+        construction, with the yaw unwrapped.
         """
 
 
 class SimulatorModule(Protocol):
-    """The names that the package of a simulated board must have."""
+    """The names that the package of a simulated board must define."""
 
     TITLE: str
-    """What it simulates, as in "A simulated ... board listens on"."""
+    """Name of the board, as in "A simulated ... board listens on"."""
     CHANNELS: tuple[Channel, ...]
-    """Those of its boards."""
+    """Channels of each of its boards."""
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
-        """Declare what a user may choose about it; ``--seed`` and the lines' faults are common."""
+        """Add the board's own options; ``--seed`` and the line faults are common to all boards."""
 
     def from_arguments(self, arguments: argparse.Namespace) -> SimulatedBoard:
-        """The board that was chosen; ``arguments.seed`` is the seed of its random numbers."""
+        """Return the board that the options describe; ``arguments.seed`` is its random seed."""

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A bad line: bytes that are lost, alone or in bursts, and bits that change on the way.
+"""A faulty serial line: it loses bytes, one by one or in bursts, and flips bits.
 
-Knows bytes and chances; not what they mean.
+Knows bytes and probabilities. Must not know what the bytes mean.
 """
 
 from collections import Counter
@@ -14,8 +14,10 @@ LONGEST_BURST = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineFaults:
-    """Chances for each byte: `lose` it; `burst`: lose it and up to 199 bytes after it; `flip` one
-    of its bits.
+    """Probability of each fault, per byte.
+
+    lose: the byte is lost. burst: the byte and up to 199 bytes after it are lost. flip: one of its
+    bits changes.
     """
 
     lose: float = 0.0
@@ -27,9 +29,11 @@ _GOOD = LineFaults()
 
 
 class FaultyLine:
-    """The same bytes and seed meet the same fate, however they are cut.
+    """A serial line with random faults, which do not depend on how the bytes are split into chunks.
 
-    lost, flipped: bytes so far.
+    The same bytes and seed always give the same faults.
+
+    lost, flipped: numbers of bytes lost and changed so far.
     """
 
     def __init__(self, faults: LineFaults = _GOOD, seed: int | str = 0) -> None:
@@ -40,11 +44,11 @@ class FaultyLine:
 
     @property
     def counts(self) -> Counter[str]:
-        """The number of bytes of each fault, by its name."""
+        """Number of bytes that met each fault, by the name of the fault."""
         return Counter(lost=self.lost, flipped=self.flipped)
 
     def carry(self, data: bytes) -> bytes:
-        """The bytes that arrive of these."""
+        """Return the bytes that arrive when ``data`` is sent."""
         if self._faults == _GOOD:
             return data
         arrived = bytearray()

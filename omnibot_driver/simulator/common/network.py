@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A bad network: datagrams that are lost, come twice, or come late and overtake each other.
+"""A faulty network: it loses, duplicates, delays and reorders datagrams.
 
-Knows datagrams, chances and board time; not what they mean.
+Knows datagrams, probabilities and board time. Must not know what the datagrams mean.
 """
 
 import heapq
@@ -13,10 +13,10 @@ from random import Random
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkFaults:
-    """What happens to each datagram, either way.
+    """Faults of a network, per datagram and in both directions.
 
-    lose, duplicate: chances. delay_s: each copy is delayed by up to this time, evenly
-    distributed, so that later ones may overtake it.
+    lose, duplicate: probabilities. delay_s: longest delay in s; each copy has its own, uniformly
+    distributed, so that later datagrams may overtake it.
     """
 
     lose: float = 0.0
@@ -28,9 +28,9 @@ _GOOD = NetworkFaults()
 
 
 class NetworkPath:
-    """One way through a network. Equal datagrams, times and seeds meet the same fate.
+    """One direction of a network. Equal datagrams, times and seeds give equal faults.
 
-    lost, duplicated: datagrams so far.
+    lost, duplicated: numbers of datagrams so far.
     """
 
     def __init__(self, faults: NetworkFaults, seed: str) -> None:
@@ -41,7 +41,7 @@ class NetworkPath:
         self._sent = 0
 
     def send(self, datagram: bytes, at_s: float) -> None:
-        """Give it to the network, at this board time."""
+        """Send a datagram into the network at the board time ``at_s``, in s."""
         if self._random.random() < self._faults.lose:
             self.lost += 1
             return
@@ -55,7 +55,7 @@ class NetworkPath:
             self._sent += 1
 
     def arrived(self, now_s: float) -> list[bytes]:
-        """The datagrams that arrive up to this board time and have not been returned before."""
+        """Remove and return the datagrams that have arrived by the board time ``now_s``, in s."""
         out = []
         while self._on_their_way and self._on_their_way[0][0] <= now_s:
             out.append(heapq.heappop(self._on_their_way)[2])
@@ -63,7 +63,7 @@ class NetworkPath:
 
 
 class FaultyNetwork:
-    """The two ways of one channel, each with chances of its own."""
+    """Both directions of one channel, with equal faults and separate random numbers."""
 
     def __init__(self, faults: NetworkFaults = _GOOD, seed: int | str = 0) -> None:
         self.to_board = NetworkPath(faults, f"to board {seed}")
@@ -71,7 +71,7 @@ class FaultyNetwork:
 
     @property
     def counts(self) -> Counter[str]:
-        """Datagrams that met a fault, by its name, both ways."""
+        """Number of datagrams that met each fault, in both directions, by the name of the fault."""
         paths = (self.to_board, self.from_board)
         return Counter(
             lost=sum(path.lost for path in paths), duplicated=sum(path.duplicated for path in paths)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user may choose about any simulated board, on the command line and in a sim:// URL.
+"""Options common to all simulated boards, on the command line and in a sim:// URL.
 
-Each option is declared once, for both. Knows words and their meaning. Must not know what runs the
-board, nor any board: its own options come from its package.
+Each option is declared once, for both. Knows the names, values and effects of options. Must not
+know what runs the board, nor any board: the board's own options come from its package.
 """
 
 import argparse
@@ -18,11 +18,11 @@ from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults
 from omnibot_driver.simulator.common.wired import Line
 
 DEFAULT_BOARD = "omnibot"
-"""Of the driver and of the simulator alike."""
+"""Default board of the driver and of the simulator."""
 
 
 class OptionError(ValueError):
-    """An option that is unknown or has a value that it cannot have; the text says which."""
+    """An unknown option or an invalid value; the text says which."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -31,18 +31,18 @@ class _Parser(argparse.ArgumentParser):
 
 
 def load(module: str) -> SimulatorModule:
-    """The package of a simulated board, by its full name."""
+    """Import and return the package of a simulated board, by its full name."""
     return cast(SimulatorModule, import_module(module))
 
 
 def command(module: str) -> str:
-    """The command that runs this package; ``--help`` after it lists its options."""
+    """Return the command that runs this package; with ``--help`` it lists the options."""
     board = module.rpartition(".")[2]
     return "simulator" if board == DEFAULT_BOARD else f"simulator --board {board}"
 
 
 def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> None:
-    """Let the parser know all options of this board and of its lines."""
+    """Add all options of this board and of its lines to the parser."""
     parser.add_argument("--seed", type=int, default=0, help="of all random numbers (default 0)")
     simulator.add_options(parser)
     serial = any(not channel.datagrams for channel in simulator.CHANNELS)
@@ -68,14 +68,17 @@ def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> 
 def from_arguments(
     arguments: argparse.Namespace, simulator: SimulatorModule
 ) -> tuple[SimulatedBoard, list[Line]]:
-    """The board that was chosen, and its lines."""
+    """Return the board and the lines that the parsed arguments describe."""
     return simulator.from_arguments(arguments), [
         _line(arguments, channel, number) for number, channel in enumerate(simulator.CHANNELS)
     ]
 
 
 def from_url(url: str, simulator: SimulatorModule) -> tuple[SimulatedBoard, list[Line]]:
-    """The same of ``sim://?seed=1&imu_only``. Raises OptionError."""
+    """Return the board and the lines that a URL such as ``sim://?seed=1&imu_only`` describes.
+
+    Raises OptionError.
+    """
     parts = urlsplit(url)
     if place := parts.netloc + parts.path:
         raise OptionError(f"'{place}' must come after a question mark")
@@ -89,7 +92,10 @@ def from_url(url: str, simulator: SimulatorModule) -> tuple[SimulatedBoard, list
 def from_words(
     words: Sequence[str], simulator: SimulatorModule
 ) -> tuple[SimulatedBoard, list[Line]]:
-    """The same of a command line. Raises OptionError."""
+    """Return the board and the lines that command line arguments describe.
+
+    Raises OptionError.
+    """
     parser = _Parser(add_help=False, allow_abbrev=False)
     add_options(parser, simulator)
     arguments, unknown = parser.parse_known_args(words)

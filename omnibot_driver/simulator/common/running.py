@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board in real time: the thread that lets its ticks pass.
+"""A simulated board in real time: the thread that advances it tick by tick.
 
-Knows the clock and the board's `receive` and `advance`. Must not know what carries the packets, nor
-what they mean.
+Knows the clock and the board's ``receive`` and ``advance``. Must not know how packets are
+transported, nor what they mean.
 """
 
 import threading
@@ -19,19 +19,20 @@ from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.common.wired import B, Line, WiredBoard
 
 UNREAD_LIMIT = 4095
-"""Bytes that a Linux terminal holds for a reader who does not read; later ones are lost."""
+"""Number of unread bytes that a Linux terminal holds; bytes beyond it are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
-"""After a longer standstill of the machine the schedule starts afresh."""
+"""Longest delay that is caught up, in s; after a longer one, ticks are skipped."""
 
 _JOIN_S = 5.0
 
 
 class RunningBoard(ABC, Generic[B]):
-    """Runs a board between `start` and `stop`; `lines` are what its packets go through.
+    """Runs a board in a thread between ``start`` and ``stop``; its packets pass ``lines``.
 
-    `dropped` counts bytes that were not read in time. From other threads touch `board` under `lock`
-    only. `stop`, `check` and `wait_for` raise RuntimeError when the board's thread died.
+    ``dropped`` counts the bytes that the driver did not read in time. Other threads may access
+    ``board`` only while they hold ``lock``. ``stop``, ``check`` and ``wait_for`` raise RuntimeError
+    if the board's thread has died.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:
@@ -46,15 +47,15 @@ class RunningBoard(ABC, Generic[B]):
 
     @abstractmethod
     def _receive(self, timeout_s: float) -> Iterable[Packet]:
-        """The bytes from the driver; waits at most this time for them."""
+        """Return the packets from the driver; wait at most ``timeout_s`` for the first."""
 
     @abstractmethod
     def _send(self, channel: int, data: bytes) -> int:
-        """Give bytes, or one datagram, to the driver; returns how many bytes found room."""
+        """Send bytes, or one datagram, to the driver; return how many bytes were accepted."""
 
     @property
     def facts(self) -> dict[str, object]:
-        """The board's, and what became of bytes on its lines. Under `lock`."""
+        """The board's facts and the counts of dropped bytes and line faults; needs ``lock``."""
         met = sum((line.counts for line in self._wired.lines), Counter())
         names = dict.fromkeys(name for line in self._wired.lines for name in line.counts)
         return {
@@ -64,11 +65,11 @@ class RunningBoard(ABC, Generic[B]):
         }
 
     def start(self) -> None:
-        """Start the board's time."""
+        """Start the thread, and with it the board's time."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread."""
+        """Stop the thread and wait until it ends."""
         self._stopping.set()
         self._thread.join(_JOIN_S)
         if self._thread.is_alive():
@@ -81,7 +82,10 @@ class RunningBoard(ABC, Generic[B]):
             raise RuntimeError("the simulated board's thread died") from self._error
 
     def wait_for(self, predicate: Callable[[B], bool], timeout_s: float) -> bool:
-        """Ask the predicate under the lock after each tick; return whether it came to hold."""
+        """Wait until ``predicate``, evaluated under the lock after each tick, is true.
+
+        Return whether it became true within ``timeout_s``.
+        """
         with self._ticked:
             held = self._ticked.wait_for(
                 lambda: self._error is not None or predicate(self.board), timeout_s
@@ -113,9 +117,10 @@ class RunningBoard(ABC, Generic[B]):
                     self._ticked.notify_all()
 
     def _due(self, due_s: float) -> tuple[int, float]:
-        """Ticks to be made up for, and when the next is due.
+        """Return the number of ticks that are overdue, and when the next one is due.
 
-        What is late comes together, as it does over a line that runs on while a machine is busy.
+        The output of all overdue ticks is sent at once: a serial line, too, continues while the
+        computer that reads it is busy.
         """
         late_s = time.monotonic() - due_s
         ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board in real time, for programs outside: each channel has a port of its own.
+"""A simulated board in real time for other programs: each channel has its own port.
 
-Knows what carries a channel, and waits for all of them at once. Must not know what packets mean.
+Knows the ports that carry the channels, and waits for all of them at once. Must not know what
+packets mean.
 """
 
 import os
@@ -21,33 +22,34 @@ from omnibot_driver.simulator.common.wired import B, Line
 
 
 class Carrier(Protocol):
-    """An open port."""
+    """An open port that carries one channel."""
 
     address: str
-    """What the driver's parameter is set to."""
+    """Value for the driver's port parameter."""
     name: str
-    """The same, or the link that leads there."""
+    """Symbolic link to the port, or its address if it has no link."""
     descriptor: int
-    """Readable when something has come."""
+    """File descriptor that is readable when data has arrived."""
 
     def receive(self) -> list[bytes]:
-        """The bytes received, in order."""
+        """Return the data received, in order: chunks of bytes, or datagrams."""
 
     def send(self, data: bytes) -> int:
-        """Give it to the driver; how many bytes found room."""
+        """Send data to the driver; return how many bytes were accepted."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
 
 
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    A pseudo-terminal for each serial channel; ``links`` name symbolic links to them: one for each,
-    or one that gets a hyphen and the channel's name appended where there are several. For channels
-    of datagrams a UDP port each, the first at ``udp_port`` or any, the others after it.
+    Each serial channel has a pseudo-terminal. ``links`` are symbolic links to the
+    pseudo-terminals: one for each, or one for all, to which a hyphen and the channel's name are
+    appended. Each datagram channel has a UDP port: the first one is ``udp_port`` (0: any free
+    port), the others follow it.
 
-    Raises OSError, on entering, with a sentence where a link or a port cannot be had.
+    Entering raises OSError if a link or a port is unavailable; its text explains why.
     """
 
     def __init__(
@@ -70,7 +72,7 @@ class ServedBoard(RunningBoard[B]):
 
     @property
     def names(self) -> list[str]:
-        """The same, but by its link what has one."""
+        """Name of the port of each channel: its symbolic link if it has one, else its address."""
         return [carrier.name for carrier in self._carriers]
 
     def __enter__(self) -> Self:
@@ -106,7 +108,7 @@ class ServedBoard(RunningBoard[B]):
 
 
 class PtyBoard(ServedBoard[B]):
-    """A board of one serial channel, on a pseudo-terminal that is found at ``path``."""
+    """A board with one serial channel, on a pseudo-terminal at ``path``."""
 
     def __init__(self, board: B, link: str | Path | None = None, line: Line | None = None) -> None:
         super().__init__(
@@ -115,7 +117,7 @@ class PtyBoard(ServedBoard[B]):
 
     @property
     def path(self) -> str:
-        """Path of the pseudo-terminal; empty until it is opened."""
+        """Path of the pseudo-terminal; empty before it is opened."""
         return self.addresses[0] if self._carriers else ""
 
     @property

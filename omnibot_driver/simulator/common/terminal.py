@@ -2,7 +2,7 @@
 
 """A pseudo-terminal that carries a serial channel of a simulated board.
 
-Knows descriptors. Must not know what bytes mean.
+Knows file descriptors. Must not know what the bytes mean.
 """
 
 import array
@@ -16,14 +16,14 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 
 
 class Terminal:
-    """A new pseudo-terminal; the driver's end is at ``address``, ours is ``descriptor``.
+    """A new pseudo-terminal; the driver opens ``address``, the simulator uses ``descriptor``.
 
-    It outlives the programs that open it. Bytes that are not read are lost, like those of a UART
-    once the kernel's buffer is full. ``link`` names a symbolic link to be made for the terminal and
-    removed on closing.
+    It stays open when a program closes its end. Bytes beyond the limit of unread ones are lost, as
+    on a UART whose kernel buffer is full. ``link`` is the path of a symbolic link to the terminal,
+    made here and removed by ``close``.
 
-    Raises FileExistsError when ``link`` is taken by anything but a dead link or a link to a
-    pseudo-terminal.
+    Raises FileExistsError if ``link`` exists, unless it is a dead link or a link to a
+    pseudo-terminal, which is replaced.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:
@@ -41,11 +41,11 @@ class Terminal:
             raise
 
     def receive(self) -> list[bytes]:
-        """The bytes received, once ``descriptor`` is readable."""
+        """Return the bytes received; call it when ``descriptor`` is readable."""
         return [os.read(self.descriptor, 4096)]
 
     def send(self, data: bytes) -> int:
-        """Give bytes to the driver; how many found room."""
+        """Send bytes to the driver; return how many were accepted."""
         unread = array.array("i", [0])
         fcntl.ioctl(self._near, termios.FIONREAD, unread)
         room = max(0, UNREAD_LIMIT - unread[0])
@@ -55,7 +55,7 @@ class Terminal:
             return 0
 
     def close(self) -> None:
-        """Take the link away, if it still leads here, and the terminal."""
+        """Remove the link, if it still leads to this terminal, and close the terminal."""
         if self._link is not None and _leads_to(self._link, self.address):
             self._link.unlink()
         self._close_descriptors()

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""UDP sockets that carry the channels of a simulated board whose packets are datagrams.
+"""UDP sockets that carry the datagram channels of a simulated board.
 
-Knows sockets. Must not know what datagrams mean.
+Knows sockets. Must not know what the datagrams mean.
 """
 
 import contextlib
@@ -10,14 +10,14 @@ import errno
 import socket
 
 HOST = "127.0.0.1"
-"""A simulated robot cannot be driven over the network."""
+"""Loopback only, so that a simulated robot cannot be driven over the network."""
 
 LARGEST = 65_535
 _TRIES = 100
 
 
 class UdpSocket:
-    """Bound at ``address``; answers go to the sender of the last datagram."""
+    """A socket bound to ``address``; it sends to the sender of the last datagram."""
 
     def __init__(self, bound: socket.socket) -> None:
         bound.setblocking(False)
@@ -27,7 +27,7 @@ class UdpSocket:
         self.address = self.name = f"udp://{HOST}:{bound.getsockname()[1]}"
 
     def receive(self) -> list[bytes]:
-        """Return all datagrams that have arrived; one may be empty."""
+        """Return all datagrams that have arrived; a datagram may be empty."""
         datagrams = []
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -36,7 +36,7 @@ class UdpSocket:
         return datagrams
 
     def send(self, data: bytes) -> int:
-        """Send a datagram to the driver; returns 0 if there is no driver, or no room."""
+        """Send a datagram to the driver; return 0 if its address is unknown or sending fails."""
         if self._peer is None:
             return 0
         try:
@@ -45,12 +45,15 @@ class UdpSocket:
             return 0
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the socket."""
         self._socket.close()
 
 
 def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
-    """Sockets on this port and those that follow it; on free ones if it is 0. Raises OSError."""
+    """Open ``count`` sockets on consecutive ports from ``port``, or from any free one if it is 0.
+
+    Raises OSError.
+    """
     if not 0 <= port <= LARGEST - count + 1:
         raise OSError(
             f"--udp-port {port}: there is no such port; choose 1 to {LARGEST - count + 1}"

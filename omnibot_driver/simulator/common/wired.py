@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board at the far end of its lines, in board time: whatever passes meets their faults.
+"""A board behind its lines, in board time: each packet passes a line, which may be faulty.
 
 Pure, as the board is. Knows channels and lines. Must not know real time, nor what packets mean.
 """
@@ -15,18 +15,18 @@ from omnibot_driver.simulator.common.network import FaultyNetwork
 B = TypeVar("B", bound=SimulatedBoard)
 
 Line = FaultyLine | FaultyNetwork
-"""Of a serial channel the first, of one with datagrams the second."""
+"""The line of a serial channel, or of a datagram channel."""
 
 
 def good_line(channel: Channel) -> Line:
-    """A line without faults."""
+    """Return a line without faults."""
     return FaultyNetwork() if channel.datagrams else FaultyLine()
 
 
 class WiredBoard(Generic[B]):
-    """``lines``: one for each of the board's channels, in their order; good ones by default.
+    """A board and one line for each of its channels, in order; lines without faults by default.
 
-    Raises ValueError where they do not match the channels.
+    Raises ValueError if the lines do not match the channels.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:
@@ -44,7 +44,7 @@ class WiredBoard(Generic[B]):
         self._board_began_s = 0.0
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """Send this to the board; ``now`` is by any steady clock."""
+        """Send data to the board through its line; ``now`` is in s, by any monotonic clock."""
         line, time_s = self.lines[channel], self._time_s
         if isinstance(line, FaultyLine):
             self.board.receive(data, now, channel)
@@ -54,7 +54,7 @@ class WiredBoard(Generic[B]):
         self._hand_over(channel, line)
 
     def advance(self) -> list[Packet]:
-        """Let one tick pass; what arrives of what the board sends and has sent."""
+        """Advance by one tick; return the packets from the board that arrive in it."""
         self._ticks += 1
         for channel, network in self._networks:
             self._hand_over(channel, network)

@@ -2,7 +2,8 @@
 
 """The LOIS ECU in software, as its manual describes it or as its public firmware behaves.
 
-Shares no code with the driver: a misread manual must not cancel out. ``SimulatedLois`` is pure.
+Shares no code with the driver, so that a misread manual does not cancel out. ``SimulatedLois`` is
+pure.
 """
 
 from omnibot_driver.simulator.lois_ecu.board import CHANNELS, SimulatedLois

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU and its robot: what it obeys, measures and sends, a millisecond at a time.
+"""The LOIS ECU and its robot: it obeys, measures and sends in steps of a millisecond.
 
 Pure: bytes in, ticks of ``tick_s``, bytes out; the same settings and input give the same output.
 Knows the manual's table and, by ``Quirks``, the public firmware. Must not know ports or real time.
 
-Where the manual is silent: no set-point ends by itself; ticks are signed and wrap at 2³²; the
-button is reported on press and on release, and both set the set-points to zero.
+Assumptions where the manual says nothing: set points never expire; encoder ticks are signed and
+wrap at 2³²; the button is reported on press and on release, and both set the set points to zero.
 """
 
 from collections import deque
@@ -34,10 +34,12 @@ GPS_SENTENCE_S = 1.0
 
 
 class SimulatedLois:
-    """One board with its robot. ``tick``: of 10 ms, since construction.
+    """One board with its robot.
 
-    commands: what it obeyed, newest last. received: all that reached its port. lost_bytes: of
-    those, what it did not hear. led, balls, pressed: what can be seen of it.
+    tick: number of ticks of 10 ms since construction.
+    commands: valid lines that the board processed, newest last.
+    pressed: whether the emergency stop button is pressed.
+    motors, wheels: left and right; the true motors, and the wheels as the board measures them.
     """
 
     channels = CHANNELS
@@ -59,7 +61,7 @@ class SimulatedLois:
             self._boots_until_s = self._compass_at_s = 0.0
 
     def reboot(self) -> None:
-        """A power cycle; the robot stays where it is."""
+        """Power-cycle the board; the robot keeps its true pose."""
         self._boot()
 
     def _boot(self) -> None:
@@ -93,37 +95,37 @@ class SimulatedLois:
 
     @property
     def now_s(self) -> float:
-        """Since construction."""
+        """Board time since construction, in s."""
         return self._steps * STEP_S
 
     @property
     def truth(self) -> TrueState:
-        """The true pose of the robot."""
+        """True pose and motion of the robot."""
         return self._vehicle.truth
 
     @property
     def received(self) -> bytearray:
-        """All that reached the port."""
+        """All bytes that were sent to the port."""
         return self._uart.received
 
     @property
     def lost_bytes(self) -> int:
-        """The number of received bytes that the board missed."""
+        """Number of bytes of ``received`` that the board lost."""
         return self._uart.lost_bytes
 
     @property
     def terminal_mode(self) -> int:
-        """0 or 4: it speaks for itself."""
+        """Terminal mode, as 0x11 wrote it last; outside 0 and 4 the board itself sends no lines."""
         return self._terminal.mode
 
     @property
     def led(self) -> bool:
-        """Whether it is on."""
+        """Whether the board's LED is on."""
         return self._obedience.led
 
     @property
     def balls(self) -> int:
-        """How many have been dropped."""
+        """Number of balls dropped."""
         return self._obedience.balls
 
     @property
@@ -133,11 +135,11 @@ class SimulatedLois:
 
     @property
     def standing(self) -> bool:
-        """Whether both wheels truly stand."""
+        """Whether both wheels are truly at rest."""
         return self._vehicle.standing
 
     def press(self, pressed: bool) -> None:
-        """The emergency stop button."""
+        """Press or release the emergency stop button."""
         self.pressed = pressed
         self._button_pressed = True
         if not (self._uart.deaf and self.settings.quirks.button_waits_while_sending):
@@ -151,21 +153,21 @@ class SimulatedLois:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
-        """Hold these wheels by hand."""
+        """Block these wheels by hand, and release the others."""
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
-        """Take bytes off the line; they arrive one after the other from now on."""
+        """Receive bytes; they arrive at 115200 baud from now on, whatever ``now`` says."""
         self._uart.receive(data)
 
     def advance(self) -> list[Packet]:
-        """Let one tick pass; what left the board in it."""
+        """Advance by one tick; return the bytes sent as one packet, or an empty list."""
         data = self.step()
         return [(0, data)] if data else []
 
     @property
     def facts(self) -> dict[str, object]:
-        """Facts of the robot and its board."""
+        """Facts that the simulator's console prints."""
         truth, (left, right) = self.truth, self.wheels
         return {
             "x_m": truth.x_m,
@@ -183,7 +185,7 @@ class SimulatedLois:
         }
 
     def step(self) -> bytes:
-        """Let one tick pass; the bytes that left the board in it."""
+        """Advance by one tick of 10 ms; return the bytes sent in it."""
         self.tick += 1
         sent = bytearray()
         for _ in range(STEPS_PER_TICK):
@@ -256,7 +258,7 @@ class SimulatedLois:
             self._uart.say(data, deaf=False)
 
     def _catch_up(self) -> None:
-        """Serve the interrupts that waited while they were off."""
+        """Serve the interrupts that were pending while interrupts were off."""
         pending, self._pending = self._pending, {}
         for index, (is_long, direction) in pending.items():
             self._edge(index, self.now_s, is_long, direction)
@@ -269,7 +271,7 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """Finish a scan, then do a whole one: both take less than a millisecond."""
+        """Finish the current scan of the timers, then run another; both take less than 1 ms."""
         for _ in range(2):
             if not self._scan:
                 self._read_input()
@@ -303,7 +305,7 @@ class SimulatedLois:
             self._say(self._sayings.group(code, self._clock_ms, self.now_s))
 
     def _say_record(self, data: bytes) -> None:
-        """Send a complete record, which delays the periodic messages."""
+        """Send a complete record and restart the periods of the periodic messages."""
         if data:
             self._say(data)
             self._timers.restart(self._clock_ms)

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One wheel as the board sees it: edges in, ticks and speed out, and the duty of its motor.
+"""One wheel as the board sees it: encoder edges in; ticks, speed and motor duty out.
 
-Here are the firmware's quirks of counting and measuring. Knows no wire, and no other wheel.
+Contains the firmware's quirks of counting and measuring. Knows neither the protocol nor the other
+wheel.
 """
 
 from math import copysign
@@ -21,9 +22,14 @@ STALE_S = 0.25
 
 
 class WheelChannel:
-    """``corrections`` of the short and the long level; ``steps`` to a turn.
+    """One wheel of the board, with its encoder counter and its speed controller.
 
-    ticks: as 0x12 has them. rpm: as measured. duty_percent: as the controller wants it.
+    ``corrections``: factors for the durations of the short and the long level of the encoder.
+    ``steps``: encoder edges per turn.
+
+    ticks: encoder ticks, as 0x12 reports them. rpm: measured speed in RPM, an integer.
+    exact_rpm: the same with fraction. duty_percent: duty of the motor, -100..100.
+    open_loop: whether a duty is commanded. record, record_left: samples so far, samples to come.
     """
 
     def __init__(
@@ -42,15 +48,18 @@ class WheelChannel:
         self._count = 0
         self._ticked_s = 0.0
         self.turned_ticks = 0
-        """Since the odometry took them; signed as the wheel turns."""
+        """Ticks since the odometry last read them; signed by the true direction of the wheel."""
         self.record: list[int] = []
         self.record_left = 0
         self._records_torque = False
 
-    # What the encoder tells
+    # Encoder input
 
     def edge(self, at_s: float, is_long: bool, direction: int) -> None:
-        """Process one edge when its interrupt is served."""
+        """Process one edge of the encoder, when its interrupt is served at ``at_s``.
+
+        is_long: whether a long level ended. direction: 1 forward, -1 backward.
+        """
         quirks = self._quirks
         if not quirks.ticks_of_forward_targets:
             self.ticks += direction
@@ -78,21 +87,24 @@ class WheelChannel:
             self._sample(min(int(passed_us / unit_us), 0xFFFF))
 
     def settle(self, now_s: float) -> None:
-        """Time passes without edges: by the manual a wheel that stands has no speed."""
+        """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
+
+        This is what the manual implies; with a quirk, a stalled wheel keeps its speed.
+        """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0
 
     # Records
 
     def start_record(self, samples: int, *, torque: bool) -> None:
-        """Forget what was recorded."""
+        """Start a record of this many samples, and discard the previous one."""
         if not self._quirks.large_records_never_end:
             samples = min(samples, RECORD_DEPTH)
         self.record, self.record_left = [], samples
         self._records_torque = torque
 
     def torque(self) -> None:
-        """Take one reading of the current."""
+        """Record one torque sample, if a torque record is running."""
         if self.record_left and self._records_torque and len(self.record) < RECORD_DEPTH:
             self._sample(200 + 25 * abs(self.duty_percent))
 
@@ -100,23 +112,23 @@ class WheelChannel:
         self.record.append(value)
         self.record_left -= 1
 
-    # What is commanded
+    # Commands
 
     def command_rpm(self, rpm: int) -> None:
-        """Closed loop."""
+        """Set the speed target in RPM and close the control loop; zero or a reversal halts it."""
         self.open_loop = False
         if rpm == 0 or rpm * self._next_target < 0:
             self._halt()
         self._next_target = rpm
 
     def command_duty(self, percent: int) -> None:
-        """Open loop; the RPM target stays what it was."""
+        """Set the duty in percent and open the control loop; the speed target is kept."""
         self.open_loop = True
         self.controller.restart()
         self.duty_percent = max(-LIMIT_PERCENT, min(LIMIT_PERCENT, percent))
 
     def release(self) -> None:
-        """The button: as if zero were commanded, in whichever mode."""
+        """React to the emergency stop button as to a command of zero, in the current mode."""
         if self.open_loop:
             self.duty_percent = 0
         else:
@@ -124,7 +136,7 @@ class WheelChannel:
             self._next_target = 0
 
     def reset(self) -> None:
-        """Reset everything, as the manual says."""
+        """Set the ticks to zero and, unless a quirk prevents it, stop the motor."""
         self.ticks = 0
         if not self._quirks.reset_clears_ticks_only:
             self.command_duty(0)
@@ -132,7 +144,7 @@ class WheelChannel:
             self._next_target = 0
 
     def control(self) -> None:
-        """Run one step of the controller."""
+        """Run one step of the speed controller; do nothing in open loop."""
         if self.open_loop:
             return
         target = self._next_target if not self._quirks.reverse_runs_fast else self._target

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What each command does to the board. Knows commands and payloads; no characters, no sending."""
+"""The effect of each command on the board.
+
+Knows commands and payloads. Must not know characters, nor how replies are sent.
+"""
 
 from dataclasses import dataclass
 
@@ -18,7 +21,7 @@ BALL_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A line that the board obeyed in tick number ``tick``."""
+    """A valid line that the board processed in tick number ``tick``; the command may be unknown."""
 
     tick: int
     command: int
@@ -27,7 +30,7 @@ class Obeyed:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What commands act on, from a boot to the next."""
+    """The parts of the board that commands act on; new after each boot."""
 
     wheels: tuple[WheelChannel, ...]
     odometry: DocumentedOdometry
@@ -38,7 +41,10 @@ class Parts:
 
 
 class Commands:
-    """``led``, ``balls``: what can be seen of it."""
+    """Carries out commands.
+
+    led: whether the LED is on. balls: number of balls dropped. Both survive a reboot.
+    """
 
     def __init__(self, quirks: Quirks) -> None:
         self._quirks = quirks
@@ -47,7 +53,7 @@ class Commands:
         self._ball_at_s = -BALL_S
 
     def obey(self, parts: Parts, command: int, payload: int, now_s: float, clock_ms: int) -> None:
-        """Carry out one; one that is unknown does nothing."""
+        """Carry out one command; ignore an unknown one."""
         quirks, (left, right) = self._quirks, parts.wheels
         high, low = payload >> 16, payload & 0xFFFF
         signed = [word - 0x10000 if word & 0x8000 else word for word in (high, low)]

@@ -2,7 +2,8 @@
 
 """A motor with its wheel and encoder, and the board's speed controller for it.
 
-Speeds in RPM, efforts in percent of duty. Knows time steps, not commands nor the wire.
+Speeds are in RPM, efforts in percent of duty. Knows time steps. Must not know commands or the
+protocol.
 """
 
 from collections import deque
@@ -17,7 +18,7 @@ NOMINAL_STEP_S = 0.2
 
 
 class Motor:
-    """Advanced by ``dt_s``; ``held`` wheels do not turn."""
+    """A motor with its wheel; while ``held``, the wheel does not turn."""
 
     def __init__(self, settings: MotorSettings, load_percent: float, random: Random) -> None:
         self.rpm = 0.0
@@ -31,7 +32,7 @@ class Motor:
         self._gap = 0.0
 
     def advance(self, duty_percent: float, dt_s: float) -> float:
-        """Turns of the wheel in this time."""
+        """Advance by ``dt_s``; return the turns of the wheel in this time, with sign."""
         if self.held:
             self.rpm = 0.0
             return 0.0
@@ -66,14 +67,14 @@ class Motor:
         return self._through_gap((before + self.rpm) / 2 * dt_s / 60)
 
     def _late(self, duty_percent: float, dt_s: float) -> float:
-        """The order of one dead time ago."""
+        """Return the duty of one dead time ago, in percent."""
         self._on_the_way.append(duty_percent)
         if len(self._on_the_way) <= round(self._settings.dead_time_s / dt_s):
             return 0.0
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """Rotation of the wheel, through the gap, when the motor turns."""
+        """Return the turns of the wheel for these turns of the motor, after backlash."""
         backlash = self._settings.backlash_turns
         if not backlash:
             return turns
@@ -83,20 +84,27 @@ class Motor:
 
 
 class Encoder:
-    """Edges of a disc whose marks are ``short`` of a whole period wide, the rest long."""
+    """An encoder disc; the short level is ``short`` of a period long, the long level the rest.
+
+    ``steps``: edges per turn. ``noise``: standard deviation of the length of a level, as a fraction
+    of half a period.
+    """
 
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._per_turn = steps / 2
         self._short = short
-        # Two neighbours that are off their places make a way from one to the other.
+        # The distance between two marks has the position errors of both, hence the root of 2.
         self._off = [
             noise / 2 / 2**0.5 * random.gauss(0.0, 1.0) for _ in range(steps if noise else 1)
         ]
 
     def turn(self, turns: float) -> tuple[float, bool, int] | None:
-        """The edge that was passed: when (as part of the step), if a long level ended, and in
-        which direction."""
+        """Turn the disc; return the edge that was passed, or None.
+
+        The edge consists of its time as a fraction of the step, whether a long level ended, and its
+        direction (1 forward, -1 backward).
+        """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
         level_before, level_after = self._level(before), self._level(after)
@@ -109,7 +117,7 @@ class Encoder:
         return (at - before) / (after - before), is_long, 1 if forward else -1
 
     def _place(self, edge: int) -> float:
-        """Position of a mark, in periods."""
+        """Return the position of an edge, in periods."""
         return edge // 2 + (self._short if edge % 2 else 0.0) + self._off[edge % len(self._off)]
 
     def _level(self, periods: float) -> int:
@@ -131,9 +139,9 @@ class Gains:
 
 
 class SpeedController:
-    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) by the trapezoidal rule, and what the firmware adds.
+    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) by the trapezoidal rule, as the firmware extends it.
 
-    The coefficients are for steps of ``NOMINAL_STEP_S``, however often it is called. An output
+    The coefficients are for steps of ``NOMINAL_STEP_S``, whatever the true step is. An output
     beyond 100 % is not remembered (anti-windup), and one against the target becomes zero.
     """
 
@@ -142,17 +150,17 @@ class SpeedController:
         self.restart()
 
     def change(self, **gains: float) -> None:
-        """New gains; begins anew."""
+        """Change these gains and restart the controller."""
         self.gains = replace(self.gains, **gains)
         self.restart()
 
     def restart(self) -> None:
-        """Forget everything."""
+        """Reset the controller's state; the gains stay."""
         self._errors = self._outputs = (0.0, 0.0)
         self._target = 0.0
 
     def step(self, measured_rpm: float, target_rpm: float) -> float:
-        """Duty in percent, -100..100; no power where nothing is wanted."""
+        """Return the duty in percent, -100..100; zero if the target is zero."""
         if not target_rpm:
             self.restart()
             return 0.0

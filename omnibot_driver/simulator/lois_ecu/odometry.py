@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's own odometry, as the manual means it and as the firmware computes it.
+"""The board's own odometry, as the manual describes it and as the firmware computes it.
 
-Knows wheels and their nominal geometry; must not know where the robot truly is.
+Knows wheels and their nominal geometry. Must not know the true pose of the robot.
 """
 
 from math import cos, inf, nan, pi, sin
@@ -15,7 +15,11 @@ SLOW_COUNT_S = 7251 / 72e6
 
 
 class DocumentedOdometry:
-    """Odometry from signed ticks and measured speeds."""
+    """Odometry from signed ticks and measured speeds, as the manual describes it.
+
+    pose: x, y in m and yaw in rad. velocity: dx, dy in m/s, in the frame of the pose, and dyaw in
+    rad/s.
+    """
 
     def __init__(self, steps: int, radius_m: float, track_m: float) -> None:
         self._tick_m = 2 * pi * radius_m / steps
@@ -24,12 +28,12 @@ class DocumentedOdometry:
         self.clear()
 
     def clear(self) -> None:
-        """Return to the origin."""
+        """Return to the origin, at rest."""
         self.pose = (0.0, 0.0, 0.0)
         self.velocity = (0.0, 0.0, 0.0)
 
     def move(self, left_ticks: int, right_ticks: int) -> None:
-        """Move by these increments."""
+        """Move the pose by these increments of the ticks."""
         way = (left_ticks + right_ticks) * self._tick_m / 2
         turn = (right_ticks - left_ticks) * self._tick_m / self._track_m
         x, y, yaw = self.pose
@@ -37,7 +41,7 @@ class DocumentedOdometry:
         self.pose = (x + way * cos(middle), y + way * sin(middle), yaw + turn)
 
     def measure(self, left_rpm: float, right_rpm: float) -> None:
-        """The velocity of now."""
+        """Set the velocity from the measured wheel speeds in RPM."""
         speed = (left_rpm + right_rpm) / 2 * self._rim_mps
         turning = (right_rpm - left_rpm) * self._rim_mps / self._track_m
         yaw = self.pose[2]
@@ -45,10 +49,11 @@ class DocumentedOdometry:
 
 
 class FirmwareOdometry(DocumentedOdometry):
-    """From the integer speeds that were measured last, at each tick of either wheel.
+    """Odometry as the firmware computes it: at each tick of either wheel, from the latest RPMs.
 
-    ``stands``: at equal speeds the position does not move. ``divides``: the velocity is the way
-    over the time since the last tick, which may be none. ``slow``: a count takes 0.7 % too long.
+    The RPMs are integers. ``stands``: at equal speeds the position does not change. ``divides``:
+    the velocity is the displacement divided by the time since the last tick, even if that is zero
+    (NaN or infinity). ``slow``: a count of the timer takes 0.7 % too long.
     """
 
     def __init__(
@@ -67,7 +72,7 @@ class FirmwareOdometry(DocumentedOdometry):
         self._count: int | None = None
 
     def tick(self, at_s: float, left_rpm: int, right_rpm: int) -> None:
-        """Process one edge of either wheel at this time."""
+        """Process one encoder edge of either wheel at ``at_s``."""
         count = int(at_s / self._timer_s) % TIMER_COUNTS
         before, self._count = self._count, count
         if before is None:
@@ -90,7 +95,7 @@ class FirmwareOdometry(DocumentedOdometry):
 
 
 def odometry_of(settings: LoisSettings) -> DocumentedOdometry:
-    """The odometry of this board's firmware."""
+    """Return the odometry of the firmware that ``settings.quirks`` describes."""
     geometry = settings.steps, settings.wheel_radius_m, settings.track_m
     quirks = settings.quirks
     stands, divides = quirks.odometry_stands_at_equal_speeds, quirks.velocity_may_be_nan

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user may choose about a simulated LOIS ECU, besides its seed and the faults of its line.
+"""Options of a simulated LOIS ECU, except its seed and the faults of its line.
 
-Knows words and their meaning. Must not know what runs the board.
+Knows the names, values and effects of options. Must not know what runs the board.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from omnibot_driver.simulator.lois_ecu.settings import QUIRKS, Firmware, LoisSet
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Let the parser know them all."""
+    """Add all options to the parser."""
     parser.add_argument(
         "--firmware",
         choices=get_args(Firmware),
@@ -27,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def from_arguments(arguments: argparse.Namespace) -> SimulatedLois:
-    """The board that was chosen."""
+    """Return the board that the parsed options describe."""
     return SimulatedLois(
         LoisSettings(
             quirks=QUIRKS[arguments.firmware], seed=arguments.seed, running=arguments.running

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Records of tick times, torque and headings: taken, and written as lines when they are complete.
+"""Records of tick times, torque and headings: sampled, and encoded as lines when complete.
 
-Knows wheels as the board sees them; must not know when it sends.
+Knows wheels as the board sees them. Must not know when the lines are sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire
@@ -14,7 +14,10 @@ PADDING, HEADING_PADDING = 10, 0x016A
 
 
 class Recorder:
-    """``number``: of the record that is being taken, as it was asked for; None where none is."""
+    """Takes one record at a time.
+
+    number: command number of the record in progress, as requested; None without one.
+    """
 
     def __init__(self, quirks: Quirks, wheels: tuple[WheelChannel, ...]) -> None:
         self._quirks, self._wheels = quirks, wheels
@@ -23,7 +26,7 @@ class Recorder:
         self._wanted = 0
 
     def start(self, number: int, payload: int) -> None:
-        """Start a record and forget the one before."""
+        """Start a record and discard the previous one."""
         self.number = number
         if number == HEADINGS:
             self._headings, self._wanted = [], payload
@@ -32,13 +35,13 @@ class Recorder:
             channel.start_record(samples, torque=number == TORQUE)
 
     def control(self) -> None:
-        """A step of the controllers: a sample of torque."""
+        """Take a torque sample if one is wanted; called at each step of the controllers."""
         if self.number == TORQUE:
             for channel in self._wheels:
                 channel.torque()
 
     def heading(self, heading: int) -> bytes:
-        """A sample of the compass; the record, where it is complete."""
+        """Record a compass heading in degrees; return the encoded record once it is complete."""
         if self.number != HEADINGS:
             return b""
         full = len(self._headings) >= min(self._wanted, 2 * RECORD_DEPTH)
@@ -55,7 +58,7 @@ class Recorder:
         return b"".join([*lines, wire.words(HEADINGS, HEADING_PADDING, HEADING_PADDING)])
 
     def of_wheels(self) -> bytes:
-        """The record of both wheels, where it is complete."""
+        """Return the encoded record of both wheels once it is complete."""
         left, right = self._wheels
         if self.number not in (RPM, TORQUE) or left.record_left or right.record_left:
             return b""

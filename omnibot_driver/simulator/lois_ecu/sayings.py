@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the board says of itself, as lines: time, place, heading, ticks, odometry.
+"""The board's periodic messages as lines: GPS position, time, date, heading, ticks, odometry.
 
-Knows where each number comes from; must not know when it is said.
+Knows where each value comes from. Must not know when a message is sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire
@@ -14,7 +14,7 @@ from omnibot_driver.simulator.lois_ecu.vehicle import Vehicle
 
 
 class Sayings:
-    """Encodes the messages of one board from boot to boot."""
+    """Encodes the periodic messages of one board, from one boot to the next."""
 
     def __init__(
         self,
@@ -28,7 +28,7 @@ class Sayings:
         self._odometry, self._compass = odometry, compass
 
     def group(self, code: int, clock_ms: int, now_s: float) -> bytes:
-        """The message with this number."""
+        """Return the lines of the message with this command number."""
         quirks = self._settings.quirks
         if code == 0x10:
             return wire.words(code, 0, self._compass.last)
@@ -49,7 +49,7 @@ class Sayings:
         return group + wire.sequence(code, numbers) if quirks.appends_odometry else group
 
     def fix(self, now_s: float) -> Fix:
-        """A message with the position of the GPS."""
+        """Return the GPS fix at ``now_s``, or one of zeros if the firmware ignores the GPS."""
         settings, truth = self._settings, self._vehicle.truth
         if settings.quirks.gps_is_ignored:
             return Fix(0.0, 0.0, (0, 0, 0), (0, 0, 0))

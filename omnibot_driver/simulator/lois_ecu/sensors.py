@@ -2,7 +2,7 @@
 
 """The GPS receiver and the compass on the board's serial inputs.
 
-Knows where the robot truly is; must not know the host's protocol.
+Knows the true pose of the robot. Must not know the host's protocol.
 """
 
 from collections import deque
@@ -16,7 +16,7 @@ DAY_S = 86_400
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """A position of the GPS: degrees, then UTC."""
+    """A GPS position in degrees, with date (year of the century, month, day) and time in UTC."""
 
     latitude_deg: float
     longitude_deg: float
@@ -25,7 +25,10 @@ class Fix:
 
 
 def fix_at(start: tuple[float, float], x_m: float, y_m: float, utc_s: float) -> Fix:
-    """x is east, y is north."""
+    """Return the fix ``x_m`` east and ``y_m`` north of ``start`` (latitude, longitude in degrees).
+
+    ``utc_s`` is in s since 2000-01-01; each year has 365 days, and each month 31.
+    """
     latitude = start[0] + y_m / METRES_PER_DEGREE
     longitude = start[1] + x_m / (METRES_PER_DEGREE * cos(radians(start[0])))
     days, second = divmod(int(utc_s), DAY_S)
@@ -35,7 +38,7 @@ def fix_at(start: tuple[float, float], x_m: float, y_m: float, utc_s: float) -> 
 
 
 def sentence(body: str) -> bytes:
-    """An NMEA sentence."""
+    """Return an NMEA sentence with its checksum."""
     total = 0
     for character in body:
         total ^= ord(character)
@@ -43,7 +46,10 @@ def sentence(body: str) -> bytes:
 
 
 class Compass:
-    """Three raw readings 0..359 and their mean; ``over_north``: as if they were mere numbers."""
+    """A compass that averages its last three raw readings of 0..359 degrees.
+
+    ``over_north``: average them as plain numbers, which is wrong across north.
+    """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:
         self._raw = deque([0, 0, 0] if over_north else [], maxlen=3)
@@ -51,7 +57,7 @@ class Compass:
         self.last = 0
 
     def read(self, yaw_rad: float) -> int:
-        """The new mean, clockwise from north, -179..180."""
+        """Take a reading; return the new mean in degrees clockwise from north, -179..180."""
         true = 90.0 - degrees(yaw_rad) + self._random.gauss(0.0, self._noise_deg)
         raw = int(true % 360.0) % 360
         self._raw.append(raw)

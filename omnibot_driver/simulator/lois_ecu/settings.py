@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a simulated LOIS ECU and its robot are like: nominal values, planted errors, firmware.
+"""Settings of a simulated LOIS ECU and its robot: nominal values, planted errors, firmware.
 
-``Quirks`` are the ways in which the public firmware departs from the manual, one switch each, so
-that a driver can be tried against either, or against one of them alone.
+``Quirks`` are the deviations of the public firmware from the manual, one switch each, so that a
+driver can be tested against both, or against a single deviation.
 """
 
 from dataclasses import dataclass, fields
@@ -12,42 +12,44 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quirks:
-    """All off: as the manual says. All on: as the public firmware does.
+    """Deviations of the public firmware from the manual: none by default, all in ``FIRMWARE``.
 
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
-    odometry_stands_at_equal_speeds: its position does not move while both integer RPMs are equal.
+    odometry_stands_at_equal_speeds: its position does not change while both integer RPMs are equal.
     velocity_may_be_nan: two ticks within one count of the timer divide by zero.
-    sign_of_command: the speed has the target's sign, not the wheel's.
-    keeps_speed_of_stalled_wheel: a wheel that does not tick keeps its last speed.
-    duty_drags_target: negative duty pulls the wheel's RPM target down with each tick.
-    reverse_runs_fast: so does the controller's own negative duty, until its next step.
-    low_pass_starts_at_zero: no RPM is ever reached until 0x23 is written.
+    sign_of_command: the measured speed has the sign of the target, not of the wheel.
+    keeps_speed_of_stalled_wheel: a wheel without ticks keeps its last measured speed.
+    duty_drags_target: a negative duty command lowers the wheel's RPM target by 1 at each tick.
+    reverse_runs_fast: a negative duty of the controller does the same until the next control step.
+    low_pass_starts_at_zero: the low pass of the target has gain 0, so the wheels do not follow an
+        RPM target until 0x23 is written.
     extra_settings: 0x21 to 0x23 exist.
-    appends_odometry: 0x12 sends the odometry behind the ticks, under its own number.
-    clock_in_ms: the time of 0x12 is in ms.
-    clock_stops_while_sending: and does not run while a group is sent.
-    deaf_while_sending: characters that come meanwhile are lost, but for the first.
-    deaf_while_counting: the same for 0.2 ms with each tick.
-    button_waits_while_sending: a press takes the power away when the group, or record, has gone.
-    odometry_period_is_fixed: writing 0x20's period does nothing.
+    appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
+    clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
+    clock_stops_while_sending: the clock of the board stops while a message or record is sent.
+    deaf_while_sending: of the characters received while sending, all but the first are lost.
+    deaf_while_counting: at each tick the board receives nothing for 0.2 ms.
+    button_waits_while_sending: a press switches the motors off only after the message or record in
+        progress is sent.
+    odometry_period_is_fixed: writing the period of 0x20 has no effect.
     terminal_mode_zeroes_correction: every write of 0x11 overwrites the left short correction.
-    button_is_lost_in_terminal_mode: a press is not told.
-    terminal_mixes_sensors: each mode passes on both sensors, character by character.
-    reset_clears_ticks_only: odometry and set-points stay.
-    terminal_passes_input_on: what the host says goes to the sensor at its baud rate (9600, 4800),
-        and the board reads no further before it has gone.
-    one_ball_in_six_seconds: 0x19 is ignored while a ball is on its way.
+    button_is_lost_in_terminal_mode: a press is not reported.
+    terminal_mixes_sensors: each mode forwards both sensors, character by character.
+    reset_clears_ticks_only: 0x18 keeps the odometry and the set points.
+    terminal_passes_input_on: what the host sends is forwarded to the sensor at its baud rate (9600,
+        4800), and the board reads no further input until that is done.
+    one_ball_in_six_seconds: 0x19 is ignored within 6 s of the previous ball.
     gps_is_ignored: position, time and date are zeros.
     headings_average_over_north: the mean of 359, 1 and 1 is 120.
-    records_in_100_us: not in 100 ns.
-    torque_comes_as_rpm: the answer to 0x17 has the number 0x04.
-    record_waits_for_one_more: headings are sent when sample n + 1 is there.
-    large_records_never_end: more than 1024 samples do not fit.
-    lenient_hex: a payload that is not a number is obeyed if its checksum is right.
-    limits_rpm: beyond 50 RPM it drives 50.
-    fast_control: each 91 ms instead of 200 ms, with the same coefficients.
-    slow_timer: one count of 100 us takes 100.7 us, so each speed is reported 0.7 % too high.
-    slow_boot: silent and deaf for two seconds; what comes meanwhile is read then.
+    records_in_100_us: tick times are in 100 µs, not in 100 ns.
+    torque_comes_as_rpm: the reply to 0x17 has command number 0x04.
+    record_waits_for_one_more: a record of n headings is sent when sample n + 1 arrives.
+    large_records_never_end: a record of more than 1024 samples is never completed.
+    lenient_hex: a line with a field that is not hexadecimal is obeyed if its checksum is right.
+    limits_rpm: targets beyond 50 RPM are limited to 50 RPM.
+    fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
+    slow_timer: a count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
+    slow_boot: the board does not react for 2 s after power-up; it reads the input afterwards.
     """
 
     ticks_of_forward_targets: bool = False
@@ -94,11 +96,13 @@ QUIRKS: dict[Firmware, Quirks] = {"documented": DOCUMENTED, "firmware": FIRMWARE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorSettings:
-    """A motor of first order with dry friction.
+    """A first-order motor with dry friction.
 
-    rpm_per_percent: beyond the dead zone; friction_rpm_per_s: how fast it slows down without power,
-    besides the time constant. second_time_constant_s, dead_time_s: of the power stage, before the
-    motor; backlash_turns: of the wheel, between motor and encoder.
+    rpm_per_percent: speed per duty beyond the dead zone. dead_zone_percent: duty below which the
+    motor has no torque. time_constant_s: of the speed.
+    friction_rpm_per_s: additional deceleration without power.
+    second_time_constant_s, dead_time_s: lag and delay of the power stage, before the motor.
+    backlash_turns: play between motor and encoder, in turns of the wheel.
     """
 
     rpm_per_percent: float = 0.66
@@ -112,13 +116,19 @@ class MotorSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoisSettings:
-    """The board, its robot, and where it is.
+    """The board, its robot, and its position on Earth.
 
-    wheel_radius_scale, track_scale: true over nominal. slip: standard deviation in m of the way of
-    a wheel after 1 m. load_percent: of duty, standard deviation of what the ground takes, changing
-    within half a second. start_latitude_deg ...: where x = y = 0 is; x is east.
-    mark_noise: of the encoders' marks, standard deviation of the way from one to the next, as part
-    of it. heading_noise_deg: of each raw heading. running: it has booted already.
+    wheel_radius_m, track_m, steps: nominal geometry; ``steps`` are encoder edges per turn.
+    wheel_radius_scale, track_scale: true value divided by nominal value.
+    slip: standard deviation, in m, of the distance that a wheel rolls in 1 m.
+    load_percent: standard deviation, in percent of duty, of the load from the ground, which has a
+        correlation time of 0.5 s.
+    mark_noise: standard deviation of the distance between adjacent encoder marks, as a fraction of
+        half a period.
+    start_latitude_deg, start_longitude_deg: position of x = y = 0; x points east.
+    compass_period_s: time between two compass readings.
+    heading_noise_deg: standard deviation of each raw heading.
+    running: the board has already booted.
     """
 
     quirks: Quirks = FIRMWARE
@@ -135,7 +145,7 @@ class LoisSettings:
     start_latitude_deg: float = 48.1
     start_longitude_deg: float = 11.5
     utc_s: int = 20 * 365 * 86400
-    """Seconds of the day and the date begin from this, counted from 2000-01-01, 365 days a year."""
+    """Date and time at construction, in s since 2000-01-01, with 365 days a year."""
     compass_period_s: float = 0.1
     heading_noise_deg: float = 0.0
     running: bool = False

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What passes between the board's sensors and its host in a terminal mode.
+"""The terminal mode: characters that pass between the board's sensors and the host.
 
-Knows characters and which sensor wrote them; must not know the protocol, nor when it sends.
+Knows characters and which sensor sent them. Must not know the protocol, nor when the board sends.
 """
 
 from collections import deque
@@ -14,11 +14,11 @@ GPS, COMPASS = 1, 2
 NO_TERMINAL = (0, 4)
 PASSED_ON_DEPTH = 2048
 CHARACTERS_PER_STEP = {GPS: 0.96, COMPASS: 0.48}
-"""At 9600 and 4800 baud."""
+"""Characters per step of 1 ms at 9600 and 4800 baud."""
 
 
 class Terminal:
-    """``mode``: as the host wrote it last."""
+    """State of the terminal mode; ``mode`` is the value that the host wrote last."""
 
     def __init__(self, quirks: Quirks) -> None:
         self._quirks = quirks
@@ -28,21 +28,21 @@ class Terminal:
 
     @property
     def on(self) -> bool:
-        """Whether the board itself is silent."""
+        """Whether sensor data replaces the board's own lines."""
         return self.mode not in NO_TERMINAL
 
     @property
     def busy(self) -> bool:
-        """Whether the main loop waits for characters that go to the sensor."""
+        """Whether the main loop waits for characters that are sent to the sensor."""
         return self._to_sensor > 0
 
     def heard(self, count: int) -> None:
-        """This many characters came from the host; they go to the sensor."""
+        """Forward ``count`` characters from the host to the sensor, if the firmware does that."""
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)
 
     def sensor(self, sensor: int, text: bytes) -> bytes:
-        """A sensor has written this; what of it goes to the host at once."""
+        """Process a text from a sensor; return the part that is sent to the host at once."""
         if not self._quirks.terminal_mixes_sensors:
             return text if self.mode == sensor else b""
         if self.on:
@@ -50,7 +50,7 @@ class Terminal:
         return b""
 
     def mixed(self) -> bytes:
-        """One step: a character of each sensor that has some, where the board is free for it."""
+        """Advance by one step; return one waiting character of each sensor if the board is free."""
         if self.busy:
             speed = CHARACTERS_PER_STEP.get(self.mode, BYTES_PER_STEP)
             self._to_sensor = max(self._to_sensor - speed, 0.0)

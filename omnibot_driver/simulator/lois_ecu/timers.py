@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When each message of the board is due. Knows the board's clock and numbers of messages."""
+"""Periods of the board's messages. Knows the board's clock and the command numbers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ ONCE, NEVER = 0xFFFE, 0xFFFF
 
 @dataclass(slots=True)
 class Timer:
-    """Of one message."""
+    """Period of one message, in ms, and the time when the period began."""
 
     period_ms: int
     since_ms: int = 0
 
 
 class Timers:
-    """By number of message, in the order in which the board looks at them."""
+    """Timers by command number, in the order in which the board checks them."""
 
     def __init__(self) -> None:
         self._timers = {code: Timer(period) for code, period in PERIODS_MS.items()}
@@ -33,16 +33,16 @@ class Timers:
         return self._timers[code]
 
     def set(self, code: int, period_ms: int, clock_ms: int) -> None:
-        """Begin a new period."""
+        """Set the period of a message and begin it now."""
         self._timers[code] = Timer(period_ms, clock_ms)
 
     def restart(self, clock_ms: int) -> None:
-        """Begin every period anew."""
+        """Begin the periods of all messages again."""
         for timer in self._timers.values():
             timer.since_ms = clock_ms
 
     def take(self, code: int, clock_ms: int) -> bool:
-        """Whether this message is due now; it counts as sent."""
+        """Return whether this message is due; if so, regard it as sent."""
         timer = self._timers[code]
         if timer.period_ms == NEVER:
             return False

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The wheels' controllers and encoders as the board begins with them, and what changes them.
+"""Initial parameters of the wheels' controllers and encoders, and the commands that change them.
 
-Knows the commands that write one number each; not lines.
+Knows the commands that write one number each. Must not know lines.
 """
 
 from omnibot_driver.simulator.lois_ecu.channel import WheelChannel
@@ -16,7 +16,7 @@ GAIN_NAMES = {0x06: "kp", 0x07: "tn", 0x08: "td", 0x09: "kp", 0x0A: "tn", 0x0B: 
 
 
 def wheels_of(quirks: Quirks, steps: int) -> tuple[WheelChannel, ...]:
-    """Left and right, after a boot."""
+    """Return the left and the right wheel as they are after a boot."""
     low_pass = 0.0 if quirks.low_pass_starts_at_zero else 1.0
     return tuple(
         WheelChannel(
@@ -27,7 +27,10 @@ def wheels_of(quirks: Quirks, steps: int) -> tuple[WheelChannel, ...]:
 
 
 def adjust(wheels: tuple[WheelChannel, ...], command: int, number: float, quirks: Quirks) -> None:
-    """Write a gain, a correction, and what the public firmware has besides; else do nothing."""
+    """Set the gain or correction that ``command`` writes; ignore other commands.
+
+    Feed-forward and low pass (0x21 to 0x23) exist in the public firmware only.
+    """
     left, right = wheels
     if command in GAIN_NAMES:
         channel = left if command <= 0x08 else right

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's serial port: what it hears at 115200 baud, and what it sends with interrupts off.
+"""The board's serial port at 115200 baud: what it receives, and what it sends with interrupts off.
 
-Knows characters and steps of a millisecond, no lines.
+Knows characters and steps of a millisecond. Must not know lines.
 """
 
 from collections import deque
@@ -12,10 +12,10 @@ INPUT_DEPTH = 600
 
 
 class Uart:
-    """``loses``: what comes while interrupts are off is lost, but for the first character.
+    """The port; with ``loses``, all but the first byte that arrives with interrupts off are lost.
 
-    received: all that reached the port; lost_bytes: of those, what was not heard; input: what was,
-    and was not read yet.
+    received: all bytes sent to the port. lost_bytes: number of bytes that were lost.
+    input: characters received but not read yet.
     """
 
     def __init__(self, *, loses: bool) -> None:
@@ -27,7 +27,7 @@ class Uart:
         self.boot()
 
     def boot(self) -> None:
-        """Forget the buffers; what is on the line still arrives."""
+        """Clear the buffers; bytes still on the line arrive later."""
         self.input: deque[int] = deque()
         self._sending: deque[tuple[bytearray, bool]] = deque()
         self._out_credit = 0.0
@@ -36,29 +36,29 @@ class Uart:
 
     @property
     def sending(self) -> bool:
-        """Whether something is still to be sent."""
+        """Whether data remains to be sent."""
         return bool(self._sending)
 
     @property
     def deaf(self) -> bool:
-        """Whether it is sent with interrupts off."""
+        """Whether interrupts are off while the current data is sent."""
         return bool(self._sending) and self._sending[0][1]
 
     def receive(self, data: bytes) -> None:
-        """Let the bytes arrive one after the other from now on."""
+        """Put bytes on the line; they arrive one after the other from now on."""
         self.received += data
         self._inbound.extend(data)
 
     def say(self, data: bytes, *, deaf: bool) -> None:
-        """Queue these bytes behind those that wait."""
+        """Queue data to be sent; ``deaf``: with interrupts off."""
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:
-        """The processor serves something else for 0.2 ms of this step: a character is lost."""
+        """Lose a character in the next ``listen``: for 0.2 ms the processor serves an interrupt."""
         self._misses = True
 
     def listen(self) -> int:
-        """Run one step; returns how many characters were received."""
+        """Receive for one step; return the number of characters received."""
         came = heard = 0
         self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._inbound and self._in_credit >= 1.0:
@@ -78,7 +78,10 @@ class Uart:
         return heard
 
     def send(self, sent: bytearray) -> bool:
-        """Run one step; returns whether interrupts are on again, so that ``hear_kept`` follows."""
+        """Send for one step, appending to ``sent``.
+
+        Return whether interrupts are switched on again; the caller must then call ``hear_kept``.
+        """
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._sending and self._out_credit >= 1.0:
             burst, deaf = self._sending[0]
@@ -93,7 +96,7 @@ class Uart:
         return False
 
     def hear_kept(self) -> int:
-        """The character that the hardware has kept; how many were heard, 0 or 1."""
+        """Receive the character that the hardware kept; return the number received, 0 or 1."""
         if self._kept is None:
             return 0
         self._hear(self._kept)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot that a simulated LOIS ECU drives: two wheels on the ground, and where they bring it.
+"""The robot that a simulated LOIS ECU drives: two wheels on the ground, and the resulting motion.
 
-Knows duties and where the marks of the encoders are; must not know the board.
+Knows duties and the positions of the encoder marks. Must not know the board.
 """
 
 from dataclasses import dataclass
@@ -26,9 +26,9 @@ class TrueState:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A mark passed a sensor of wheel ``index`` (0 is left) at ``at_s``.
+    """An encoder edge of wheel ``index`` (0 left, 1 right) at ``at_s``.
 
-    ``is_long``: a long level ended; ``direction``: 1 forward.
+    is_long: whether a long level ended. direction: 1 forward, -1 backward.
     """
 
     at_s: float
@@ -38,8 +38,10 @@ class Edge:
 
 
 class Vehicle:
-    """``truth``: where it is. ``corrections``: short and long of each encoder, with which the board
-    makes their levels equal.
+    """The robot; ``truth`` is its true pose and motion.
+
+    ``corrections``: for each encoder, the factors of the short and the long level with which the
+    board makes the levels equal.
     """
 
     def __init__(
@@ -65,11 +67,11 @@ class Vehicle:
 
     @property
     def standing(self) -> bool:
-        """Whether both wheels truly stand."""
+        """Whether both wheels are truly at rest."""
         return all(motor.rpm == 0.0 for motor in self.motors)
 
     def advance(self, duties: tuple[float, float], now_s: float, step_s: float) -> list[Edge]:
-        """Let the step that ends now pass; the edges in it, in their order."""
+        """Advance by the step that ends at ``now_s``; return its encoder edges in order of time."""
         settings, state = self._settings, self.truth
         ways: list[float] = []
         edges: list[Edge] = []

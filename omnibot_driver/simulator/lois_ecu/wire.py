@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Characters of the protocol as the board writes and reads them; from the manual, its own codec.
+"""The protocol as the board encodes and decodes it, written from the manual alone.
 
-A line is ``:``, two digits of command, eight of payload, two of checksum (XOR of all before) and a
-line feed. Knows no meaning of a command.
+A line is ``:``, two hexadecimal digits of command, eight of payload, two of checksum (XOR of all
+characters before it) and a line feed. Shares no code with the driver. Must not know what a command
+means.
 """
 
 import re
@@ -30,12 +31,12 @@ def line(command: int, payload: int) -> bytes:
 
 
 def words(command: int, high: int, low: int) -> bytes:
-    """Encode one line of two words."""
+    """Encode one line whose payload is two 16-bit words."""
     return line(command, (high & 0xFFFF) * 0x10000 + (low & 0xFFFF))
 
 
 def bits_of(number: float) -> int:
-    """The bits of a float32; what is too large is infinite."""
+    """Return the bits of a float32; a number that is too large becomes infinity."""
     try:
         return int.from_bytes(struct.pack(">f", number), "big")
     except OverflowError:
@@ -43,22 +44,22 @@ def bits_of(number: float) -> int:
 
 
 def number_of(bits: int) -> float:
-    """The float32 of these bits."""
+    """Return the float32 that has these bits."""
     (number,) = struct.unpack(">f", bits.to_bytes(4, "big"))
     return float(number)
 
 
 def sequence(command: int, payloads: list[int]) -> bytes:
-    """A line of ones, then these."""
+    """Encode a line whose payload is 0xFFFFFFFF, then a line for each payload."""
     return b"".join(line(command, payload) for payload in (0xFFFFFFFF, *payloads))
 
 
 class LineReader:
-    """What the board understands, character by character.
+    """Decoder of the lines that the board receives, character by character.
 
-    ``checks``: whether lines have a checksum. ``lenient``: fields are read as C's strtol does, with
-    space, sign and prefix, up to the first character that is not a digit, instead of making the
-    line wrong.
+    ``checks``: whether lines have a checksum. ``lenient``: fields are read like C's strtol, which
+    accepts space, sign and prefix and stops at the first character that is not a digit. Otherwise
+    such a field invalidates the line.
     """
 
     def __init__(self, *, lenient: bool) -> None:
@@ -67,7 +68,7 @@ class LineReader:
         self._buffer: list[str] = []
 
     def take(self, character: int) -> tuple[int, int] | None:
-        """Command and payload of the line that this character completes."""
+        """Process a character; return command and payload of the line it completes, or None."""
         letter = chr(character)
         length = LINE_CHARACTERS if self.checks else LINE_CHARACTERS - 2
         if letter == ":" or len(self._buffer) >= length:
@@ -86,7 +87,7 @@ class LineReader:
         return command, high * 0x10000 + low
 
     def take_all(self, data: bytes) -> Iterator[tuple[int, int]]:
-        """Read many characters."""
+        """Process many characters; yield command and payload of each complete line."""
         for character in data:
             found = self.take(character)
             if found is not None:

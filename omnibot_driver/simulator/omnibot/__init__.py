@@ -2,8 +2,9 @@
 
 """The OmniBot board in software, written from its manual, to run the driver against.
 
-Shares no code with the driver: a misread manual must not cancel out. `SimulatedBoard` is pure,
-`PtyBoard` runs it in real time; `python -m omnibot_driver.simulator` does so from the command line.
+Shares no code with the driver, so that a misread manual does not cancel out. ``SimulatedBoard``
+is pure; ``PtyBoard`` runs it in real time, and ``python -m omnibot_driver.simulator`` does so from
+the command line.
 """
 
 from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The manual's geometry of three omni wheels (Control equation, Odometry equation).
+"""Kinematics of the three omni wheels (manual, Control equation and Odometry equation).
 
 Knows the pure kinematics, without the gains of the firmware's command path, and how a displacement
-moves a pose. Must not know counts, time or which pose it moves.
+changes a pose. Must not know encoder counts, time, or whose pose it is.
 """
 
 from math import cos, pi, sin
@@ -24,7 +24,10 @@ class PlanarPose(NamedTuple):
     yaw_rad: float
 
     def moved(self, dx_body_m: float, dy_body_m: float, dyaw_rad: float) -> "PlanarPose":
-        """Apply a body displacement at the mean heading of the step (manual, Odometry equation)."""
+        """Return the pose after a displacement in the body frame, in m and rad.
+
+        The displacement is rotated by the mean heading of the step (manual, Odometry equation).
+        """
         heading_rad = self.yaw_rad + dyaw_rad / 2
         c, s = cos(heading_rad), sin(heading_rad)
         return PlanarPose(
@@ -35,7 +38,10 @@ class PlanarPose(NamedTuple):
 
 
 def rims_from_body(vx: float, vy: float, yaw_rate: float, base_radius_m: float) -> Wheels:
-    """Rim speeds (or distances) of wheels A, B, C in m/s (m) from a body twist (displacement)."""
+    """Return the rim speeds (or distances) of wheels A, B, C for a body twist (or displacement).
+
+    Linear values are in m/s (or m), ``yaw_rate`` is in rad/s (or rad).
+    """
     turning = base_radius_m * yaw_rate
     return (
         -_COS30 * vx - _SIN30 * vy - turning,
@@ -45,7 +51,10 @@ def rims_from_body(vx: float, vy: float, yaw_rate: float, base_radius_m: float) 
 
 
 def body_from_rims(rims: Wheels, base_radius_m: float) -> tuple[float, float, float]:
-    """Body twist (or displacement) from rim speeds (distances): the manual's odometry matrix."""
+    """Return the body twist (or displacement) for rim speeds (or distances): the odometry matrix.
+
+    Linear values are in m/s (or m), the last one is in rad/s (or rad).
+    """
     a, b, c = rims
     return (
         (b - a) / (2 * _COS30),

@@ -1,20 +1,21 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's firmware: modes, the 100 Hz control loop, and what is sent when.
+"""The board's firmware: its modes, the 100 Hz control loop, and when each frame is sent.
 
 Pure: bytes in, one tick at a time, bytes out; the same settings and input give the same output.
 Knows the manual's state machine and control equations. Must not know ports or real time.
 
-Where the manual is silent:
-- The control loop runs from the end of the boot on, also while paused (motors off), so motion while
-  paused is in the first 25 Hz difference afterwards. The rates count from the end of the boot.
-- Its mode list has 10 Hz where its frame table has 25 Hz: the settings say how often differences
+Assumptions where the manual says nothing, or contradicts itself:
+- The control loop runs from the end of the boot, also while paused (motors off), so the first
+  25 Hz difference after a pause includes motion during the pause. The output periods are counted
+  from the end of the boot.
+- The list of modes has 10 Hz where the frame table has 25 Hz: a setting says how often differences
   are sent.
 - Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
 - The number in the paused text starts from zero each time the board becomes paused.
-- With the switch on positional control (see `position`) the wheels' targets follow the goal.
-- Control frames with a mode that the manual does not name are taken off the line and ignored.
-- How commands are found among the bytes is a choice of several (see `receivers`).
+- With the switch on positional control (see ``position``) the wheels' targets follow the goal.
+- A control frame whose mode the manual does not name is consumed and ignored.
+- A setting selects how commands are found among the bytes (see ``receivers``).
 """
 
 from collections import deque
@@ -60,7 +61,7 @@ _IDEAL = BoardSettings()
 
 
 class BoardMode(Enum):
-    """The states of the manual's Operation State Machine, and the time before them."""
+    """The states of the manual's Operation State Machine, and the boot before them."""
 
     BOOTING = "booting"
     PAUSED = "paused"
@@ -86,7 +87,7 @@ _LETTER_KINDS: dict[StateLetter, CommandKind] = {
 
 @dataclass(frozen=True, slots=True)
 class ReceivedCommand:
-    """A command that the board obeyed after `tick` ticks; the values of a letter are zeros."""
+    """A command that the board obeyed after ``tick`` ticks; a state letter has zeros as values."""
 
     tick: int
     kind: CommandKind
@@ -95,7 +96,7 @@ class ReceivedCommand:
 
 @dataclass(frozen=True, slots=True)
 class SentFrame:
-    """A frame or text that the board sent in tick number `tick`."""
+    """A frame or text that the board sent in tick number ``tick``."""
 
     tick: int
     data: bytes
@@ -104,12 +105,13 @@ class SentFrame:
 class SimulatedBoard:
     """An OmniBot board with its robot.
 
-    tick: control ticks of 10 ms since construction.
-    mode, estopped: what the board is in.
-    commands: what it obeyed, newest last; motion refused by a latched emergency stop is not there.
-    sent: the frames and texts it sent, newest last.
-    received: everything that reached its serial port, also while it was dead; the older half is
-        forgotten beyond a million bytes.
+    tick: number of control ticks of 10 ms since construction.
+    mode: current mode. estopped: whether an emergency stop is in effect.
+    commands: commands that it obeyed, newest last; motion that a latched emergency stop refused
+        is not included.
+    sent: frames and texts that it sent, newest last.
+    received: all bytes that reached its serial port, also while it booted; beyond a million bytes
+        the older half is discarded.
     """
 
     channels = CHANNELS
@@ -134,7 +136,7 @@ class SimulatedBoard:
             self._run()
 
     def reboot(self) -> None:
-        """Do what a power cycle or R does; the robot stays where it truly is."""
+        """Restart the board as a power cycle or R does; the robot keeps its true pose."""
         self._power_up(BoardPose())
 
     def _power_up(self, pose: BoardPose) -> None:
@@ -151,43 +153,46 @@ class SimulatedBoard:
 
     @property
     def truth(self) -> TruePose:
-        """The true pose and motion of the robot."""
+        """True pose and twist of the robot."""
         return self._world.truth
 
     @property
     def rim_speeds_mps(self) -> Wheels:
-        """True momentary rim speeds of wheels A, B, C."""
+        """True rim speeds of wheels A, B, C, in m/s."""
         return self._world.rim_speeds_mps
 
     @property
     def odometry(self) -> BoardPose:
-        """The board's own pose, in the units of the 5 Hz frame."""
+        """The board's own pose, in mm and mrad as in the 5 Hz frame."""
         return BoardPose(*(1000 * value for value in self._odometry.pose))
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Be held by hand: tilted by this angle, and turned to the left at this rate."""
+        """Hold the robot by hand: tilt it by these angles (rad), turn it left at this rate (rad/s).
+
+        Only the IMU senses it; the true pose does not change.
+        """
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
     def push(self, x_pwm: float = 0.0, y_pwm: float = 0.0, turning_pwm: float = 0.0) -> None:
-        """Be pushed from now on, against the motors, along its own axes (see `world.Force`)."""
+        """Push the robot from now on, along its own axes (see ``world.Force``)."""
         self._world.force = Force(x_pwm, y_pwm, turning_pwm)
 
     def grip(self, vx_mps: float = 0.0, vy_mps: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Be moved by somebody stronger than the motors: held in place, or with this twist."""
+        """Move the robot with this twist, or hold it in place, whatever its motors do."""
         self._world.gripped = Twist(vx_mps, vy_mps, yaw_rate)
 
     def let_go(self) -> None:
-        """Release the robot that was held."""
+        """Release the robot from ``grip``."""
         self._world.gripped = None
 
     @property
     def driven(self) -> bool:
-        """Whether the motors turn by the last command."""
+        """Whether the last command makes the motors turn."""
         return self._goal is not None or self._targets != _ALL_ZERO
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """The facts that the simulator's console prints."""
+        """Facts that the simulator's console prints."""
         return {
             **asdict(self.truth),
             "mode": self.mode.value,
@@ -197,12 +202,12 @@ class SimulatedBoard:
         }
 
     def receive(self, data: bytes, at_s: float | None = None, channel: int = 0) -> None:
-        """Take bytes off the line, in any chunking; each command acts at once.
+        """Receive bytes, in chunks of any size; each command takes effect at once.
 
-        at_s: when the first of them arrived, in seconds by any steady clock; the last tick by
-            default. The others follow without a pause. Only a receiver that looks for idle gaps
-            cares.
-        channel: there is one.
+        at_s: arrival time of the first byte, in s by any monotonic clock (default: the time of the
+            last tick). The other bytes follow without a pause. Only a receiver that detects idle
+            gaps uses it.
+        channel: ignored, because the board has only one.
         """
         self.received += data
         if len(self.received) > RECEIVED_LOG_BYTES:
@@ -221,7 +226,7 @@ class SimulatedBoard:
             arrives_s += BYTE_S
 
     def step(self) -> bytes:
-        """Let one tick of 10 ms pass; return the bytes sent in it."""
+        """Advance by one tick of 10 ms; return the bytes sent in it."""
         self.tick += 1
         self._world.advance(self._pwm)
         if self.mode is BoardMode.BOOTING:
@@ -238,7 +243,7 @@ class SimulatedBoard:
         return b"".join(sent)
 
     def advance(self) -> list[Packet]:
-        """Like `step`, as a packet; None if nothing is sent."""
+        """Advance by one tick; return the bytes sent as one packet, or an empty list."""
         data = self.step()
         return [(0, data)] if data else []
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MPU6050 as it is mounted, by default upside down; +-2 g and +-250 degrees per second.
+"""The MPU6050 as it is mounted, by default upside down; ranges ±2 g and ±250 °/s.
 
-Knows the sensor's scales, axes, bias and noise. Must not know the wire. The lever arm between the
-sensor and the body's origin is ignored (at 0.5 rad/s it would add less than 0.01 m/s²).
+Knows the sensor's scales, axes, bias and noise. Must not know the frame layout. The lever arm
+between the sensor and the body's origin is ignored (at 0.5 rad/s it would add less than 0.01 m/s²).
 """
 
 from math import cos, degrees, sin, sqrt
@@ -24,7 +24,7 @@ def _counts(value: float) -> int:
 
 
 class Mpu6050:
-    """Converts true motion to raw counts."""
+    """The IMU: converts true motion to raw counts."""
 
     def __init__(self, settings: BoardSettings) -> None:
         self._settings = settings
@@ -34,7 +34,7 @@ class Mpu6050:
         self._bias_dps = settings.gyro_bias_dps
 
     def read(self, world: World) -> tuple[Triple, Triple]:
-        """Sample the accelerometer and the gyro, in raw counts along the sensor's axes."""
+        """Return accelerometer and gyro readings, in raw counts along the sensor's axes."""
         gauss, settings, held = self._random.gauss, self._settings, world.held
         ax_mps2, ay_mps2 = world.acceleration
         level = cos(held.pitch_rad)
@@ -56,7 +56,7 @@ class Mpu6050:
         return (ax, ay, az), settings.gyro_stuck or (gx, gy, gz)
 
     def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """A vector in the body's axes, along the sensor's."""
+        """Rotate a vector from the body's axes to the sensor's."""
         along_x, along_y, along_z = (
             axis[0] * x + axis[1] * y + axis[2] * z for axis in self._sensor_axes
         )
@@ -69,7 +69,7 @@ class Mpu6050:
 
 
 def _axes(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
-    """The sensor's three axes in the body's, after fixed-axis roll, pitch and yaw."""
+    """Return the sensor's axes in body coordinates, after fixed-axis roll, pitch and yaw in rad."""
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
     return (
         (cy * cp, sy * cp, -sp),

@@ -2,12 +2,12 @@
 
 """One wheel: a motor with its encoder, and the firmware's speed controller for it.
 
-Knows the 100 Hz tick and the controller gains of the manual. All speeds are encoder counts per
-tick, all efforts PWM steps. Must not know commands, geometry or the wire.
+Knows the 100 Hz tick and the controller gains of the manual. All speeds are in encoder counts per
+tick, all efforts in PWM steps. Must not know commands, geometry or the wire.
 
-The manual says nothing about the motor. The model is of first order with dry friction and a dead
-zone, driven by a 12-bit PWM; by default a steady speed needs 46 PWM steps per count per tick, so
-that the manual's feed-forward of 40 carries seven eighths of the load and the integrator the rest.
+The manual does not describe the motor. The model is first order with dry friction and a dead
+zone, driven by a 12-bit PWM. By default a steady speed needs 46 PWM steps per count per tick, so
+the manual's feed-forward of 40 supplies seven eighths of the effort and the integrator the rest.
 """
 
 from collections import deque
@@ -18,17 +18,19 @@ TICK_S = 0.01
 
 PWM_LIMIT = 4095.0
 DEAD_ZONE_PWM = 60.0
-"""Effort that sets a resting wheel in motion."""
+"""Largest effort that leaves a wheel at rest, in PWM steps."""
 STICKING_SPEED = 0.3
-"""A wheel slower than this is held by the dead zone like a resting one, so it never creeps."""
+"""Speed below which the dead zone stops a wheel, so that it never creeps, in counts per tick."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorConstants:
-    """What one motor is like.
+    """Properties of one motor.
 
-    friction_pwm: effort that dry friction eats while the wheel turns.
-    delay_ticks: ticks between an effort and what it does.
+    pwm_per_count: effort per speed, in PWM steps per count per tick.
+    time_constant_ticks: time constant of the speed, in ticks.
+    friction_pwm: effort lost to dry friction while the wheel turns.
+    delay_ticks: delay from an effort to its effect, in ticks.
     """
 
     pwm_per_count: float = 46.0
@@ -51,7 +53,7 @@ MANUAL = WheelGains()
 
 
 class Motor:
-    """A gear motor with its quadrature encoder, moved one tick at a time."""
+    """A gear motor with its quadrature encoder, advanced one tick at a time."""
 
     def __init__(self, constants: MotorConstants = USUAL) -> None:
         self._constants = constants
@@ -59,17 +61,17 @@ class Motor:
         self._on_the_way = deque([0.0] * constants.delay_ticks)
         self.speed = 0.0
         self.position = 0.5
-        """Counts turned so far with their fraction, from the middle of an encoder step."""
+        """Counts turned so far, with fraction; starts in the middle of an encoder step."""
 
     @property
     def encoder(self) -> int:
-        """The whole counts that the firmware can read."""
+        """Encoder count that the firmware reads, an integer."""
         return floor(self.position)
 
     def advance(self, pwm: float, load_pwm: float = 0.0) -> float:
         """Turn for one tick under a constant effort; return the counts turned, with fraction.
 
-        ``load_pwm`` is what the floor adds to the effort, at once.
+        ``load_pwm`` is added to the effort, without the motor's delay.
         """
         constants, start = self._constants, self.speed
         self._on_the_way.append(pwm)
@@ -81,7 +83,7 @@ class Motor:
         settled = (pwm - copysign(constants.friction_pwm, direction)) / constants.pwm_per_count
         end = settled + (start - settled) * self._decay
         ticks = 1.0
-        if end * direction < 0:  # friction brings it to rest within this tick
+        if end * direction < 0:  # friction stops it within this tick
             ticks = constants.time_constant_ticks * log(1 - start / settled)
             end = 0.0
         turned = settled * ticks + constants.time_constant_ticks * (start - end)
@@ -90,7 +92,7 @@ class Motor:
         return turned
 
     def turn(self, counts: float, pwm: float) -> None:
-        """Be turned from outside for one tick, whatever the effort."""
+        """Turn by ``counts`` in one tick, moved from outside, whatever the effort."""
         self._on_the_way.append(pwm)
         self._on_the_way.popleft()
         self.speed = counts
@@ -98,11 +100,11 @@ class Motor:
 
 
 class WheelController:
-    """The PI loop of the manual (Wheel control), its feed-forward outside the accumulator.
+    """The manual's PI loop (Wheel control), with its feed-forward outside the accumulator.
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    While u is saturated, the integral term rests if it would drive u further.
+    While u is saturated, the integral term is not added if it would drive u further.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the firmware makes of its encoders (manual, Odometry equation).
+"""The firmware's odometry from its encoders (manual, Odometry equation).
 
-Knows counts, the geometry as the firmware believes it, and the words of the 25 Hz frame. Must not
-know modes, time, or where the robot truly is.
+Knows encoder counts, the geometry assumed by the firmware, and the units of the 25 Hz frame. Must
+not know modes, time, or the true pose of the robot.
 
-A 25 Hz difference is that of the unrounded positions at two transmissions, rounded each time by
-itself: rounding errors add up, as they do for anybody who sums what a board of this kind sends.
+A 25 Hz difference is computed from unrounded values and then rounded, each one independently of the
+others. Rounding errors therefore accumulate in a host that sums the differences.
 """
 
 from omnibot_driver.simulator.omnibot.chassis import PlanarPose, body_from_rims
@@ -15,7 +15,7 @@ from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 class Odometry:
-    """The board's own pose in its earth frame, and what has not been sent of it."""
+    """The board's own pose in its earth frame, and the part of it that is not sent yet."""
 
     _body_unsent: tuple[float, float, float]
     _counts_unsent: Triple
@@ -26,7 +26,7 @@ class Odometry:
         self._begin_difference()
 
     def integrate(self, counts: Triple) -> None:
-        """Take what the encoders of wheels A, B, C counted in one control tick."""
+        """Add what the encoders of wheels A, B, C counted in one control tick."""
         settings = self._settings
         a_m, b_m, c_m = (n * settings.rim_m_per_count for n in counts)
         moved = body_from_rims((a_m, b_m, c_m), settings.base_radius_m)
@@ -38,7 +38,7 @@ class Odometry:
         self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
 
     def difference(self) -> Triple:
-        """The words of the 25 Hz frame; the next ones are counted from here."""
+        """Return the values of the 25 Hz frame, and begin the next difference."""
         words = self._counts_unsent
         if self._settings.frame == "body":
             words = _tenths(self._body_unsent)
@@ -56,6 +56,6 @@ class Odometry:
 
 
 def _tenths(moved: tuple[float, float, float]) -> Triple:
-    """Tenths of a millimetre and of a milliradian, as far as a word goes."""
+    """Convert m and rad to 0.1 mm and 0.1 mrad, limited to int16."""
     x, y, yaw = (max(-32768, min(32767, round(value * 10_000))) for value in moved)
     return x, y, yaw

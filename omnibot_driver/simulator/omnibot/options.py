@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user may choose about a simulated OmniBot, besides its seed and the faults of its line.
+"""Options of a simulated OmniBot, except its seed and the faults of its line.
 
-Knows words and their meaning. Must not know what runs the board.
+Knows the names, values and effects of options. Must not know what runs the board.
 """
 
 import argparse
@@ -69,7 +69,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def from_arguments(arguments: argparse.Namespace) -> SimulatedBoard:
-    """The board that was chosen."""
+    """Return the board that the parsed options describe."""
     return SimulatedBoard(
         BoardSettings(
             seed=arguments.seed,

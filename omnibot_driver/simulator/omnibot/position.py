@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Positional control, of which the manual says no more than that the switch selects it.
+"""Positional control, of which the manual says only that the switch selects it.
 
-Knows the units of a commanded pose and how fast the robot drives to one. Must not know wheels.
+Knows the units of a commanded pose and how fast the robot drives to it. Must not know wheels.
 """
 
 from math import cos, hypot, sin
@@ -12,15 +12,15 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 from omnibot_driver.simulator.omnibot.wire import Triple
 
 SPEED_PER_WAY = 2.0
-"""In 1/s: speed towards the pose per distance from it, up to the fastest."""
+"""Speed per distance from the pose, in 1/s, up to the limits below."""
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3
-"""Metres and radians."""
+"""Tolerance of the goal, in m and in rad."""
 
 
 def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
-    """The pose in the board's earth frame that the words of a control frame mean."""
+    """Return the pose in the board's earth frame that a control frame commands."""
     x, y, theta = values
     return PlanarPose(
         x / settings.position_scale, y / settings.position_scale, theta / settings.heading_scale
@@ -28,9 +28,10 @@ def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
 
 
 def approach(pose: PlanarPose, goal: PlanarPose) -> tuple[float, float, float]:
-    """Velocity along the body's x and y and yaw rate, straight to the goal and turning with it.
+    """Return the twist straight to the goal: body x and y in m/s, yaw rate in rad/s.
 
-    The heading is unwrapped: a goal that is a turn further is a turn further.
+    The robot turns while it drives. The heading is unwrapped: to a goal that is a full turn away,
+    the robot makes that turn.
     """
     dx_m, dy_m = goal.x_m - pose.x_m, goal.y_m - pose.y_m
     way_m, turn_rad = hypot(dx_m, dy_m), goal.yaw_rad - pose.yaw_rad

@@ -2,17 +2,17 @@
 
 """The firmware's receiver: bytes in, the commands that they complete out.
 
-The manual shows what a command looks like, not how the firmware finds it among the bytes. So there
-are several receivers, and a driver has to be safe with each. Knows control frames, letters and the
-time of a byte. Must not know modes or motion.
+The manual shows the layout of a command, but not how the firmware finds it among the bytes.
+Therefore several receivers exist, and a driver has to be safe with each. Knows control frames,
+letters and the time of a byte. Must not know modes or motion.
 
-- A `Framing` is a pure function: what is held so far, one byte, and the pause before it go in; what
-  is held now comes out, with the control frame that the byte completes, and whether the byte may
-  belong to a frame.
-- Letters count between control frames only, or anywhere: then each byte that is a letter acts, and
-  the frame around it goes on.
-- After power-up the receiver takes three arbitrary bytes for its wake-up. Bytes that arrive while
-  the board still boots are lost, or count for it as well.
+- A ``Framing`` is a pure function. Its arguments are the bytes held so far, a new byte, and the
+  pause before it in s. It returns the bytes held now, the control frame that the byte completes
+  (or None), and whether the byte may belong to a frame.
+- State letters act between control frames only, or anywhere. If anywhere, each byte that is a
+  letter acts, and the frame around it continues.
+- After power-up the receiver discards three arbitrary bytes as its wake-up. Bytes that arrive while
+  the board still boots are lost, or are among these three.
 """
 
 from collections.abc import Callable
@@ -29,9 +29,9 @@ from omnibot_driver.simulator.omnibot.wire import (
 )
 
 WAKE_UP_BYTES: Final = 3
-"""Serial Command: "Serial initialization: 3 arbitrary byte"."""
+"""Manual, Serial Command: "Serial initialization: 3 arbitrary byte"."""
 IDLE_GAP_S: Final = 0.005
-"""The pause after which the receiver `idle_gap` gives up half a frame."""
+"""Pause after which the receiver ``idle_gap`` discards an incomplete frame, in s."""
 
 FramingName = Literal["counting", "naive", "idle_gap", "window"]
 LetterPlace = Literal["between", "anywhere"]
@@ -44,7 +44,7 @@ _NOTHING: Final[Step] = (b"", None, False)
 
 
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
-    """A receiver that counts seven more bytes after FF FE, for ever; FF FF FE is a header."""
+    """Find frames by counting seven bytes after FF FE, without a timeout; FF FF FE has a header."""
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""
     if not held and byte != _FIRST:
@@ -53,22 +53,22 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """A receiver like `counting` that drops the byte after FF unless it is FE."""
+    """Find frames like ``counting``, but discard the byte after FF unless it is FE."""
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
     return counting(held, byte, pause_s)
 
 
 def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
-    """A receiver like `counting` in which a pause ends an incomplete frame."""
+    """Find frames like ``counting``, but discard an incomplete frame after a pause."""
     return counting(b"" if pause_s >= IDLE_GAP_S else held, byte, pause_s)
 
 
 def window(held: bytes, byte: int, pause_s: float) -> Step:
-    """It looks at the last nine bytes after each, and acts when they begin with FF FE.
+    """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
-    It forgets nothing, so an FF FE within a frame may begin another one. Any byte that stands less
-    than nine bytes after an FF FE may belong to a frame.
+    Bytes of an accepted frame are searched again, so an FF FE within a frame may begin another
+    one. A byte may belong to a frame if an FF FE is among the last nine bytes.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
@@ -88,11 +88,11 @@ FRAMINGS: Final[dict[FramingName, Framing]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReceiverKind:
-    """Which firmware it is.
+    """Selects the behaviour of the receiver.
 
     framing: how control frames are found.
-    letters: where a byte that is a letter acts: between control frames, or anywhere.
-    wakes_while_booting: bytes that arrive during the boot count for the wake-up.
+    letters: where a byte that is a state letter acts: between control frames, or anywhere.
+    wakes_while_booting: whether bytes that arrive during the boot are part of the wake-up.
     """
 
     framing: FramingName = "counting"
@@ -104,11 +104,11 @@ COUNTING: Final = ReceiverKind()
 
 
 class CommandReceiver:
-    """The receiver of one power-up.
+    """The receiver from one power-up to the next.
 
-    held, last_at_s: what it keeps of the bytes so far, and when the last one came: all that its
-        framing knows.
-    to_swallow: how many bytes are missing for the wake-up.
+    held, last_at_s: the bytes kept for the framing, and the arrival time of the last byte; the
+        framing has no other state.
+    to_swallow: number of wake-up bytes still expected.
     """
 
     def __init__(self, kind: ReceiverKind = COUNTING, *, awake: bool = False) -> None:
@@ -120,15 +120,15 @@ class CommandReceiver:
         self.last_at_s = 0.0
 
     def boot(self) -> None:
-        """Count a byte that arrives while the board boots."""
+        """Process a byte that arrives while the board boots."""
         if self._wakes_while_booting and self.to_swallow:
             self.to_swallow -= 1
 
     def feed(self, byte: int, at_s: float, *, control_frames: bool) -> tuple[Command, ...]:
-        """Take the byte that arrives at `at_s`; return the commands that it completes, in order.
+        """Process the byte that arrives at ``at_s``; return the commands it completes, in order.
 
-        A control frame is recognised only where the caller says so; elsewhere each byte of one is
-        looked at for a state letter.
+        Without ``control_frames``, control frames are not recognised, and each of their bytes may
+        act as a state letter.
         """
         if self.to_swallow:
             self.to_swallow -= 1

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What can be chosen about a simulated board and its robot: values only, no behaviour."""
+"""Settings of a simulated board and its robot: values only, no behaviour."""
 
 from dataclasses import dataclass
 from math import pi
@@ -25,18 +25,17 @@ class BoardPose:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardSettings:
-    """How a simulated board is built, and how its robot departs from the ideal.
+    """How a simulated board is built, and how its robot deviates from the ideal.
 
     seed: of every random number; two boards with equal settings and input send equal bytes.
-    frame: meaning of the 25 Hz frame: "earth", the difference of two positions in the board's
-        earth frame, "body", the sum of each control tick's displacement in the robot's frame, or
-        "wheel_counts", the encoder counts of wheels A, B, C (manual, Deprecated).
-    delta_period_s: from one 25 Hz frame to the next, in whole ticks of 10 ms; the manual has 10 Hz
-        as well.
-    imu_only: running, the board is in IMU only mode instead of nominal mode.
+    frame: meaning of the 25 Hz frame. "earth": the difference of two positions in the board's
+        earth frame. "body": the sum of each control tick's displacement in the robot's frame.
+        "wheel_counts": the encoder counts of wheels A, B, C (manual, Deprecated).
+    delta_period_s: period of the 25 Hz frame, in whole ticks of 10 ms; the manual also has 10 Hz.
+    imu_only: the board runs in IMU only mode instead of nominal mode.
     linear_scale: LSB per m/s, of Vx and Vy and of the rim speeds in wheel mode.
     angular_scale: LSB per rad/s, of Omega.
-    control: where the on-board switch stands: whether base vector control commands a velocity, or a
+    control: position of the on-board switch: base vector control commands a velocity, or a
         pose in the board's own earth frame to drive to.
     position_scale: LSB per m, of X and Y.
     heading_scale: LSB per rad, of theta, which is unwrapped as in the 5 Hz frame.
@@ -44,27 +43,29 @@ class BoardSettings:
     obeys_estop: an emergency stop frame stops the robot; otherwise it is ignored.
     estop_latches: after an emergency stop frame every motion is refused until a reset;
         otherwise the next motion command moves the robot again.
-    pose_byte_order: of the three floats of the 5 Hz frame.
-    axis_signs: of the board's x, y and yaw against the robot's: forward, left, counter-clockwise.
-    wheel_gains: of the firmware's three speed controllers.
-    motors: of wheels A, B, C.
-    motor_wiring: the motor that each controller drives, 1 to 3 for wheels A to C; negative
-        where its two poles are swapped. The encoders stay where they are.
-    wheel_radius_m, base_radius_m, counts_per_revolution: as the firmware believes them
+    pose_byte_order: byte order of the three floats of the 5 Hz frame.
+    axis_signs: signs of the board's x, y and yaw relative to the robot's (forward, left,
+        counter-clockwise).
+    wheel_gains: gains of the firmware's three speed controllers.
+    motors: properties of the motors of wheels A, B, C.
+    motor_wiring: for each controller, the motor that it drives, 1 to 3 for wheels A to C;
+        negative if the two poles of the motor are swapped. The encoders are not affected.
+    wheel_radius_m, base_radius_m, counts_per_revolution: values that the firmware assumes
         (manual, Vehicle Parameters).
-    wheel_radius_scale: true radius of wheels A, B, C over `wheel_radius_m`.
-    base_radius_scale: true distance of the wheels from the centre over `base_radius_m`.
+    wheel_radius_scale: true radius of wheels A, B, C divided by ``wheel_radius_m``.
+    base_radius_scale: true distance of the wheels from the centre divided by ``base_radius_m``.
     slip: mean fraction of each wheel's rim motion that is lost on the floor; the momentary fraction
-        wanders about it for each wheel by itself.
-    slope_pwm: how hard the floor's slope pulls the robot along the x axis of its first pose, as an
-        effort at the rim.
-    imu_rpy_rad: how the IMU is mounted: the fixed-axis roll, pitch and yaw that turn the body's
+        varies around it, independently for each wheel.
+    slope_pwm: pull of the floor's slope along the x axis of the robot's first pose, as an
+        effort at the rim, in PWM steps.
+    imu_rpy_rad: mounting of the IMU: the fixed-axis roll, pitch and yaw that turn the body's
         axes into the sensor's, as in a URDF.
-    gyro_bias_dps, gyro_noise_dps: degrees per second in the sensor's axes; noise rms per reading.
-    gyro_walk_dps: how far the bias wanders in a second, rms; with the root of time.
-    accel_bias_g, accel_noise_g: in the sensor's axes; noise rms per reading.
-    gyro_stuck: raw counts that the gyro reads for ever, whatever the motion.
-    boot_time_s: from power-up or reset until the board is paused; dead meanwhile.
+    gyro_bias_dps, gyro_noise_dps: in the sensor's axes, in °/s; the noise is rms per reading.
+    gyro_walk_dps: rms change of the gyro bias within 1 s, in °/s; grows with the square root of
+        time.
+    accel_bias_g, accel_noise_g: in the sensor's axes, in g; the noise is rms per reading.
+    gyro_stuck: raw counts that the gyro always reads, whatever the motion.
+    boot_time_s: time from power-up or reset until the board is paused; it is dead meanwhile.
     initial_pose: the board's own pose at construction, for a board that has already driven.
     running: at construction the board is awake and in its running mode.
     """
@@ -106,5 +107,5 @@ class BoardSettings:
 
     @property
     def rim_m_per_count(self) -> float:
-        """Distance per encoder count, as the firmware believes (manual: 2πr/N)."""
+        """Rim distance per encoder count that the firmware assumes, in m (manual: 2πr/N)."""
         return 2 * pi * self.wheel_radius_m / self.counts_per_revolution

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The wheels' set-points (manual, Control equation), in encoder counts per control tick.
+"""Set points of the wheels (manual, Control equation), in encoder counts per control tick.
 
-Knows scales, signs and the kinematics. Must not know modes, nor when a wheel receives one.
+Knows scales, signs and the kinematics. Must not know modes, nor when a set point takes effect.
 """
 
 from omnibot_driver.simulator.omnibot.chassis import Wheels, rims_from_body
@@ -12,20 +12,20 @@ from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 def from_wheel_words(values: Triple, settings: BoardSettings) -> Wheels:
-    """The words of a control frame of mode 2: v_A, v_B, v_C."""
+    """Return the set points for v_A, v_B, v_C of a control frame of mode 2."""
     a, b, c = (value / settings.linear_scale for value in values)
     return _counts_per_tick((a, b, c), settings)
 
 
 def from_velocity_words(values: Triple, settings: BoardSettings) -> Wheels:
-    """The words of a control frame of mode 1, with the switch on velocity: Vx, Vy, Omega."""
+    """Return the set points for Vx, Vy, Omega of a mode 1 frame, with the switch on velocity."""
     x, y, omega = values
     linear, angular = settings.linear_scale, settings.angular_scale
     return from_twist((x / linear, y / linear, omega / angular), settings)
 
 
 def from_twist(twist: tuple[float, float, float], settings: BoardSettings) -> Wheels:
-    """Velocities in m/s and rad/s along the axes that the board believes in."""
+    """Return the set points for velocities in m/s and rad/s, ``settings.axis_signs`` applied."""
     x, y, yaw = (sign * speed for sign, speed in zip(settings.axis_signs, twist, strict=True))
     return _counts_per_tick(rims_from_body(x, y, yaw, settings.base_radius_m), settings)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The wire as the board sees it: the layouts of what it sends and of what it understands.
+"""The serial protocol from the board's side: layouts of the frames it sends and receives.
 
 Knows the byte layouts of the manual (sections Serial Command and Serial Data Output), written from
 the manual alone. Must not know modes or motion, nor how a command is found among the bytes, and
@@ -13,7 +13,7 @@ from enum import IntEnum
 from typing import Literal
 
 BYTE_S = 10 / 115200
-"""How long a byte takes, with its start and stop bit."""
+"""Duration of a byte with its start and stop bit, in s."""
 
 _IMU = struct.Struct(">2B6h")
 _DELTA = struct.Struct(">2B3hB")
@@ -45,14 +45,14 @@ class ControlMode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ControlFrame:
-    """A complete control data frame; `mode` may be a number that the manual does not name."""
+    """A complete control data frame; ``mode`` may be a number that the manual does not name."""
 
     mode: int
     values: Triple
 
 
 LETTERS = {int(letter): letter for letter in StateLetter}
-"""By their bytes."""
+"""State letters by their byte."""
 
 
 def imu_frame(accel: Triple, gyro: Triple) -> bytes:
@@ -61,7 +61,7 @@ def imu_frame(accel: Triple, gyro: Triple) -> bytes:
 
 
 def delta_frame(difference: Triple, seq: int) -> bytes:
-    """Encode the 9 bytes of the 25 Hz frame from 0.1 mm, 0.1 mm and 1e-4 rad (int16)."""
+    """Encode the 9 bytes of the 25 Hz frame from 0.1 mm, 0.1 mm and 0.1 mrad (int16)."""
     return _DELTA.pack(0xFF, 0xFB, *difference, seq)
 
 
@@ -73,7 +73,7 @@ def pose_frame(
 
 
 def paused_text(count: int) -> bytes:
-    """Encode the 1 Hz system info, `count` being a uint8."""
+    """Encode the 1 Hz system info; ``count`` is a uint8."""
     return b"Paused: %d \n" % count
 
 

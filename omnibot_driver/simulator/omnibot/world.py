@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot on the floor: what truly moves when the motors turn.
+"""The robot on the floor: how it truly moves when the motors turn.
 
-Knows motors, true wheel sizes, slip and the true pose. Must not know what the firmware believes,
-commands or sends; the firmware reads the encoders and the IMU here, nothing else.
+Knows motors, true wheel sizes, slip and the true pose. Must not know what the firmware assumes,
+commands or sends. The firmware reads only the encoders and the IMU.
 """
 
 from collections.abc import Sequence
@@ -22,14 +22,14 @@ from omnibot_driver.simulator.omnibot.motors import TICK_S, Motor
 from omnibot_driver.simulator.omnibot.settings import BoardSettings
 
 SLIP_CORRELATION_M = 0.1
-"""Rim motion after which a wheel has forgotten how much it was slipping."""
+"""Rim distance over which the slip of a wheel becomes uncorrelated, in m."""
 
 
 @dataclass(frozen=True, slots=True)
 class TruePose:
-    """The robot's true pose and its twist along its own axes.
+    """The robot's true pose, and its twist along its own axes.
 
-    Metres, radians (unwrapped), m/s and rad/s; the pose is zero at construction.
+    In m, rad (unwrapped), m/s and rad/s; the pose is zero at construction.
     """
 
     x_m: float
@@ -41,7 +41,7 @@ class TruePose:
 
 
 class Held(NamedTuple):
-    """The posture of a robot held by hand: roll and pitch (REP-103), and turn rate."""
+    """State of a robot held by hand: roll and pitch in rad (REP-103), and turn rate in rad/s."""
 
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
@@ -49,9 +49,10 @@ class Held(NamedTuple):
 
 
 class Force(NamedTuple):
-    """What pushes the robot along its x and y, and turns it to the left.
+    """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    As an effort at the rims, shared by the wheels as a velocity of that direction would be.
+    It adds to the motor efforts at the rims, distributed over the wheels as a velocity in that
+    direction would be.
     """
 
     x_pwm: float = 0.0
@@ -60,7 +61,7 @@ class Force(NamedTuple):
 
 
 class Twist(NamedTuple):
-    """Along the robot's x and y in m/s, and to the left in rad/s."""
+    """Velocity along the robot's x and y axes in m/s, and left turn rate in rad/s."""
 
     vx_mps: float = 0.0
     vy_mps: float = 0.0
@@ -85,26 +86,26 @@ class World:
         self._slope_pwm = settings.slope_pwm
         self.held = Held()
         self.force = Force()
-        """Of somebody who pushes, or of a bump."""
+        """Force of a person who pushes, or of a bump."""
         self.gripped: Twist | None = None
-        """How somebody moves the robot who is stronger than its motors."""
+        """Twist that a person stronger than the motors imposes; None if the robot moves freely."""
         self.acceleration = (0.0, 0.0)
         """Acceleration of the body's origin over the last tick, along body x and y, in m/s²."""
 
     @property
     def truth(self) -> TruePose:
-        """The true pose and motion of the robot."""
+        """True pose and twist of the robot."""
         return TruePose(*self._pose, *self._twist)
 
     @property
     def encoders(self) -> tuple[int, int, int]:
-        """Counts of wheels A, B, C since construction."""
+        """Encoder counts of wheels A, B, C since construction."""
         a, b, c = self._motors
         return a.encoder, b.encoder, c.encoder
 
     @property
     def rim_speeds_mps(self) -> Wheels:
-        """Momentary speeds of the rims."""
+        """Current rim speeds of wheels A, B, C, in m/s."""
         a, b, c = (
             motor.speed / TICK_S * rim_m
             for motor, rim_m in zip(self._motors, self._rim_m_per_count, strict=True)
@@ -112,7 +113,7 @@ class World:
         return a, b, c
 
     def advance(self, pwm: Wheels) -> None:
-        """Let one tick pass under the given efforts of the three controllers."""
+        """Advance by one tick with these efforts of the three controllers, in PWM steps."""
         rims_m = self._turn_wheels(self._wired(pwm))
         if self._mean_slip:
             self._slip = [self._wander(*now) for now in zip(self._slip, rims_m, strict=True)]
@@ -127,14 +128,14 @@ class World:
         )
 
     def _wired(self, pwm: Wheels) -> list[float]:
-        """The efforts as they reach the motors A, B, C."""
+        """Return the efforts that reach the motors A, B, C through the wiring."""
         reached = [0.0] * 3
         for effort, (motor, sign) in zip(pwm, self._wiring, strict=True):
             reached[motor] += sign * effort
         return reached
 
     def _turn_wheels(self, efforts: Sequence[float]) -> list[float]:
-        """Rim motion of the wheels in this tick, in m."""
+        """Turn the wheels for one tick; return their rim motion, in m."""
         wheels = zip(self._motors, efforts, self._rim_m_per_count, strict=True)
         if self.gripped is not None:
             moved = rims_from_body(*self.gripped, self._base_radius_m)
@@ -147,7 +148,7 @@ class World:
         ]
 
     def _loads(self) -> Wheels:
-        """Efforts that a slope and people who push add at the rims."""
+        """Return the efforts that a slope and a pushing force add at the rims of wheels A, B, C."""
         x, y, turning = self.force
         if self._slope_pwm:
             x += self._slope_pwm * cos(self._pose.yaw_rad)
@@ -159,7 +160,10 @@ class World:
         return a, b, c
 
     def _wander(self, slip: float, rim_m: float) -> float:
-        """Let the slip of a wheel drift about its mean, with half the mean as deviation."""
+        """Return the wheel's slip after ``rim_m`` of rim motion.
+
+        It drifts around the mean slip, with a standard deviation of half the mean, within 0..1.
+        """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)
         drifted = self._mean_slip + kept * (slip - self._mean_slip) + change
