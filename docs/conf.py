@@ -2,7 +2,8 @@
 
 """Sphinx settings for `make docs`, and for rosdoc2, which executes this file with its own defaults.
 
-The site is made from the whole repository, so that a link leads in it where it leads on GitHub.
+The site is built from the complete repository, so that each link leads to the same place as on
+GitHub.
 """
 
 project = "omnibot_driver"

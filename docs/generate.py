@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes what the documents take from the code: `make docs` runs it, a test compares.
+"""Write the parts of the documents that come from the code.
 
-Each text is a function of the code alone, so a test shows what to commit after a change.
+`make docs` runs this, and a test compares the files with its results. Each text depends on the code
+alone, so the test shows what to commit after a change.
 """
 
 import textwrap
@@ -39,7 +40,7 @@ TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 
 
 def parameter_file(board: str) -> str:
-    """config/<board>.yaml: every parameter with its default, and in a comment what it may be."""
+    """Return config/<board>.yaml: every parameter with its default, and its range in a comment."""
     lines = [
         f"# Every parameter with the board {board}, and its default. Give the file with",
         f"#   ros2 run omnibot_driver driver --ros-args --params-file {board}.yaml",
@@ -67,7 +68,7 @@ def parameter_file(board: str) -> str:
 
 
 def parameters_page() -> str:
-    """docs/parameters.md: the same for readers, board by board."""
+    """Return docs/parameters.md: tables of all parameters, board by board."""
     lines = PARAMETERS_INTRODUCTION.splitlines()
     for board in boards.PROFILES:
         lines += ["", f"## The board `{board}`"]
@@ -106,7 +107,7 @@ def _yaml(value: Value) -> str:
 
 
 def architecture() -> str:
-    """docs/internals/architecture.md with its mode table as it is in the code."""
+    """Return docs/internals/architecture.md with the mode table of the code."""
     lines = ["| | " + " | ".join(mode.value for mode in Mode) + " |", "|---|---|---|---|---|"]
     for happening, after in TRANSITIONS.items():
         cells = [after[mode].value if mode in after else "refused" for mode in Mode]
@@ -119,7 +120,7 @@ def architecture() -> str:
 
 GENERATED: Final[dict[str, Callable[[], str]]] = {
     **{f"config/{board}.yaml": partial(parameter_file, board) for board in boards.PROFILES},
-    "config/driver.yaml": partial(parameter_file, "omnibot"),  # for one release
+    "config/driver.yaml": partial(parameter_file, "omnibot"),  # former name, for one release
     "docs/internals/architecture.md": architecture,
     "docs/parameters.md": parameters_page,
     "docs/pictures/modes.svg": mode_diagram.svg,
@@ -127,7 +128,7 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
 
 
 def main() -> None:
-    """Write them all."""
+    """Write all generated files."""
     for name, text in GENERATED.items():
         (ROOT / name).write_text(text(), encoding="utf-8")
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's modes as a picture (SVG), drawn from the mode table."""
+"""Draw the board's modes as a picture (SVG) from the mode table."""
 
 import math
 import textwrap
@@ -29,7 +29,7 @@ Point = tuple[float, float]
 
 
 def svg() -> str:
-    """The picture: an arrow for what changes the mode; in the boxes, what does not."""
+    """Return the picture: arrows show what changes the mode, boxes what does not."""
     pairs = [(before, after) for before in Mode for after in Mode if before is not after]
     return "\n".join(
         [
@@ -49,7 +49,7 @@ def _happenings(before: Mode, after: Mode) -> list[str]:
 
 
 def _curve(before: Mode, after: Mode) -> tuple[Point, Point, Point]:
-    """From the edge of one box to that of the other, bent to the left of its way."""
+    """Return start, control point and end of an arrow between two boxes, bent to the left."""
     (x0, y0), (x1, y1) = PLACES[before], PLACES[after]
     length = math.hypot(x1 - x0, y1 - y0)
     left = ((y1 - y0) / length, -(x1 - x0) / length)
@@ -58,7 +58,7 @@ def _curve(before: Mode, after: Mode) -> tuple[Point, Point, Point]:
 
 
 def _border(centre: Point, towards: Point) -> Point:
-    """Where the box around this centre ends in that direction."""
+    """Return the point where the box around this centre ends in that direction."""
     dx, dy = towards[0] - centre[0], towards[1] - centre[1]
     part = min(
         (BOX_WIDTH / 2 + 4) / abs(dx) if dx else math.inf,
@@ -91,7 +91,10 @@ def _arrow(before: Mode, after: Mode) -> list[str]:
 
 
 def _label(before: Mode, after: Mode) -> list[str]:
-    """In the middle of an arrow that lies, near the beginning of one that might meet another's."""
+    """Return an arrow's label: at the middle of a horizontal arrow, near the start of any other.
+
+    There it does not meet the label of another arrow.
+    """
     lying = PLACES[before][1] == PLACES[after][1]
     x, y = _at(_curve(before, after), 0.5 if lying else 0.3)
     texts = [line for text in _happenings(before, after) for line in textwrap.wrap(text, 22)]

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keeps the tests' ROS traffic to this machine and to this run of them; what many tests ask for.
+"""Shared fixtures; ROS traffic stays on this machine and within this test run.
 
-Hypothesis tries the same examples in every run, so what turns red was changed;
-``pytest --hypothesis-profile exploring`` looks for others. None is timed.
+Hypothesis tries the same examples in every run, so a test that turns red was caused by a change.
+``pytest --hypothesis-profile exploring`` looks for other examples. No example has a deadline.
 """
 
 import os
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
     from omnibot_driver.simulator.omnibot import PtyBoard
 
-# Domains 0 to 101 are safe on every platform; 0 is everybody's default.
+# Domains 0 to 101 are safe on every platform; 0 is the default of all ROS programs.
 os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 ENDS_WITHIN_S = 60.0
-"""A thread of a link that was closed; the driver itself waits for it less long."""
+"""Time limit for the end of a closed link's thread, in s; the driver itself waits less long."""
 
 settings.register_profile("exploring", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("same", settings.get_profile("exploring"), derandomize=True)
@@ -39,9 +39,9 @@ WAITING = ("faults", "system", "tools")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Workers side by side begin with the files that wait, and end with many short ones.
+    """Sort the tests so that parallel workers begin with the files that wait.
 
-    Otherwise one worker is busy with a long file when the others have ended.
+    Otherwise one worker is still busy with a long file when the others have ended.
     """
     if not hasattr(config, "workerinput"):
         return
@@ -56,13 +56,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_report_header() -> str:
-    """Which core is tested."""
+    """Say whether the compiled or the interpreted core is tested."""
     return f"core: {'interpreted' if INTERPRETED else 'compiled'}"
 
 
 @pytest.fixture
 def nothing_left_behind() -> Iterator[None]:
-    """Every link, port and board that a test opens gives its threads and descriptors back."""
+    """Check that every link, port and board of a test gives back its threads and descriptors."""
     threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
     yield
     for thread in threading.enumerate():
@@ -73,14 +73,17 @@ def nothing_left_behind() -> Iterator[None]:
 
 
 def driver_threads() -> list[str]:
-    """Those of links, recordings and simulated boards; a test runner has threads of its own."""
+    """Return the names of the threads of links, recordings and simulated boards.
+
+    The test runner has threads of its own; they are left out.
+    """
     names = (thread.name for thread in threading.enumerate())
     return sorted(name for name in names if name.startswith(("omnibot-", "simulated board")))
 
 
 @pytest.fixture
 def terminal() -> Iterator[Terminal]:
-    """A terminal that is closed before the test looks for what was left behind."""
+    """Yield a terminal, closed before ``nothing_left_behind`` looks for open descriptors."""
     terminal = Terminal()
     yield terminal
     terminal.close()
@@ -88,7 +91,7 @@ def terminal() -> Iterator[Terminal]:
 
 @pytest.fixture
 def line() -> Iterator["Line"]:
-    """Where no process and no descriptor may be left behind."""
+    """Yield a guarded line; check at the end that no process and no descriptor is left behind."""
     from guarded_line import Line
 
     descriptors = len(os.listdir("/proc/self/fd"))
@@ -101,7 +104,7 @@ def line() -> Iterator["Line"]:
 
 @pytest.fixture
 def board() -> Iterator["PtyBoard"]:
-    """A board that runs, on a pseudo-terminal."""
+    """Yield a running board on a pseudo-terminal."""
     from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 
     with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:

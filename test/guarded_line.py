@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A line with a guard, and how a test acts as the driver that it guards."""
+"""A line with a guard process, and what a test does in place of the driver."""
 
 import contextlib
 import os
@@ -25,7 +25,7 @@ LATCHED_WORDS = b"and these under the e-stop"
 
 
 class Line:
-    """A pseudo-terminal: ``near`` is the driver's port; the far end is read here."""
+    """A pseudo-terminal: ``near`` is the driver's port; the far end is read by the test."""
 
     def __init__(self) -> None:
         self._far, self.near = os.openpty()
@@ -35,11 +35,11 @@ class Line:
         self._others = children()
 
     def children(self) -> list[int]:
-        """The processes begun since this line was made, zombies included."""
+        """Return the processes that were started since this line was made, zombies included."""
         return [pid for pid in children() if pid not in self._others]
 
     def hear(self, words: bytes) -> bytes:
-        """Everything so far, once these words are in it."""
+        """Read until ``words`` has arrived; return everything received so far."""
         end = time.monotonic() + PATIENCE_S
         while words not in self.heard:
             assert select.select([self._far], [], [], end - time.monotonic())[0], self.heard
@@ -61,7 +61,7 @@ class Line:
 
 
 def children() -> list[int]:
-    """Our child processes, zombies included."""
+    """Return the ids of our child processes, zombies included."""
     found = []
     for directory in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -72,12 +72,12 @@ def children() -> list[int]:
 
 
 def started(pid: int) -> None:
-    """Wait until Python has come up in it, and it does not heed SIGTERM any more."""
+    """Wait until Python runs in the process and it ignores SIGTERM."""
     end = time.monotonic() + PATIENCE_S
     bit = 1 << (signal.SIGTERM - 1)
     while not int(status_of(pid, "SigIgn"), 16) & bit:
         assert time.monotonic() < end
-        time.sleep(0.005)  # what a process ignores changes without an event
+        time.sleep(0.005)  # a process changes what it ignores without an event
 
 
 def status_of(pid: int, field: str) -> str:
@@ -86,7 +86,7 @@ def status_of(pid: int, field: str) -> str:
 
 
 def alive(keeper: Keeper, seconds: float) -> float:
-    """Beat as the driver does, whose pace is the thing itself; the longest pause in between."""
+    """Send heartbeats for ``seconds`` at the driver's pace; return the longest pause, in s."""
     begun_s = beaten_s = time.monotonic()
     longest_s = 0.0
     while (now := time.monotonic()) < begun_s + seconds:
@@ -97,7 +97,7 @@ def alive(keeper: Keeper, seconds: float) -> float:
 
 
 def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
-    """Beat as the driver does until the condition holds; returns the messages."""
+    """Send heartbeats at the driver's pace until the condition holds; return the messages."""
     told, end = "", time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end
@@ -107,6 +107,6 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
 
 
 def replaced(line: Line, guard: int) -> bool:
-    """Whether another guard runs, and this one has ended and was reaped."""
+    """Return whether another guard runs, and this one has ended and was reaped."""
     found = line.children()
     return bool(found) and guard not in found

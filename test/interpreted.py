@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which core is tested, and the mark of tests that only make sense with one of them."""
+"""Whether the tested core is interpreted, and marks for tests that need one kind of core."""
 
 import pytest
 

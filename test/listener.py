@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What stands around a link in place of a node."""
+"""The surroundings of a link in tests, in place of a node."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ LAST_WORDS = (packed(STOP), packed(EMERGENCY_STOP + STOP))
 
 
 class Listener:
-    """Keeps what a link delivers and reports, and wakes who waits for it."""
+    """Keeps what a link delivers and reports, and wakes the test that waits for it."""
 
     def __init__(self) -> None:
         self.events: list[Event] = []
@@ -81,7 +81,7 @@ def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[An
 
 
 def kinds(board: SimulatedBoard) -> list[str]:
-    """The kinds of the commands that it obeyed."""
+    """Return the kinds of the commands that the board obeyed."""
     return [command.kind for command in board.commands]
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A program on a terminal of 80x24 of its own, as a person has it: keys in, what it draws out."""
+"""A program on its own terminal of 80x24: the test types keys and reads what it draws."""
 
 import contextlib
 import fcntl
@@ -17,7 +17,7 @@ PATIENCE_S = 60.0
 
 
 class PseudoTerminal:
-    """Runs the command; whatever is left of it ends with the test."""
+    """Runs the command, and ends it with the test."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self._far, near = os.openpty()
@@ -52,18 +52,18 @@ class PseudoTerminal:
         self._reader.join()
 
     def type(self, keys: str) -> None:
-        """As if they were pressed one after the other."""
+        """Send keys as if they were pressed one after the other."""
         os.write(self._far, keys.encode())
 
     def wait_for(self, text: str) -> None:
-        """Until it has drawn this, since this was last asked."""
+        """Wait until the program has drawn this text, since the last text that was waited for."""
         with self._changed:
             found = self._changed.wait_for(lambda: text.encode() in self._drawn, PATIENCE_S)
             assert found, f"{text!r} is not in {self._drawn[-2000:]!r}"
             self._drawn = self._drawn.partition(text.encode())[2]
 
     def end(self) -> int:
-        """Wait for its end; the exit code."""
+        """Wait until the program ends; return its exit code."""
         return self.process.wait(PATIENCE_S)
 
     def _read(self) -> None:

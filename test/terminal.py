@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pseudo-terminals without a program at the other end, and what tests do to them."""
+"""Pseudo-terminals that a test fills and reads, without a program at the other end."""
 
 import contextlib
 import os
@@ -12,9 +12,10 @@ PATIENCE_S = 60.0
 
 
 def fill(descriptor: int, words: bytes = b"x") -> None:
-    """With these, until the kernel takes no more, not even after moving it to the next buffer.
+    """Write ``words`` repeatedly until the kernel accepts no more.
 
-    The descriptor must not block. The kernel does not report when it moves it, hence the pauses.
+    The descriptor must not block. The kernel may move data to its next buffer and then has room
+    again. It does not report that, hence the pauses.
     """
     taken, full = 0, 0
     while full < 5:
@@ -41,7 +42,7 @@ class Terminal:
         fill(self._near)
 
     def read_until(self, words: bytes) -> bytes:
-        """All that has been written, up to the time when these words are in it."""
+        """Read until ``words`` has arrived; return all that was read."""
         heard, end = b"", time.monotonic() + PATIENCE_S
         while words not in heard:
             assert select.select([self.far], [], [], end - time.monotonic())[0], heard

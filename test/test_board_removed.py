@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board is its own folders: without them the rest works as before."""
+"""A board is only its own folders: without them the other boards still work."""
 
 import shutil
 import subprocess
@@ -18,7 +18,7 @@ REMAINS: Final = (
     "test/system/test_driver_toys.py::test_a_toy_drives_and_is_heard[line_board]",
     "test/transports/test_simulated.py",
 )
-"""Each board that is left, the whole driver, and the simulators inside it: one test of each."""
+"""One test each of the remaining boards, of the complete driver, and of the built-in simulators."""
 IMPORT_AND_TEST: Final = """
 import importlib, pkgutil, sys
 import pytest
@@ -35,7 +35,7 @@ sys.exit(pytest.main(sys.argv[1:]))
 def test_without_the_folders_of_one_board_the_tests_of_the_rest_are_green(
     board: str, tmp_path: Path
 ) -> None:
-    """The folders are removed in a copy. All modules that are left can be imported there."""
+    """The folders are removed in a copy, where all remaining modules can be imported."""
     ignored = shutil.ignore_patterns(board, f"{board}.py", f"{board}_*.py", "__pycache__")
     for folder in ("omnibot_driver", "test"):
         shutil.copytree(HOME / folder, tmp_path / folder, ignore=ignored)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each kind of board meets the rest of the driver in its profile alone."""
+"""Profiles: each connects a kind of board to the rest of the driver."""
 
 import ast
 import sys
@@ -25,11 +25,11 @@ from omnibot_driver.simulator.common import options
 
 PACKAGE = Path(boards.__file__).parent.parent
 KNOW_BOARDS = ("boards", *boards.PROFILES)
-"""Folders."""
+"""Folders that may import boards."""
 
 
 def imported(path: Path) -> set[str]:
-    """The modules that this one imports."""
+    """Return the names of the modules that this one imports."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -49,7 +49,7 @@ def imported(path: Path) -> set[str]:
     ids=lambda path: str(path.relative_to(PACKAGE)),
 )
 def test_common_code_imports_no_board(path: Path) -> None:
-    """Session, link, node and all the others take what the profile made."""
+    """Session, link, node and all other common code use only what the profile made."""
     known = {
         f"omnibot_driver.{place}.{name}" for place in ("core", "boards") for name in boards.PROFILES
     }
@@ -58,7 +58,7 @@ def test_common_code_imports_no_board(path: Path) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
-    """With a kinematics whose joints are the wheels that can be commanded."""
+    """Its kinematics has one joint per wheel that can be commanded."""
     values = boards.check_all({"board": name})
     profile = boards.load(name)
     board = profile.make(values)
@@ -68,7 +68,7 @@ def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_names_its_simulated_board(name: str) -> None:
-    """It is the one that ``simulator --board`` runs by the same name."""
+    """The same name runs it with ``simulator --board``."""
     module = boards.load(name).SIMULATOR
     assert module == f"omnibot_driver.simulator.{name}"
     assert name in simulated_boards()
@@ -78,14 +78,14 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
 
 @pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
 def test_what_is_no_board_is_refused_with_those_there_are(wrong: object) -> None:
-    """The value may have any type."""
+    """The value may have any type; the error lists the boards."""
     with pytest.raises(ParameterError, match="'board' must be "):
         boards.check_all({"board": wrong})
 
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_has_a_table_of_its_own(name: str) -> None:
-    """In which no name comes twice, and its board is the only one."""
+    """Its parameter names are unique, and its own board is the only choice."""
     table = boards.load(name).PARAMETERS
     assert sum(map(len, table.sections.values())) == len(table.rows)
     assert (table.board, table.by_name["board"].choices) == (name, (name,))
@@ -107,7 +107,7 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """Common rows by what it can do, with its defaults, and without those it has no use for."""
+    """It has the common rows that fit the board's abilities, its defaults, and its own rows."""
     own = table(
         "few",
         FEW,
@@ -135,13 +135,13 @@ def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
 
 @pytest.mark.parametrize("name", ["guard", "port", "on_exit", "auto_gyro_bias", "max_linear_speed"])
 def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
-    """It says so when the profile is imported, and what may be dropped."""
+    """Importing the profile raises an error that lists what may be dropped."""
     with pytest.raises(ValueError, match=f"few must not be without {name}: .* without axis_signs"):
         table("few", FEW, without=("baudrate", name))
 
 
 def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
-    """The driver takes it for granted nowhere but in the boards' own profiles; tools ask first."""
+    """Only the boards' own profiles index such a parameter; other code uses a default."""
     indexed = {
         node.slice.value
         for path in PACKAGE.rglob("*.py")
@@ -154,7 +154,7 @@ def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
 
 
 def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
-    """What is absent is not asked for."""
+    """Code that reads an absent parameter does not fail."""
     values = table("few", FEW).check_all({})
     settings = session_settings(values, OmniKinematics(0.029, 0.143))
     assert settings.limits.wheel_radps == 0.0
@@ -167,7 +167,7 @@ def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
 def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """An unknown one is refused with the nearest of this board."""
+    """An unknown name is refused with the most similar name of this board."""
     other = SimpleNamespace(PARAMETERS=table("few", FEW, own={"Docking": (OWN,)}))
     monkeypatch.setitem(boards.PROFILES, "few", "few_profile")
     monkeypatch.setitem(sys.modules, "few_profile", other)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calibration file: whole or not at all, and other names stay."""
+"""The calibration file: written completely or not at all, keeping other names in it."""
 
 import stat
 from pathlib import Path
@@ -24,7 +24,7 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
 
 
 def test_no_file_yet_is_no_calibration(tmp_path: Path) -> None:
-    """An empty one is none either; the folder is created with the file."""
+    """An empty file contains no calibration either; the folder is created with the file."""
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}
     calibration.save(path, {"gyro_bias": BIAS})
@@ -57,7 +57,7 @@ def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
 def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
     tmp_path: Path, text: str
 ) -> None:
-    """It names the file; nothing is overwritten."""
+    """The error names the file; nothing is overwritten."""
     path = tmp_path / "robot.yaml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(ParameterError, match="correct it, or remove it") as caught:
@@ -66,7 +66,7 @@ def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    """Read as little as written."""
+    """A folder at the file's path is an error that says it cannot be read."""
     with pytest.raises(ParameterError, match="cannot be read"):
         calibration.load(tmp_path, PARAMETERS)
 
@@ -74,7 +74,7 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As on a disk that is full."""
+    """The cause here is a full disk."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
 
@@ -89,14 +89,14 @@ def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
 
 
 def test_others_may_read_the_file(tmp_path: Path) -> None:
-    """It is readable for others, although mkstemp makes it private."""
+    """The file of ``mkstemp``, from which it is made, is private."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
     assert stat.S_IMODE(path.stat().st_mode) == 0o644
 
 
 def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
-    """What it leads to is written, where that is."""
+    """The link's target is written, in the target's folder."""
     path, link = tmp_path / "far" / "robot.yaml", tmp_path / "robot.yaml"
     link.symlink_to(path)
     calibration.save(link, {"gyro_bias": BIAS})

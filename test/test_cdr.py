@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Serialised measurements are what rclpy makes of the same measurements."""
+"""The driver's own serializer makes the same bytes as rclpy."""
 
 import struct
 from dataclasses import replace
@@ -47,13 +47,13 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 def message_name(message: object) -> str:
-    """The name in the form "sensor_msgs/msg/Imu"."""
+    """Return the name in the form "sensor_msgs/msg/Imu"."""
     return f"{type(message).__module__.split('.')[0]}/msg/{type(message).__name__}"
 
 
 @st.composite
 def settings(draw: st.DrawFn) -> MessageSettings:
-    """Settings with frames of any length, so that every alignment occurs, and any noise."""
+    """Draw settings with any noise, and frame names of any length so that all alignments occur."""
     values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
@@ -61,9 +61,9 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 
 
 def padded(data: bytes, like: bytes) -> bytes:
-    """The same bytes with padding as in ``like``: what rclpy leaves there is no part of a message.
+    """Return ``data`` with padding as in ``like``, since rclpy may leave anything there.
 
-    Padding are the zeros behind a string's NUL up to the next multiple of eight.
+    Padding is the bytes after a string's NUL up to the next multiple of eight.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):
@@ -80,7 +80,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
     wheels: Wheels,
     stamp_ns: int,
 ) -> None:
-    """They agree byte for byte except padding, and in every field after reading them again."""
+    """They are equal byte for byte except for padding, and in every field after deserializing."""
     serializer, messages = Serializer(chosen), Messages(chosen)
     for ours, message in (
         (serializer.imu(imu, stamp_ns), messages.imu(imu, stamp_ns)),
@@ -95,7 +95,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
 
 
 def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
-    """Of a differential drive: 1 m ahead on wheels of 0.1 m is 10 rad."""
+    """On a differential drive with wheels of 0.1 m radius, 1 m forward turns both by 10 rad."""
     two = replace(
         MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS)),
         wheels=DifferentialKinematics(wheel_radius_m=0.1, track_m=0.4),
@@ -113,7 +113,7 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
-    """Each alignment therefore has a fast way."""
+    """So the fast serializer can be used for each alignment."""
     values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
 
@@ -129,7 +129,7 @@ def test_no_frame_length_is_refused_at_start(length: int) -> None:
 def test_a_difference_is_found_at_start(
     monkeypatch: pytest.MonkeyPatch, name: str, wrong: object, strange: str
 ) -> None:
-    """In any constant part; values that vary are compared in the test above."""
+    """Constant parts are checked at start; values that vary are compared in the test above."""
     monkeypatch.setattr(cdr, name, wrong)
     chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     assert difference(chosen) == strange
@@ -145,7 +145,7 @@ def test_the_orientation_that_is_none_is_the_messages_default() -> None:
 def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
     linear: tuple[float, float, float], angular: tuple[float, float, float]
 ) -> None:
-    """As from the message itself; a big-endian sender's bytes are rclpy's to read."""
+    """The result equals the message's own fields, also for a big-endian sender."""
     (x, y, z), (u, v, w) = linear, angular
     data = serialize_message(Twist(linear=Vector3(x=x, y=y, z=z), angular=Vector3(x=u, y=v, z=w)))
     assert cdr.twist(data) == BodyTwist(x, y, w)
@@ -155,7 +155,7 @@ def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
 def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
-    """Also of an axis that this robot has not."""
+    """This includes axes that this robot does not have."""
     values = [0.1] * 6
     values[place] = nonsense
     with pytest.raises(CommandRefused, match="NaN or infinity"):
@@ -164,7 +164,7 @@ def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense
 
 @pytest.mark.parametrize("length", range(52))
 def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> None:
-    """A middleware may let short messages through."""
+    """A middleware may deliver messages that are too short."""
     data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
     with pytest.raises(CommandRefused, match="not a valid Twist"):
         cdr.twist(data[:length])
@@ -181,5 +181,5 @@ def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> No
     ids=lambda wheels: f"{len(wheels.joints)} joints",
 )
 def test_any_number_of_wheels_is_serialised_as_rclpy_does(wheels: Any) -> None:
-    """None at all, too: then there is no joint_states."""
+    """Without wheels, joint_states is not published."""
     assert difference(MessageSettings.from_parameters(boards.check_all({}), wheels)) == ""

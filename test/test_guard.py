@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The guard as a process of its own, on a real pseudo-terminal."""
+"""The guard as a separate process, on a real pseudo-terminal."""
 
 import ast
 import os
@@ -30,7 +30,7 @@ from omnibot_driver.keeper import Keeper
 
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
-    """It has stopped the robot itself; not a byte is added."""
+    """The driver has stopped the robot itself, so the guard writes nothing."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     alive(keeper, 0.2)
     keeper.end(stopped=True)
@@ -40,14 +40,14 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
-    """For a second, since the board may be deaf just now; then it leaves."""
+    """The guard repeats them for a second, since the board may not receive now; then it ends."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.end(stopped=False)
     assert line.hear(guard.TIMES * LAST_WORDS) == guard.TIMES * LAST_WORDS
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
-    """It goes on guarding: it stops the robot the next time as well."""
+    """The guard stays active, and stops the robot again at the next silence."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"so far: ")
@@ -61,7 +61,7 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
-    """What stops a board may depend on what it does just now."""
+    """Which bytes stop a board may depend on the board's current state."""
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
     keeper.change(*words)
@@ -81,7 +81,7 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
-    """Old commands wait there; they are read only after the guard has gone."""
+    """Old commands fill the buffer and are dropped; they are read only after the guard has gone."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
     keeper.end(stopped=False)
@@ -89,7 +89,7 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 
 
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
-    """It leaves, and so does the driver."""
+    """The guard ends, so the driver does not wait for it."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     process = keeper._process
     assert process is not None
@@ -100,7 +100,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """Ctrl-C does not reach its session; SIGTERM to a whole group does, and is not for it."""
+    """Ctrl-C does not reach its session, and it ignores a SIGTERM sent to a whole process group."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     assert os.getsid(pid) == pid
@@ -114,8 +114,10 @@ def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
 def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
     line: Line, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``pkill -9 -f omnibot_driver``, in a hurry, while the robot drives; the folder of a clone
-    with its .venv has that name too."""
+    """A user may run ``pkill -9 -f omnibot_driver`` while the robot drives.
+
+    The folder of a clone with its .venv has that name too.
+    """
     interpreter = tmp_path / "omnibot_driver" / ".venv" / "bin" / "python"
     interpreter.parent.mkdir(parents=True)
     interpreter.symlink_to(sys.executable)
@@ -131,7 +133,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
 
 
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
-    """It has none of the driver's sockets and files, and few modules of Python."""
+    """It has none of the driver's sockets and files, and imports few modules."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     started(pid)
@@ -156,7 +158,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """Each line gets its own last words."""
+    """Each line gets its own last bytes."""
     other = Line()
     try:
         words = ((0, b"drive stands"), (1, b"front stands"))
@@ -171,7 +173,7 @@ def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line
 
 
 def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
-    """Each stop is a datagram; lost ones do not end the guard."""
+    """Each stop is a datagram; those that are lost do not end the guard."""
     host = socket.socket(type=socket.SOCK_DGRAM)
     host.bind(("127.0.0.1", 0))
     address = host.getsockname()
@@ -190,7 +192,7 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """They are in the guard's pipe before the driver is gone."""
+    """They are in the guard's pipe before the driver ends."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):
@@ -200,7 +202,7 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """Words hold the letter of a latched beat; what is cut is completed by the next read."""
+    """Last bytes may contain the letter of a latched beat; the next read completes a cut line."""
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")
     assert guard.parted(b".=3:be") == (b".", b"", b"=3:be")

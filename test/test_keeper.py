@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Guards that die, hang, or cannot be started: the driver replaces them and does not wait."""
+"""Guards that die, hang, or cannot be started: the driver replaces them and never waits."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """It would say old ones."""
+    """The hung guard would write the bytes it knew before."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGSTOP)
@@ -29,7 +29,7 @@ def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Lin
 
 
 def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
-    """It has not come up yet."""
+    """The guard has only not started to read yet."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     children = line.children()
     for number in range(30):
@@ -40,7 +40,7 @@ def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
-    """The new one guards."""
+    """The new guard works; a second death is not reported again."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
@@ -57,7 +57,7 @@ def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
 def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The driver drives on without."""
+    """The driver continues without a guard."""
     with monkeypatch.context() as without:
         without.setattr("sys.executable", "/no/python")
         keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -70,7 +70,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
-    """A stopped guard would not stop the robot; the driver does not wait until its pipe is full."""
+    """A stopped guard would not stop the robot; the driver acts before the guard's pipe is full."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     started(first)
@@ -87,7 +87,7 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As in an uninterruptible sleep. It is replaced at once, and reaped later."""
+    """It is replaced at once and reaped later; a process in uninterruptible sleep behaves so."""
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
@@ -128,7 +128,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
-    """It does not hear the good-bye."""
+    """The guard does not receive the end message."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
@@ -139,7 +139,7 @@ def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
 def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A stopped process that no signal reaches stands for an uninterruptible sleep."""
+    """A stopped process that signals do not reach imitates an uninterruptible sleep."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)

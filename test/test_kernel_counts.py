@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the kernel counts of ports and threads."""
+"""The kernel's counters of ports and threads."""
 
 import fcntl
 import os
@@ -36,7 +36,7 @@ def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.Mo
 
 
 def test_a_thread_has_waited_and_one_that_is_none_is_not_known() -> None:
-    """The time is in seconds."""
+    """Its waiting time is in s; for an unknown thread it is None."""
     waited = waited_s(threading.get_native_id())
     assert waited is None or waited >= 0.0
     assert waited_s(0) is None

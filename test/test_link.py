@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The threads around a session, on a real pseudo-terminal and without ROS."""
+"""The threads of a link around a session, on a real pseudo-terminal and without ROS."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> None:
-    """No queue, no timer and no other thread stand between the wire and the listener."""
+    """Without a queue, a timer or another thread in between, the latency is shortest."""
     listener = Listener()
     link = link_to(board.path, listener, session())
     link.start()
@@ -31,12 +31,12 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 
 
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
-    """The pacer repeats and stops, also while the commanding callback hangs."""
+    """The pacer repeats and stops, even while the commanding callback hangs."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
-    for _ in range(20):  # a machine that hangs stops the robot
+    for _ in range(20):  # if the machine hangs, the robot is stopped: try again
         before = len(board.board.commands)
         link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
         if board.wait_for(lambda b, n=before: kinds(b)[n:].count("velocity") > 3, 1.0):  # type: ignore[misc]
@@ -49,7 +49,7 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each repetition of a command is a pass; a guard that hangs is known by unread beats."""
+    """The pacer passes at each repetition of a command; a hung guard is known by unread beats."""
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
     listener, ours = Listener(), session()
@@ -67,7 +67,7 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 
 
 def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:
-    """Why it cannot be had, how often it could, what went through it."""
+    """They contain why the port cannot be opened, how often it was, and the bytes each way."""
     listener, name = Listener(), tmp_path / "board"
     link = link_to(str(name), listener, session())
     link.start()
@@ -85,7 +85,7 @@ def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: P
 
 
 def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
-    """It may be closed twice."""
+    """A second close does nothing."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -99,7 +99,7 @@ def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
 
 
 def test_every_read_and_every_write_can_be_listened_to(board: PtyBoard) -> None:
-    """Byte for byte as they were, the opening and the final Stop included."""
+    """The bytes are exactly those on the line, including the opening and the final Stop."""
     read, written = [], []
     listener, ours = Listener(), session()
     link = link_to(
@@ -139,7 +139,7 @@ def test_an_estop_is_written_before_the_call_returns(
 
 
 def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
-    """The link goes on."""
+    """The link continues to work."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -152,7 +152,7 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """The driver is then the only one who can stop the robot."""
+    """Only the driver itself can stop the robot then."""
     listener = Listener()
     link = link_to("loop://", listener, session())
     link.start()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a link tells its listener: in which order, and what if the listener hangs or fails."""
+"""Events from a link to its listener: their order, and a listener that hangs or fails."""
 
 import threading
 import time
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: PtyBoard) -> None:
-    """Callers, the reader and the pacer, with a listener that is now and then slow."""
+    """The events come from callers, the reader and the pacer; the listener is sometimes slow."""
     happened: list[Event] = []
     ours, listener = session(), Listener()
     hear, take_events, deliver = ours.inbound.hear, ours.take_events, listener.deliver
@@ -38,7 +38,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
         return events
 
     def slowly(events: Sequence[Event]) -> None:
-        time.sleep(random.choice((0.0, 0.0, 0.001)))  # a network now and then is
+        time.sleep(random.choice((0.0, 0.0, 0.001)))  # a network is sometimes slow
         deliver(events)
 
     def press(name: str) -> None:
@@ -66,7 +66,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
 
 
 def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard) -> None:
-    """The call and the watchdog's thread do not wait; what was missed is delivered in order."""
+    """The caller and the watchdog's thread do not wait; late events are delivered in order."""
     listener, ours = Listener(), session()
     deliver, hang, goes_on = listener.deliver, threading.Event(), threading.Event()
 
@@ -94,7 +94,7 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """The log says why."""
+    """So the log shows the reason before the refusal."""
     listener, ours = Listener(), session()
     link = link_to(
         board.path, listener, ours, refused=lambda text: listener.deliver([Notice(text)])
@@ -114,7 +114,7 @@ def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) 
 
 
 def test_a_listener_that_raises_ends_the_link_with_a_report(board: PtyBoard) -> None:
-    """A thread never dies unheard, and the robot is stopped before the port is given back."""
+    """A thread reports its end, and the robot is stopped before the port is closed."""
     listener = Listener()
 
     def explode(events: Sequence[Event]) -> None:

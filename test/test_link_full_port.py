@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A link whose port no longer accepts data: Stop is written first when it does again."""
+"""A link whose port accepts no more data: Stop is written first when it does again."""
 
 import os
 import threading
@@ -30,9 +30,9 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """A board that hung may hold half a command; S, which found no room, is not what it needs.
+    """A board that hung may hold half a command, so S, which had no room before, must wait.
 
-    The first Stop is there before the port is opened anew: it may resume sooner.
+    The first Stop is written before the port is opened again, since the board may resume sooner.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
@@ -46,7 +46,7 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
 
 
 def at_rest(terminal: Terminal) -> tuple[Link, Session]:
-    """A link that has opened this port and wants nothing more of the board."""
+    """Return a link that has opened this port and sends nothing more to the board."""
     ours = session(run=False)
     link = link_to(terminal.path, Listener(), ours)
     link.start()
@@ -55,7 +55,7 @@ def at_rest(terminal: Terminal) -> tuple[Link, Session]:
 
 
 def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> None:
-    """Closing does not hang; the robot is stopped as soon as the board listens again."""
+    """Closing does not hang; the robot is stopped as soon as the board receives again."""
     link, _ours = at_rest(terminal)
     terminal.fill()
     assert not link.close("stop")
@@ -64,7 +64,7 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
-    """The answer says so; it is the first to be written once there is room."""
+    """The link reports that it is blocked; the e-stop is written first when there is room."""
     link, _ours = at_rest(terminal)
     assert not link.blocked
     terminal.fill()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A link to a board of two lines, one of which comes late, goes and comes back."""
+"""A link to a board with two lines, one of which appears late, disappears and comes back."""
 
 import os
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ OTHER_STOP = packed(b"v  0  0\n")
 
 
 class MoodyBoard(LineBoard):
-    """What stops it depends on what it said last."""
+    """A board whose stop command depends on its last report."""
 
     def stop(self) -> Packets:
         return OTHER_STOP if self.mode.running else STOP
@@ -84,7 +84,7 @@ class Lines:
         self.name.symlink_to(self.sense.path)
 
     def say_that_it_stands(self) -> None:
-        """Report a standstill as soon as the line is open, since earlier data is dropped."""
+        """Report a standstill when the line is open, since earlier data is dropped."""
         self.listener.wait_for(lambda: self.listener.reports[-1:] == [None])
         os.write(self.sense.far, b"d 0 0\n")
         self.come_to_state("nominal")
@@ -115,7 +115,7 @@ def lines(tmp_path: Path) -> Iterator[Lines]:
 def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missing(
     lines: Lines,
 ) -> None:
-    """There is one connection; motion is refused with the name of the missing line."""
+    """Both lines are one connection; motion is refused with the name of the missing line."""
     lines.link.start()
     lines.drive.read_until(5 * STOPS)
     lines.come_to_state("connecting")
@@ -130,7 +130,7 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
 
 
 def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
-    """The robot drives; the line that was there was never given back."""
+    """The robot can be driven; the line that was open stays open."""
     lines.link.start()
     lines.drive.read_until(STOPS)
     lines.connect()
@@ -142,7 +142,7 @@ def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
 def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
     lines: Lines,
 ) -> None:
-    """The command from before is forgotten."""
+    """The command from before is discarded."""
     lines.connect()
     lines.link.start()
     lines.say_that_it_stands()
@@ -173,7 +173,7 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
 
 
 def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> None:
-    """It changes with what the board says."""
+    """The stop bytes change with the state that the board reports."""
     with closing(Lines(tmp_path, MoodyBoard())) as lines:
         lines.connect()
         lines.link.start()
@@ -187,7 +187,7 @@ def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> No
 
 
 def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
-    """It comes each 0.4 s: a proof takes longer than at a faster board."""
+    """Its odometry comes every 0.4 s, so the proof of a standstill takes longer."""
     with ServedBoard(LineRobot()) as robot:
         lines = [partial(SerialPort, path, 115200) for path in robot.addresses]
         listener, ours = Listener(), session_of(LineBoard())

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A port that comes late, goes, comes back, or comes back while everything ends."""
+"""A port that appears late, disappears, comes back, or comes back during the shutdown."""
 
 import itertools
 import threading
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
-    """The link can also be closed before."""
+    """A link can also be closed before its port appears."""
     listener, ours = Listener(), session()
     name = str(tmp_path / "omnibot")
     link = link_to(name, listener, ours)
@@ -34,7 +34,7 @@ def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
 def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each wait is half as long again as the one before; a limit keeps the board from waiting."""
+    """Each wait is 1.5 times the one before, up to a limit, so that a board need not wait long."""
 
     class Timed(Listener):
         def report(self, trouble: str | None) -> None:
@@ -52,12 +52,12 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     listener = Listener()
     link = link_to("/no/such/port", listener, session())
     link.start()
-    listener.wait_for(lambda: len(listener.reports) > 40)  # unlimited, that took days
+    listener.wait_for(lambda: len(listener.reports) > 40)  # without the limit this would take days
     link.close("stop")
 
 
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
-    """Behind the link that udev keeps; the command from before is forgotten."""
+    """The link of udev leads to the new port; the command from before is discarded."""
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard()) as second:
@@ -80,7 +80,7 @@ def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_pat
 
 
 def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
-    """The terminal hangs up."""
+    """The terminal hangs up when its board ends."""
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard()) as board:
         link = link_to(board.path, listener, ours)
@@ -112,7 +112,7 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
-    """The cable is in again, and the driver ends before it would have tried the port anew."""
+    """The cable is back, but the driver ends before it would have opened the port again."""
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
     link = link_to(str(name), listener, ours)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A driver that did not run for a while: the robot is stopped, and what waited is refused."""
+"""A driver that did not run for a while: the robot is stopped, and old commands are refused."""
 
 import threading
 import time
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def obeyed(command: Callable[[], None]) -> bool:
-    """Commands may be refused just after a stall, when the reader runs before the pacer."""
+    """Return whether the command is accepted; after a stall it is not until the pacer has run."""
     try:
         command()
     except CommandRefused:
@@ -31,14 +31,14 @@ def obeyed(command: Callable[[], None]) -> bool:
 def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A thread with the lock keeps the pacer from passing; what is sent later is obeyed."""
+    """A thread that holds the lock blocks the pacer; commands sent later are obeyed."""
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
     drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
-    for _ in range(20):  # a machine that hangs is another standstill
+    for _ in range(20):  # if the machine hangs, that is another stall: try again
         if obeyed(lambda: drive([time.time_ns()])) and board.wait_for(lambda b: b.driven, 0.3):
             break
     else:
@@ -59,7 +59,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     with pytest.raises(CommandRefused, match="waited"):
         drive([sent_ns])
     with pytest.raises(CommandRefused, match="waited while the driver was stalled"):
-        drive([time.time_ns(), sent_ns])  # or so, as little is known of its sender
+        drive([time.time_ns(), sent_ns])  # little is known of its sender yet
     listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
 
@@ -68,7 +68,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 
 
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No thread misses a beat by the steady clock; the robot is still stopped."""
+    """Threads miss no heartbeat by the steady clock, but the robot is stopped."""
     suspended_s = 0.0
     monkeypatch.setattr(
         "omnibot_driver.shared_session.boot_time_s",
@@ -80,7 +80,7 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
     drive = partial(link.command, Session.command_twist, BodyTwist(0.3, 0.0, 0.0))
-    for _ in range(20):  # a machine that hangs is another standstill
+    for _ in range(20):  # if the machine hangs, that is another stall: try again
         fresh = obeyed(lambda: drive([time.time_ns()]))
         if fresh and board.wait_for(lambda b: kinds(b)[-1:] == ["velocity"], 0.3):
             break
@@ -90,7 +90,7 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     assert board.wait_for(lambda b: kinds(b)[-1:] == ["wheels"], PATIENCE_S)
     listener.wait_for(lambda: any("for 36" in str(event) for event in listener.events))
     with pytest.raises(CommandRefused, match="waited"):
-        drive([time.time_ns() - 1_000_000_000])  # while it was suspended, by a clock that went on
+        drive([time.time_ns() - 1_000_000_000])  # from during the suspension, by a running clock
     listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
     assert board.wait_for(lambda b: kinds(b)[-1:] == ["velocity"], PATIENCE_S)
     link.close("stop")

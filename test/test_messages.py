@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Values to ROS messages: where each number goes, by REP-103, REP-105 and REP-145."""
+"""Values to ROS messages: the place of each number, by REP-103, REP-105 and REP-145."""
 
 import math
 from types import SimpleNamespace
@@ -37,7 +37,7 @@ def test_a_stamp_is_seconds_and_nanoseconds() -> None:
 
 @pytest.mark.parametrize(("sec", "nanosec", "age_s"), [(98, 0, 2.0), (102, 5 * 10**8, -2.5)])
 def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, age_s: float) -> None:
-    """Negative where it is in the future."""
+    """It is negative when the stamp is in the future."""
     assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
 
 
@@ -61,7 +61,7 @@ def goal(
 def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
     yaw_rad: float, length: float
 ) -> None:
-    """Some senders do not normalise it."""
+    """Some senders do not normalize it."""
     turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
     pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")
     assert (pose.x_m, pose.y_m) == (1.0, -2.0)
@@ -70,7 +70,7 @@ def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
 
 @pytest.mark.parametrize("frame", ["", "odom"])
 def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
-    """None is taken for the odometry frame."""
+    """An empty frame means the odometry frame."""
     assert messages.goal_pose(goal(1.0, frame=frame), "odom") == Pose(1.0, 0.0, 0.0)
 
 
@@ -113,7 +113,7 @@ def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """Readings that only took long contradict nothing; a step either way does."""
+    """Slow readings of the clocks do not change it; a step in either direction does."""
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
     assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset
@@ -152,7 +152,7 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 
 
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
-    """The first displacement after a pause holds all motion since, at an unknown speed."""
+    """The first displacement after a pause includes all motion since, at an unknown speed."""
     message = messages.odometry_message(
         OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS
     )
@@ -200,7 +200,10 @@ def test_every_frame_has_the_prefix_as_it_is() -> None:
 
 
 def test_joint_states_are_the_manuals_wheels() -> None:
-    """A metre ahead at 0.1 m/s: A back, B forth, C not at all; in rad and rad/s, of r = 29 mm."""
+    """After 1 m forward at 0.1 m/s, A has turned backwards, B forwards, and C not at all.
+
+    Values are in rad and rad/s, of wheels with a radius of 29 mm.
+    """
     estimate = OdometryEstimate(
         0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)
     )
@@ -224,7 +227,7 @@ def test_joints_whose_rate_is_not_known_have_none() -> None:
 
 
 def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
-    """Each way is turned by the radius of its moment; without a way nothing turns."""
+    """Each way is divided by the radius of its time; at rest a new radius turns nothing."""
     small, large = OmniKinematics(0.029, 0.143), OmniKinematics(0.058, 0.2)
     ahead = [OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(x, 0.0, 0.0)) for x in (1, 2)]
     before = messages.turned(messages.unturned(SETTINGS.wheels), ahead[0], small)
@@ -234,7 +237,7 @@ def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
 
 
 def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
-    """Node, colon, task; the level is a byte."""
+    """The name is node, colon, task; the level is one byte."""
     statuses = [
         Status("Link", Level.OK, "connected", {"Port": "p"}),
         Status("IMU", Level.STALE, "nothing", {}),
@@ -250,7 +253,7 @@ def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
 
 @given(st.floats(-1e4, 1e4))
 def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
-    """The number of turns does not matter."""
+    """This holds for any number of turns."""
     turn = messages.yaw_quaternion(yaw_rad)
     assert math.hypot(turn.z, turn.w) == pytest.approx(1.0)
     assert math.cos(2 * math.atan2(turn.z, turn.w)) == pytest.approx(math.cos(yaw_rad), abs=1e-6)

@@ -16,7 +16,7 @@ PATIENCE_S = 60.0
 
 
 def in_threads(*works: Callable[[], object]) -> None:
-    """All at once, until all are done."""
+    """Run all functions at once, each in a thread, until all are done."""
     threads = [threading.Thread(target=work) for work in works]
     for thread in threads:
         thread.start()
@@ -26,7 +26,7 @@ def in_threads(*works: Callable[[], object]) -> None:
 
 
 class Held:
-    """A delivery that is under way until it is let go."""
+    """A delivery that lasts until ``let_go`` is called."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._begun, self._over = threading.Event(), threading.Event()
@@ -100,7 +100,7 @@ def test_nobody_claims_what_is_not_next() -> None:
 
 
 def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
-    """It finds the place taken, and what it put leaves when that one is done."""
+    """A thread that cannot deliver returns at once; its events leave after the current delivery."""
     outbox = Outbox()
     left: list[str] = []
     held = Held(outbox)
@@ -114,7 +114,7 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 
 
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
-    """The next thread delivers the rest."""
+    """The error is raised in the thread that delivered; the next thread delivers the rest."""
     outbox = Outbox()
     left: list[int] = []
 
@@ -131,7 +131,7 @@ def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
 
 
 def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
-    """They leave after it."""
+    """New events leave after that delivery."""
     outbox = Outbox()
     left: list[int] = []
     outbox.put(lambda: outbox.put(partial(left.append, 2)) or left.append(1))
@@ -140,7 +140,7 @@ def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """What waits does not grow for ever."""
+    """Otherwise the queue would grow without limit."""
     outbox = Outbox()
     left: list[int] = []
     held = Held(outbox)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is printed never waits, and what cannot be printed is lost alone."""
+"""Output to the terminal: the driver never waits for it, and loses only what cannot be printed."""
 
 import fcntl
 import os
@@ -19,7 +19,7 @@ PATIENCE_S = 60.0
 
 
 def taken(pipe: int) -> None:
-    """Wait until it is empty; no event reports that."""
+    """Wait until the pipe is empty; no event reports that."""
     end = time.monotonic() + PATIENCE_S
     while fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)) != struct.pack("i", 0):
         assert time.monotonic() < end
@@ -27,7 +27,7 @@ def taken(pipe: int) -> None:
 
 
 def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
-    """It is written once there is room again."""
+    """The next line is written when the disk has room again."""
     (source, pipe), (heard, room) = os.pipe(), os.pipe()
     disk = os.open("/dev/full", os.O_WRONLY)
     copier = threading.Thread(target=_copy, args=(source, disk))
@@ -45,7 +45,7 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
 
 
 def test_who_prints_more_than_nobody_reads_is_not_held_up() -> None:
-    """More than all buffers on the way hold together."""
+    """The output exceeds all buffers between program and reader."""
     program = """
 import contextlib, os
 from omnibot_driver.output import UnblockedOutput
@@ -65,8 +65,9 @@ with UnblockedOutput():
 
 @pytest.mark.parametrize("lines", [16, 100])
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
-    """Python prints what it ignores, and its own traceback, once the context has ended. The pipe is
-    exactly full, or more waits for it.
+    """Python prints ignored errors, and its own traceback, after the context has ended.
+
+    The pipe is exactly full (16 lines), or more output waits for it (100 lines).
     """
     program = f"""
 import contextlib, os, time
@@ -88,7 +89,7 @@ raise SystemExit("the last words")
 
 
 def test_what_is_printed_at_the_end_is_seen_where_it_is_read() -> None:
-    """Behind what was printed before."""
+    """It comes after what was printed before."""
     program = """
 import os
 from omnibot_driver.output import UnblockedOutput
@@ -102,7 +103,7 @@ raise SystemExit("then the last words")
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
-    """What is printed would go to the board."""
+    """Otherwise printed text would go to the board."""
     program = """
 import os, sys
 from omnibot_driver.output import UnblockedOutput

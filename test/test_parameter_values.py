@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What one parameter may be, and what is said of any other value."""
+"""Valid values of a single parameter, and the message for an invalid one."""
 
 import math
 from dataclasses import replace
@@ -30,7 +30,7 @@ def name_of(parameter: object) -> str | None:
 
 @pytest.mark.parametrize("parameter", FLOATS, ids=name_of)
 def test_an_integer_will_do_for_a_float(parameter: Parameter) -> None:
-    """YAML's 1 is taken as 1.0."""
+    """YAML's 1 is accepted as 1.0."""
     assert parameter.high is not None
     value = parameter.check(int(parameter.high))
     assert type(value) is float
@@ -90,7 +90,7 @@ WRONG_TYPES: dict[type, list[object]] = {
     ids=lambda value: value.name if isinstance(value, Parameter) else repr(value),
 )
 def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object) -> None:
-    """Always by a ParameterError that names the parameter."""
+    """The error is always a ParameterError that names the parameter."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 
@@ -109,7 +109,7 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
     ],
 )
 def test_types_are_told_in_the_words_of_ros(name: str, wrong: object, words: str) -> None:
-    """Those of ``ros2 param describe``; the message explains what YAML made of the word no."""
+    """Types are named as in ``ros2 param describe``; the message explains what YAML made of no."""
     with pytest.raises(ParameterError) as caught:
         PARAMETERS.by_name[name].check(wrong)
     message = str(caught.value)
@@ -141,14 +141,14 @@ def test_any_value_is_either_taken_in_the_right_type_or_refused(
 
 @pytest.mark.parametrize("wrong", [[1, 0, 1], [1, 2, 1], [1, 1, 0.5]])
 def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
-    """Other factors are refused."""
+    """Factors other than 1 and -1 are refused."""
     with pytest.raises(ParameterError, match="each 1 or -1"):
         PARAMETERS.by_name["axis_signs"].check(wrong)
 
 
 @pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
 def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
-    """They may be in any sequence; the result is integers."""
+    """Any kind of sequence is accepted; the result is a list of integers."""
     taken = PARAMETERS.by_name["axis_signs"].check(signs)
     assert taken == [1, -1, 1]
     assert isinstance(taken, list)
@@ -160,14 +160,14 @@ def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
 def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
     parameter: Parameter, wrong: str
 ) -> None:
-    """Both are refused by tf2."""
+    """Both are invalid in tf2."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 
 
 @pytest.mark.parametrize("wrong", ["/", "/robot1/"])
 def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
-    """tf2 knows no such frames; no prefix at all is one."""
+    """Such frames are unknown to tf2; an empty prefix is valid."""
     with pytest.raises(ParameterError, match=r"'frame_prefix'.*such as robot1/"):
         PARAMETERS.by_name["frame_prefix"].check(wrong)
     assert PARAMETERS.by_name["frame_prefix"].check("robot1/") == "robot1/"
@@ -176,7 +176,7 @@ def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
 
 @pytest.mark.parametrize("parameter", VECTORS, ids=name_of)
 def test_a_bias_is_three_numbers_each_within_its_range(parameter: Parameter) -> None:
-    """Integers will do; floats come of it."""
+    """Integers are accepted; the result is floats."""
     assert parameter.high is not None
     taken = parameter.check((1, -1, 0.5))
     assert taken == [1.0, -1.0, 0.5]
@@ -205,7 +205,7 @@ ANY = Parameter("any", ["x"], "", "One word.")
 def test_a_list_may_have_any_length_that_its_row_allows(
     parameter: Parameter, value: object, taken: object
 ) -> None:
-    """The list has numbers or words."""
+    """Its elements are numbers or strings."""
     assert parameter.check(value) == taken
 
 
@@ -224,7 +224,7 @@ def test_a_list_may_have_any_length_that_its_row_allows(
 def test_a_wrong_list_is_refused_with_what_it_may_be(
     parameter: Parameter, wrong: object, sentence: str
 ) -> None:
-    """How many, of what, and what each may be."""
+    """The message says how many elements, of which type, and the range of each."""
     with pytest.raises(ParameterError) as refused:
         parameter.check(wrong)
     assert str(refused.value).startswith(f"parameter '{parameter.name}' {sentence}")

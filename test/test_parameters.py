@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of parameters against the interface, the core and the file."""
+"""The table of parameters, compared with the promised interface, the core and the file."""
 
 from pathlib import Path
 
@@ -69,7 +69,7 @@ def name_of(parameter: object) -> str | None:
 
 @pytest.mark.parametrize(("name", "default"), PROMISED.items())
 def test_every_promised_parameter_is_there_with_its_default(name: str, default: object) -> None:
-    """Value and type: a float stays a float."""
+    """This includes the type: a float stays a float."""
     assert PARAMETERS.by_name[name].default == default
     assert type(PARAMETERS.by_name[name].default) is type(default)
 
@@ -101,7 +101,7 @@ def test_identity_cannot_change_while_it_runs(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["max_linear_speed", "linear_scale", "cmd_vel_timeout"])
 def test_tuning_may_change_while_it_runs(name: str) -> None:
-    """It is found by trying."""
+    """Users find these values by trial."""
     assert not PARAMETERS.by_name[name].fixed
 
 
@@ -133,20 +133,20 @@ def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, me
 
 @given(st.text())
 def test_any_unknown_name_is_refused(name: str) -> None:
-    """The distance to known names does not matter; an empty name is refused too."""
+    """This holds for names that are similar to known ones or not, and for the empty name."""
     if name not in PARAMETERS.by_name and not boards.owners_of(name):
         with pytest.raises(ParameterError, match="the nearest is"):
             check_all({name: 1})
 
 
 def test_one_wrong_value_among_many_is_found() -> None:
-    """The message names it."""
+    """The message names the parameter."""
     with pytest.raises(ParameterError, match="'command_rate'"):
         check_all({"port": "/dev/ttyACM3", "command_rate": 1e6, "baudrate": 9600})
 
 
 def test_a_frame_that_moves_within_itself_is_refused() -> None:
-    """TF would have a loop; the IMU may well be the base."""
+    """TF would have a loop; the IMU frame may equal the base frame."""
     with pytest.raises(ParameterError, match="'odom_frame' must not be 'base_link'"):
         check_all({"odom_frame": "base_link"})
     assert check_all({"imu_frame": "base_link"})
@@ -156,7 +156,7 @@ def test_a_frame_that_moves_within_itself_is_refused() -> None:
 def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
     signs: list[int],
 ) -> None:
-    """Velocities can do with them, places cannot."""
+    """They are valid for velocities; for goal positions they are not."""
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
         check_all({"axis_signs": signs, "control_method": "position"})
@@ -164,7 +164,7 @@ def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
 
 
 def test_values_reach_the_core_under_their_meaning() -> None:
-    """Each is changed, and none is mistaken for another."""
+    """Every value is changed, so a mixed-up parameter is found."""
     values = check_all(
         {
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
@@ -229,7 +229,7 @@ def test_the_file_has_its_former_name_as_well() -> None:
 
 
 def test_the_file_of_parameters_is_the_table() -> None:
-    """Every name with its default, in a type that a strict reader takes."""
+    """It contains every name with its default, of the exact type that a strict reader expects."""
     values = in_the_file()
     assert values == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     for name, value in values.items():
@@ -238,7 +238,7 @@ def test_the_file_of_parameters_is_the_table() -> None:
 
 @pytest.mark.parametrize("parameter", PARAMETERS.rows, ids=name_of)
 def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None:
-    """The comment above each has description, range or choices, and unit."""
+    """The comment above each parameter has description, range or choices, and unit."""
     text = CONFIG.read_text(encoding="utf-8")
     comment = text.split(f"\n    {parameter.name}:")[0].rsplit("\n\n", 1)[-1]
     words = " ".join(comment.replace("#", " ").split())
@@ -252,7 +252,7 @@ def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None
 def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
     kind: str, unit: str, fastest: float
 ) -> None:
-    """Above it every displacement would be rejected, and odometry would stop without a word."""
+    """Odometry would reject every displacement above it and stop without a message."""
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest
     with pytest.raises(ParameterError) as refused:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Publishers of a real node, and the stamps of what is published by its clock."""
+"""Publishers of a real node, and stamps from the node's clock."""
 
 import json
 import subprocess
@@ -48,7 +48,7 @@ def node() -> Iterator[Node]:
 
 
 def session_with(node: Node) -> tuple[Session, Publishing]:
-    """A session that hears nothing but what a test has it hear."""
+    """Return a session that receives only what the test gives it, and its publishing."""
     session = Session(
         omnibot.make(VALUES),
         parameters.session_settings(VALUES, omnibot.kinematics(VALUES)),
@@ -64,7 +64,7 @@ def session_with(node: Node) -> tuple[Session, Publishing]:
 
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:
-    """The executor looks at each thing that it waits for, rclpy's own publisher's included."""
+    """Event handlers cost time: the executor checks each one, even of rclpy's own publisher."""
     script = (
         "import rclpy\n"
         "from omnibot_driver.node import OmniBotDriver\n"
@@ -84,7 +84,7 @@ def test_a_command_waits_for_no_events_of_publishers() -> None:
 def test_stamps_follow_simulated_time_while_there_is_any(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whether it begins before the driver or later, and after it ends they are the system's."""
+    """Simulated time may begin before the driver or later; after it, stamps are system time."""
     published: list[bytes] = []
 
     def published_at_s() -> float:
@@ -104,13 +104,13 @@ def test_stamps_follow_simulated_time_while_there_is_any(
         assert published_at_s() == pytest.approx(5.0, abs=1.0)
         simulate(False)
         assert published_at_s() == pytest.approx(time.time(), abs=1.0)
-        publishing._time_watch.unregister()  # rcl would go on calling one that is no more
+        publishing._time_watch.unregister()  # otherwise rcl calls it after it was destroyed
 
 
 def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its clock goes in steps: between two of them time stands still; a jump back is followed."""
+    """Stamps increase even between two steps of the simulated clock; a jump back is followed."""
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
     stamps_ns: dict[str, list[int]] = {"_imu": [], "_odometry": []}
@@ -151,7 +151,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A robot that has come far and stands does not turn them."""
+    """The angles of a robot at rest do not change when the parameters do."""
     _, publishing = session_with(node)
     published: list[bytes] = []
     monkeypatch.setattr(publishing._joints, "publish", published.append)
@@ -167,7 +167,7 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another thread may publish in the middle of it, and nothing tells of the end but the end."""
+    """Another thread may publish during the read; the published state must be the last one."""
     session, publishing = session_with(node)
     published: list[str] = []
     monkeypatch.setattr(publishing._state, "publish", lambda state: published.append(state.data))
@@ -198,7 +198,7 @@ def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
 
 @dataclass(frozen=True, slots=True)
 class Charge:
-    """A value of one board's own kind."""
+    """A value that only one board has."""
 
     volts: float
 

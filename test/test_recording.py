@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``replay://``: the wire as a bag holds it, and every way in which it cannot be had."""
+"""``replay://``: the bytes of a recorded line from a bag, and every way in which this can fail."""
 
 import sys
 from pathlib import Path
@@ -18,7 +18,7 @@ from omnibot_driver.recording import is_recording, open_recording
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 RAW = "std_msgs/msg/UInt8MultiArray"
 RX = "/omnibot_driver/raw_rx"
-# CDR by hand: little endian; no dimension, offset 0, the count, the bytes.
+# CDR typed by hand: little endian; without a dimension, offset 0, the count, the bytes.
 CHUNKS = [
     (1_790_000_000_000_000_000, b"Paused: 0 \n"),
     (1_790_000_000_000_000_001, b"\xff\xfa\x00"),
@@ -35,7 +35,7 @@ def cdr(data: bytes) -> bytes:
 def bag(
     path: Path, *topics: str, plugin: StoragePlugin = StoragePlugin.MCAP, kind: str = RAW
 ) -> Path:
-    """A bag in which each topic holds the chunks."""
+    """Write a bag in which each topic contains the chunks; return its path."""
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         for topic in topics:
             connection = writer.add_connection(topic, kind, typestore=TYPES)
@@ -46,7 +46,7 @@ def bag(
 
 @pytest.mark.parametrize("plugin", StoragePlugin)
 def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlugin) -> None:
-    """This holds for both kinds of storage, and for the bag's single file."""
+    """This holds for both storage formats, and for the bag's single file."""
     path = bag(tmp_path / "bag", "/omnibot_driver/raw_tx", RX, plugin=plugin)
     (file,) = (found for found in path.iterdir() if found.suffix != ".yaml")
     for place in (path, file):
@@ -54,7 +54,7 @@ def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlug
 
 
 def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
-    """Two robots in one bag: their topics tell them apart."""
+    """A bag may have two robots, which differ by their topics."""
     path = bag(tmp_path / "bag", "/robot1/omnibot_driver/raw_rx", "/robot2/omnibot_driver/raw_rx")
     recording = open_recording(
         f"replay://{path}?speed=2.5&delay=0&topic=/robot2/omnibot_driver/raw_rx"
@@ -76,7 +76,7 @@ def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: P
 
 
 def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_path: Path) -> None:
-    """Others have time to find the driver; the topic is the one there is."""
+    """Five seconds let other nodes find the driver; the bag's single topic is chosen."""
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     assert (recording.speed, recording.delay_s, recording.topics) == (1.0, 5.0, (RX,))
 
@@ -101,14 +101,14 @@ def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why:
 
 
 def test_a_bag_without_the_wire_says_how_to_record_it(tmp_path: Path) -> None:
-    """The commonest mistake."""
+    """The usual cause is a recording without ``publish_raw``."""
     path = bag(tmp_path / "bag", "/odom", kind="std_msgs/msg/String")
     with pytest.raises(ParameterError, match="record with `publish_raw: true`"):
         open_recording(f"replay://{path}")
 
 
 def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
-    """All that could be meant are named."""
+    """The message names all topics that could be meant."""
     path = bag(tmp_path / "bag", "/b/raw_rx", "/a/raw_rx")
     with pytest.raises(ParameterError, match="topic=/a/raw_rx or topic=/b/raw_rx"):
         open_recording(f"replay://{path}")
@@ -151,7 +151,7 @@ def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> Non
 
 
 def test_only_its_own_urls_are_taken() -> None:
-    """A device may have any name."""
+    """A device may have any other name."""
     assert is_recording("replay://x")
     assert not is_recording("/dev/replay")
     assert not is_recording("sim://")

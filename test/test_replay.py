@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A recorded wire, heard again: the same every time, however fast, and as it was when recorded."""
+"""A recorded line, replayed: the same result every time, at any speed, and as when recorded."""
 
 import itertools
 import math
@@ -34,7 +34,7 @@ Chunks = list[tuple[int, bytes]]
 
 @dataclass(frozen=True)
 class Tape:
-    """A recording without a bag."""
+    """A recording that is not from a bag."""
 
     content: Iterable[tuple[int, bytes]]
     speed: float = math.inf
@@ -46,7 +46,7 @@ class Tape:
 
 
 class Heard(Listener):
-    """The events of a replay, with the state after each."""
+    """A listener that keeps the events of a replay, and each new state."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -83,7 +83,7 @@ def play(tape: Tape) -> Heard:
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:
-    """What a moving board would have sent; nothing in the silent ticks."""
+    """Return what a moving board would have sent, with their times; silent ticks are left out."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     board.receive(bytes.fromhex("FF FE 01 00 0E 00 07 00 32"))
     found = []
@@ -100,7 +100,7 @@ BAD_LINE = simulated(1500, line=FaultyLine(LineFaults(lose=0.003, burst=0.0003, 
 
 
 def measured(events: Iterable[Event]) -> list[tuple[object, ...]]:
-    """The measurements without their stamps."""
+    """Return the measurements without their stamps."""
     found: list[tuple[object, ...]] = []
     for event in events:
         if isinstance(event, ImuEstimate):
@@ -131,7 +131,7 @@ def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
 
 
 def test_every_replay_is_the_same() -> None:
-    """Measurements, stamps, states and warnings agree, also on a damaged wire."""
+    """Measurements, stamps, states and warnings agree, also on a damaged line."""
     first, second = play(Tape(BAD_LINE)), play(Tape(BAD_LINE))
     assert len(measured(first.events)) > 1000
     assert any(isinstance(event, Notice) and event != ENDED for event in first.events)
@@ -140,13 +140,13 @@ def test_every_replay_is_the_same() -> None:
 
 
 def test_the_pace_makes_no_difference() -> None:
-    """What is played faster is heard the same."""
+    """A faster replay has the same events."""
     tape = Tape(BAD_LINE[:100])
     assert play(replace(tape, speed=5.0)).events == play(tape).events
 
 
 def test_time_passes_as_it_did() -> None:
-    """A silence in the recording is noticed, however fast it is played; the end as well."""
+    """A silence in the recording is noticed at any speed, and so is the end."""
     heard = play(Tape(simulated(600, silent=range(200, 400))))
     assert heard.states == [
         *("connecting", "nominal"),
@@ -157,13 +157,13 @@ def test_time_passes_as_it_did() -> None:
 
 
 def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
-    """It has no command here, and no message asks to switch it off."""
+    """The replay has no commands, so it must not warn of motion without a command."""
     heard = play(Tape(simulated(600)))
     assert [event for event in heard.events if isinstance(event, Notice)] == [ENDED]
 
 
 def test_stamps_are_times_of_the_recording() -> None:
-    """They begin with its first bytes and go on with the board's ticks."""
+    """They begin with the first bytes and continue with the board's ticks."""
     heard = play(Tape(simulated(300)))
     stamps = [event.stamp_s for event in heard.events if isinstance(event, ImuEstimate)]
     assert len(stamps) == 300
@@ -173,7 +173,7 @@ def test_stamps_are_times_of_the_recording() -> None:
 
 
 def test_a_recording_can_be_left_before_its_end() -> None:
-    """Closing does not wait for it, nor for its beginning."""
+    """Closing does not wait for the recording's end, nor for its beginning."""
     for tape in (Tape(BAD_LINE, speed=1e-3), Tape(BAD_LINE, delay_s=3600.0)):
         replay, heard = start(tape)
         if tape.delay_s == 0.0:
@@ -185,7 +185,7 @@ def test_a_recording_can_be_left_before_its_end() -> None:
 
 
 def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
-    """A request that the end overtakes is answered; afterwards the port is not open."""
+    """A request that is open at the end is answered; later ones find the port closed."""
     endless = ((EPOCH_NS + n * TICK_NS, data) for n, (_, data) in enumerate(itertools.cycle(TAPE)))
     stop = threading.Event()
     tape = Tape(itertools.takewhile(lambda _: not stop.is_set(), endless), speed=1.0)
@@ -206,7 +206,7 @@ TAPE = simulated(100)
 
 
 def test_a_recording_that_breaks_off_says_so() -> None:
-    """The messages until then are valid."""
+    """Events before that are valid."""
 
     def broken() -> Iterator[tuple[int, bytes]]:
         yield from TAPE

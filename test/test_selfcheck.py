@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What surrounds a port, by a sysfs made up in a temporary folder."""
+"""Checks of a port's surroundings, with an artificial sysfs in a temporary folder."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from omnibot_driver import selfcheck
 
 
 def adapter(root: Path, device: str, latency: str) -> Path:
-    """A sysfs with one adapter in it."""
+    """Create a sysfs with one adapter; return its root."""
     folder = root / "class/tty" / device / "device"
     folder.mkdir(parents=True)
     (folder / "latency_timer").write_text(latency)
@@ -19,7 +19,7 @@ def adapter(root: Path, device: str, latency: str) -> Path:
 
 
 def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) -> None:
-    """FTDI's default is reported, with a permanent remedy and one for now."""
+    """The message for FTDI's default has a permanent remedy and one that works until unplugging."""
     text = selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", "16\n"))
     assert "16 ms" in text
     assert "udev/99-omnibot.rules" in text

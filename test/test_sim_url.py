@@ -14,14 +14,14 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
-    """The board boots, is started, obeys a command and is heard of, in real time."""
+    """The board boots, is started, obeys a command and reports odometry, in real time."""
     listener, ours = Listener(), session()
     link = link_to("sim://", listener, ours)
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
 
     def drives() -> bool:
-        """Commanded again and again: a machine that hangs stops the robot."""
+        """Command again at each call, since a machine that hangs lets the command time out."""
         link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
         return any(
             isinstance(event, OdometryEstimate) and event.twist and event.twist.vx_mps > 0.1
@@ -34,7 +34,7 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
 
 
 def test_a_board_that_ends_with_the_driver_needs_no_guard() -> None:
-    """No warning of a robot that would go on."""
+    """The driver does not warn that the robot would continue."""
     listener, ours = Listener(), session()
     link = link_to("sim://?running", listener, ours)
     link.start()

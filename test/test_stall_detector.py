@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the watchdog's thread stood still, and which commands had waited meanwhile."""
+"""Detection of stalls of the watchdog's thread, and of commands that waited meanwhile."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from omnibot_driver.keeper import BEAT_S
 from omnibot_driver.stall_detector import SETTLE_S, STANDSTILL_S, StallDetector
 
 DAY_NS = 1_700_000_000_000_000_000
-"""The time of day when the steady clock shows 0."""
+"""Wall-clock time at which the steady clock shows 0, in ns."""
 
 
 def wall_ns(now: float) -> int:
@@ -17,7 +17,7 @@ def wall_ns(now: float) -> int:
 
 
 def resumed(length_s: float) -> StallDetector:
-    """A detector that ran until 100, and again from ``length_s`` later on."""
+    """Return a detector that ran until 100 s, and again from ``length_s`` later."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     standstill.begun(100.0 + length_s)
@@ -26,9 +26,9 @@ def resumed(length_s: float) -> StallDetector:
 
 
 def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
-    """A busy machine may keep it waiting a little."""
+    """A busy machine may delay it a little."""
     standstill = StallDetector()
-    assert standstill.begun(5.0) == 0.0  # not even before it ever ran
+    assert standstill.begun(5.0) == 0.0  # also before its first run
     for now in (10.0, 10.1, 10.45):
         assert standstill.begun(now) == 0.0
         standstill.passed(now, wall_ns(now))
@@ -56,14 +56,14 @@ def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
 
 
 def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
-    """Ran until ``begin``, and again from ``end`` on."""
+    """Let the detector run until ``begin``, and again from ``end``."""
     standstill.passed(begin, wall_ns(begin))
     standstill.begun(end)
     standstill.passed(end, wall_ns(end))
 
 
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
-    """A computer that is this busy stalls the driver again before a retransmission brings it."""
+    """A very busy computer stalls the driver again before a retransmission delivers the command."""
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
     stalls_again(standstill, 105.5, 106.2)
@@ -76,7 +76,7 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """What was sent then has come, or never will."""
+    """Commands sent then have arrived, or never will."""
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)
     standstill.passed(201.3, wall_ns(201.3))
@@ -85,21 +85,21 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """It lay in a queue when the driver stalled, and is taken long after the end."""
+    """It waited in a queue when the driver stalled, and is processed long after the end."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(99.9), 103.4)
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """Its sender's clock is not known more precisely than its fastest message."""
+    """The offset of its sender's clock is known only as exactly as its fastest message."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(103.001), 103.4)
 
 
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
-    """A retransmission may bring it up to ten seconds late."""
+    """A retransmission may deliver it up to ten seconds late."""
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
     assert not standstill.outlived_by(wall_ns(104.9), 108.0)
@@ -110,7 +110,7 @@ def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """The sender is not locked out for good."""
+    """Later commands of this sender are accepted again."""
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)
     standstill.passed(106.0, wall_ns(106.0))
@@ -118,5 +118,5 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
 
 
 def test_whenever_the_guard_steps_in_the_driver_notices() -> None:
-    """Otherwise the two of them would contradict each other on the line."""
+    """Otherwise guard and driver would send contradictory commands."""
     assert 3 * BEAT_S < STANDSTILL_S < LIMIT_S

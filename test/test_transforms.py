@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""tf2_ros there, and not there."""
+"""The publisher of transforms, with and without tf2_ros."""
 
 import sys
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ from omnibot_driver.transforms import transform_publisher
 
 
 class FakeNode:
-    """A node that records warnings."""
+    """A node that keeps its warnings."""
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
@@ -22,7 +22,7 @@ class FakeNode:
 
 
 def test_without_tf2_there_is_one_warning_and_no_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It says what to install, and how to be rid of it."""
+    """The warning says what to install, and how to switch it off."""
     monkeypatch.setitem(sys.modules, "tf2_ros", None)
     node = FakeNode()
     assert transform_publisher(node) is None

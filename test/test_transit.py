@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How long commands were under way, with clocks that are off, drift and step."""
+"""Delays of commands between sender and driver, with clocks that are off, drift and step."""
 
 from dataclasses import dataclass, field
 
@@ -36,7 +36,7 @@ class Sender:
 
 @dataclass
 class Receiver:
-    """``ahead_s``: of its time of day; its steady clock is right."""
+    """The driver's clock is ahead of the true time by ``ahead_s``; its steady clock is right."""
 
     ahead_s: float = 0.0
     transit: Transit = field(default_factory=Transit)
@@ -44,7 +44,7 @@ class Receiver:
     def hear(
         self, sender: Sender, sent_s: float, under_way_s: float = 0.0, waited_s: float = 0.0
     ) -> Delay:
-        """A message sent at this true time."""
+        """Receive a message that was sent at the true time ``sent_s``; return its delay."""
         sender.sent += 1
         received_s = sent_s + under_way_s
         now_s = received_s + waited_s
@@ -75,9 +75,7 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """The time on the way and in our queue counts; the reported delay never exceeds the true
-    one.
-    """
+    """The delay is the time on the way and in our queue; its estimate never exceeds the truth."""
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
         now_s += pause_s
@@ -91,7 +89,7 @@ def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apar
 def test_a_command_that_was_under_way_for_longer_is_refused(
     sender_s: float, receiver_s: float, numbered: bool, late_s: float, silent_s: float
 ) -> None:
-    """After any silence, of any sender, and the next one that comes in time is not."""
+    """This holds after any silence and for any sender; the next command in time is accepted."""
     receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
     for number in range(10):
         assert not refused(receiver.hear(sender, 100.0 + 0.1 * number, 0.01))
@@ -115,7 +113,7 @@ def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_fir
 
 @given(st.sampled_from([1, -1]), st.floats(1.0, 1e6), st.booleans())
 def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, shared: bool) -> None:
-    """NTP sets the clock of a robot that has none of its own; senders on it step with it."""
+    """NTP steps the clock of a robot without a battery clock; senders on the robot step with it."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(1000):
         now_s += 0.1
@@ -131,7 +129,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
 ) -> None:
-    """It looks like a network that has become slow, which would have been reported."""
+    """A step back looks like a network that has become slow, so it is accepted after a while."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for _ in range(100):
         now_s += 0.1
@@ -160,7 +158,7 @@ def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
 
 
 def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
-    """Each follows a silence, like single key presses on a bad network."""
+    """Each late command follows a silence, like single key presses on a bad network."""
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.01)
     for number in range(20):
@@ -168,7 +166,7 @@ def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() 
 
 
 def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> None:
-    """Reliable transport repeats them all, the oldest first."""
+    """Reliable transport sends them all again, the oldest first."""
     receiver, sender = Receiver(), Sender()
     for number in range(50):
         receiver.hear(sender, 100.0 + 0.1 * number, 0.01)
@@ -180,7 +178,7 @@ def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> 
 def test_two_senders_with_clocks_of_their_own_are_both_heard(
     one_s: float, other_s: float, turns: list[int]
 ) -> None:
-    """One is ahead of the other by hours, and has sent before."""
+    """One clock is hours ahead of the other; its sender has sent before."""
     receiver, senders, now_s = Receiver(), (Sender(one_s, sent=1000), Sender(other_s)), 100.0
     for sender in senders:
         receiver.hear(sender, now_s, 0.01)
@@ -190,7 +188,7 @@ def test_two_senders_with_clocks_of_their_own_are_both_heard(
 
 
 def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
-    """Their clocks agree, as those of one host do."""
+    """Their clocks agree, since both run on one host."""
     receiver, old, new = Receiver(), Sender(sent=1000), Sender()
     for number in range(20):
         receiver.hear(old, 100.0 + 0.1 * number, 0.01)
@@ -200,7 +198,7 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
 
 
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
-    """``ros2 topic pub --once``, again and again, from a computer whose clock is behind."""
+    """``ros2 topic pub --once`` is run repeatedly, also on a computer whose clock is behind."""
     receiver = Receiver()
     for number in range(20):
         assert not refused(receiver.hear(Sender(), 100.0 + number, 0.01))
@@ -210,7 +208,7 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """The drift lasts a day, with an hour of silence now and then."""
+    """The drift lasts for ten hours, with an hour of silence now and then."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -219,7 +217,7 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
-    """It names the network or this computer."""
+    """It names the network, or this computer's load."""
     with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
         Delay(1.2, 0.1).require("cmd_vel", 0.5)
     with pytest.raises(CommandRefused, match=r"1\.1 s of it in this driver's queue.* load"):
@@ -228,7 +226,7 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """The first of a sender was late by half a second: its clock seems to be half a second off."""
+    """A sender whose first message is 0.5 s late seems to have a clock that is 0.5 s off."""
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
     seems_ns, says_ns = receiver.hear(sender, 101.0, 0.7).sent_ns
@@ -237,7 +235,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """Its clock alone may claim anything."""
+    """The sender's clock alone may claim anything."""
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):
         delay = receiver.hear(sender, 100.0 + number, 0.01)

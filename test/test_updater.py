@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""diagnostic_updater there, and not there."""
+"""Diagnostics with and without the library diagnostic_updater."""
 
 import sys
 from collections.abc import Callable
@@ -27,10 +27,10 @@ class Wrapper:
 
 
 class Updater:
-    """Runs its tasks when forced to; ``reports`` are what came of it."""
+    """Runs its tasks when forced to; ``reports`` are the results."""
 
     def __init__(self, node: object, period_s: float) -> None:
-        self.period = 2 * period_s  # as its parameter says
+        self.period = 2 * period_s  # a parameter may change the period
         self.node, self.hardware_id, self.keeps_ros_time = node, "", True
         self.timer = SimpleNamespace(cancel=lambda: setattr(self, "keeps_ros_time", False))
         self.tasks: list[tuple[str, Callable[[Wrapper], Wrapper]]] = []
@@ -48,7 +48,7 @@ class Updater:
 
 
 def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No report, as the message is the same."""
+    """This is not reported, since the published message is the same."""
     monkeypatch.setitem(sys.modules, "diagnostic_updater", None)
     assert _through_updater(SimpleNamespace(), "/dev/omnibot") is None
 
@@ -56,7 +56,7 @@ def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch)
 def test_with_the_updater_each_status_is_a_task_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each is added once, and filled in every report, at the library's pace."""
+    """Each task is added once and fills every report, at the period that the library gives."""
     made: list[Any] = []
 
     def make(node: object, period_s: float) -> Updater:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How much Python is called for each tick of the nominal stream: a guard that counts, not times.
+"""Bounds for the number of Python calls per tick of the nominal stream; times are not measured.
 
-A bound is a little above what was counted when it was set. A change that makes the path longer
-raises it, and says in docs/internals/performance.md what for.
+A bound is a little above the count when it was set. A change that makes the path longer raises the
+bound and gives the reason in docs/internals/performance.md.
 """
 
 import gc
@@ -35,11 +35,11 @@ TICK_S = 0.01
 SETTLED = 400
 TICKS = 400
 IMU, DELTA, POSE = 14, 14 + 9, 14 + 9 + 15
-"""What a tick brings, by its length in bytes."""
+"""Kinds of ticks, by their length in bytes."""
 
 
 def calls(work: Callable[[], object]) -> int:
-    """The number of Python functions that this calls."""
+    """Count the calls of Python functions in ``work``."""
     count = 0
 
     def see(_frame: FrameType, event: str, _argument: object) -> None:
@@ -47,7 +47,7 @@ def calls(work: Callable[[], object]) -> int:
         count += event == "call"
 
     before = sys.getprofile()
-    gc.disable()  # Hypothesis is called when it runs, and is not part of the work
+    gc.disable()  # Hypothesis has a callback for it, which is not part of the work
     sys.setprofile(see)
     try:
         work()
@@ -58,7 +58,7 @@ def calls(work: Callable[[], object]) -> int:
 
 
 def opened_session() -> Session:
-    """A session as the driver makes it."""
+    """Return a session as the driver makes it."""
     values = boards.check_all({})
     session = Session(
         omnibot.make(values),
@@ -73,7 +73,7 @@ def opened_session() -> Session:
 def most_calls(
     work: Callable[[bytes, float], object], rest: Callable[[float], None] = lambda _now: None
 ) -> dict[int, float]:
-    """Mean number of calls for each kind of tick of a running board."""
+    """Return the mean number of calls for each kind of tick of a running board."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}
     for tick in range(SETTLED + TICKS):
@@ -88,7 +88,7 @@ def most_calls(
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 14), (DELTA, 9), (POSE, 9)])
 def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """One read of one tick."""
+    """The calls are counted in one read of one tick."""
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
@@ -108,7 +108,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """What is called before the reading can be published."""
+    """The calls are counted until the reading can be published."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
@@ -122,7 +122,7 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
 
 
 def test_a_command_calls_no_more_than_it_did() -> None:
-    """The calls are counted from the bytes of a Twist to those on the wire, on a running board."""
+    """The calls are counted from a Twist's bytes to the packets for a running board."""
     session, board, now = opened_session(), SimulatedBoard(BoardSettings(running=True)), 0.0
     for tick in range(SETTLED):
         now = tick * TICK_S
@@ -141,7 +141,7 @@ def test_a_command_calls_no_more_than_it_did() -> None:
 
 
 def test_a_serialised_tick_calls_no_more_than_it_did() -> None:
-    """An Imu, an Odometry and a JointState from their estimates."""
+    """An Imu, an Odometry and a JointState are serialised from their estimates."""
     settings = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     make, before = Serializer(settings), unturned(settings.wheels)
     imu = ImuEstimate(0.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))

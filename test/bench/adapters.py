@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a USB adapter hands over what the line brings: whole, in pieces, in packets behind a timer.
+"""How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
-Knows the pace of the line and times; not what the bytes are. Times in seconds.
+The module knows the line's pace, but nothing of frames. Times are in s.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,23 +12,23 @@ from typing import Final
 BYTE_S: Final = 10 / 115200
 LARGEST_PIECE: Final = 16
 PACKET: Final = 62
-"""What an FTDI's packet holds."""
+"""Size of an FTDI packet in bytes."""
 DRIFT: Final = 1.0002
-"""The adapter's clock against the board's: in 8 s its packets end at every moment of a tick."""
+"""Rate of the adapter's clock against the board's: in 8 s packets end at all phases of a tick."""
 
 Handed = tuple[float, bytes]
-"""When it is handed over, and what."""
+"""Time of delivery, and bytes."""
 Ticks = Iterator[tuple[float, bytes]]
 Adapter = Callable[[Ticks, Random], Iterator[Handed]]
 
 
 def whole(ticks: Ticks, _random: Random) -> Iterator[Handed]:
-    """All of a tick, as soon as it begins: the fastest stimulus there is."""
+    """Deliver all bytes of a tick when it begins, which is faster than any adapter."""
     yield from ticks
 
 
 def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
-    """1 to 16 bytes at the pace of the line, as CDC, CH340 and CP210x adapters do."""
+    """Deliver 1 to 16 bytes at the line's pace, as CDC, CH340 and CP210x adapters do."""
     for at, data in ticks:
         start = 0
         while start < len(data):
@@ -38,7 +38,7 @@ def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
 
 
 def packets(timer_s: float) -> Adapter:
-    """62 bytes, or what there is when the latency timer runs out, as FTDI's adapters do."""
+    """Make an adapter like FTDI's: 62 bytes, or what there is when its latency timer expires."""
 
     def handed(ticks: Ticks, random: Random) -> Iterator[Handed]:
         held, out = bytearray(), -1.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The core alone: decoding against a trusting loop, linearity, memory over an hour of stream."""
+"""Measurements of the core alone: decoding against a trusting loop, linearity, and memory."""
 
 import gc
 import os
@@ -27,9 +27,9 @@ BYTES_PER_S = 1700.0
 CHUNKS = (1, 14, 64, 4096)
 SECONDS = 120.0
 SETTLED = 400
-"""Ticks."""
+"""Number of ticks before a measurement begins."""
 OTHERS_BYTES = 24 << 20
-"""More than a processor's own caches hold."""
+"""Bytes that exceed the processor's caches."""
 FAULTY = "1 byte in 100 lost"
 STREAMS = (("clean", ""), (FAULTY, FAULTY))
 GOALS = {"clean": 1.5, FAULTY: 4.0}
@@ -38,7 +38,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB
 
 
 def trust(data: bytes) -> list[Frame]:
-    """The floor: every header is one, and a frame follows it."""
+    """Decode without checks, as the floor: every header is regarded as one of a full frame."""
     frames: list[Frame] = []
     at, size = 0, len(data) - 15
     while at < size:
@@ -59,12 +59,12 @@ def trust(data: bytes) -> list[Frame]:
 
 
 def trust_all(blocks: Sequence[bytes]) -> int:
-    """The frames are not kept, as with ``decode``: to keep them all costs half as much again."""
+    """Count the frames of all blocks; as in ``decode`` they are not kept, since that costs time."""
     return sum(len(trust(block)) for block in blocks)
 
 
 def decode(chunks: Sequence[bytes]) -> int:
-    """With arrival times of a line that is never idle; how many frames there were."""
+    """Decode with arrival times of a line without pauses; return the number of frames."""
     decoder, now, frames = FrameDecoder(), 0.0, 0
     for chunk in chunks:
         now += len(chunk) / BYTES_PER_S
@@ -73,7 +73,7 @@ def decode(chunks: Sequence[bytes]) -> int:
 
 
 def stream(seconds: float, fault: str = "") -> bytes:
-    """Of a robot that drives; whole, or with this fault."""
+    """Return the stream of a robot that drives, undamaged or with this fault."""
     truth = generate(SCENARIOS["driving"], 1, seconds)
     return receive(truth, FAULTS[fault], Random(1)).data if fault else bytes(truth.data)
 
@@ -100,7 +100,7 @@ def decoding(times: int) -> list[Figure]:
 
 
 def linearity() -> list[str]:
-    """Time per megabyte of streams up to 2.5 hours long; rows of a table."""
+    """Return rows of a table: time per MB for streams of up to 2.5 hours."""
     rows = ["| stream | 1 MB | 4 MB | 16 MB |", "|---|---|---|---|"]
     for name, fault in STREAMS:
         block = stream(600.0, fault)[: 1 << 20]
@@ -113,7 +113,7 @@ def linearity() -> list[str]:
 
 
 def cold(ticks: int) -> str:
-    """What a read of one IMU frame takes until it can be published, in a loop and as it happens."""
+    """Measure the time from a read to its publishable IMU reading, with and without warm caches."""
     session, board = _session(), SimulatedBoard(BoardSettings(seed=1, running=True))
     other = bytearray(OTHERS_BYTES)
     taken: dict[bool, list[float]] = {False: [], True: []}
@@ -138,7 +138,7 @@ def cold(ticks: int) -> str:
 
 
 def memory(hours: float = 1.0) -> str:
-    """Bytes through decoder and session as fast as it goes; resident memory meanwhile."""
+    """Play a stream to decoder and session as fast as possible, and report resident memory."""
     session = _session()
     data, now, events = stream(SECONDS), 0.0, 0
     resident_mb = []
@@ -184,7 +184,7 @@ def _us_per_frame(work: object, data: object, frames: int) -> float:
 
 
 def _seconds(work: object, data: object) -> float:
-    """Processor time of one call, so that others on the machine count little."""
+    """Return the processor time of one call in s, which other processes hardly influence."""
     assert callable(work)
     gc.collect()
     begun = time.process_time()

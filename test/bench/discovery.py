@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What discovery costs a fleet, with and without a Fast DDS discovery server: docs/fleet.md.
+"""Cost of discovery in a fleet, with and without a Fast DDS discovery server: docs/fleet.md.
 
-``unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]`` needs root. In a network
-namespace of its own only this traffic is counted. The drivers talk over UDP alone, as on several
-computers, but run on this one. Prints rows of a table.
+``unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]`` needs root. In its own
+network namespace only this traffic is counted. The drivers run on this computer, but use only UDP,
+as on several computers. It prints rows of a table.
 """
 
 import os
@@ -32,14 +32,14 @@ print(time.monotonic() - begun)
 
 
 def packets_and_bytes() -> tuple[int, int]:
-    """What has arrived over the loopback so far."""
+    """Return the packets and bytes that have arrived over the loopback so far."""
     line = next(row for row in Path("/proc/net/dev").read_text().splitlines() if " lo:" in row)
     words = line.partition(":")[2].split()
     return int(words[1]), int(words[0])
 
 
 def processor_s(pids: list[int]) -> float:
-    """Processor time of these processes so far, user and system."""
+    """Return the processor time of these processes so far, user and system, in s."""
     total = 0
     for pid in pids:
         words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
@@ -48,7 +48,7 @@ def processor_s(pids: list[int]) -> float:
 
 
 def measure(number: int, *, served: bool) -> str:
-    """One row: start the fleet, find it, then watch it at rest."""
+    """Start the fleet, find it, and watch it at rest; return one row."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT),

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Another process's callback: notes when which Imu came, until its standard input ends.
+"""A subscriber in its own process: notes the time of each message until its input ends.
 
-Arguments: namespaces. Prints one JSON object with an array per namespace: ``heard`` has pairs of
+Arguments: namespaces. It prints one JSON object with an array per namespace: ``heard`` has pairs of
 the steady clock's time in s and the acceleration along x, ``odometries`` the times alone.
 """
 
@@ -22,7 +22,7 @@ from sensor_msgs.msg import Imu, JointState
 
 
 def main() -> None:
-    """Listen to everything of every namespace."""
+    """Subscribe to all measurements of every namespace."""
     namespaces = sys.argv[1:]
     rclpy.init()
     node = Node("ear", start_parameter_services=False, enable_rosout=False)
@@ -41,7 +41,7 @@ def main() -> None:
         node.create_subscription(JointState, f"{namespace}/joint_states", lambda _joints: None, 100)
     threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()), daemon=True).start()
     print("listening", flush=True)
-    with suppress(ExternalShutdownException, RCLError):  # shut down while it waits, or works
+    with suppress(ExternalShutdownException, RCLError):  # shut down while waiting or working
         rclpy.spin(node)
     print(json.dumps({"heard": heard, "odometries": odometries}), flush=True)
 

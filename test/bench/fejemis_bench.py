@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of ``make bench``: how long the front angle is on its way to the drive board.
+"""The Fejemis's part of ``make bench``: delay of the front angle on its way to the drive board.
 
-A simulated pair on two pseudo-terminals in a process of its own, the driver's link without ROS in
-this one, and processes that compute all the time beside both.
+A simulated pair runs on two pseudo-terminals in its own process, the driver's link in this one
+without ROS, and busy processes beside both.
 """
 
 import contextlib
@@ -37,16 +37,16 @@ from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
 BESIDE: Final = (0, 2, 4)
-"""Busy processes."""
+"""Numbers of busy processes."""
 SETTLES_S: Final = 3.0
 TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
 RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Both halves in real time: when each angle left, and when it came to drive.
+    """Run both boards in real time; send how long each angle took to the drive board, in s.
 
-    The wheel swings from side to side, so that each angle of the last while is another one.
+    The wheel swings from side to side, so that recent angles differ.
     """
     pair = SimulatedFejemis()
     drive, _ = masters
@@ -78,13 +78,13 @@ def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
 
 
 def compute() -> None:
-    """Until it is killed."""
+    """Compute until the process is killed."""
     while True:
         sum(range(1000))
 
 
 def drive_for(seconds: float, ports: Sequence[str]) -> None:
-    """The driver's link, commanded at 20 Hz."""
+    """Run the driver's link with commands at 20 Hz."""
     settings = SessionSettings(
         limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
     )
@@ -112,7 +112,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """How long each angle took, in order of length."""
+    """Return the delay of each angle in ms, sorted."""
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
         tty.setraw(near)
@@ -133,7 +133,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """No figures with a floor; a table of the relayed angle, alone and beside busy processes."""
+    """Return a table of the delays, alone and beside busy processes; no figure has a floor."""
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",
         "",

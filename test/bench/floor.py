@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The floor: the smallest program that does the same without looking at what it does.
+"""The floor: the smallest program with the same output as the driver, without any checks.
 
-``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, an Odometry and a JointState
-for every delta, trusting the second byte of what looks like a frame; ``commands PORT NAMESPACE``
-writes a frame for every cmd_vel. Each fills in one number, by which a message is known again.
-``bare PORT NAMESPACE`` has the topics and services of the driver, and does nothing: its memory is
-what ROS takes.
+``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, and an Odometry and a
+JointState for every delta, trusting the second byte of what looks like a frame. ``commands PORT
+NAMESPACE`` writes a frame for every cmd_vel. Each message or frame has one number by which it is
+recognized. ``bare PORT NAMESPACE`` has the topics and services of the driver without any function:
+its memory is ROS's part.
 """
 
 import os
@@ -25,7 +25,7 @@ LENGTHS = {IMU: 14, DELTA: 9, POSE: 15}
 
 
 def measurements(port: int, node: Node) -> None:
-    """A blocking read, one prefilled Imu, publish."""
+    """Read, and publish prefilled messages for each frame."""
     imus = node.create_publisher(Imu, "imu/data_raw", 10)
     odometries = node.create_publisher(Odometry, "odom", 10)
     joints = node.create_publisher(JointState, "joint_states", 10)
@@ -45,12 +45,12 @@ def measurements(port: int, node: Node) -> None:
             elif kind == DELTA:
                 odometries.publish(odometry)
                 joints.publish(joint)
-            at += LENGTHS.get(kind, 1)  # no frame: the first read began within one
+            at += LENGTHS.get(kind, 1)  # skip a byte: the first read began within a frame
         begun = data[at:]
 
 
 def commands(port: int, node: Node) -> None:
-    """A callback, one frame, written."""
+    """Write one frame in the callback of each command."""
     pack = struct.Struct(">BBBhhh").pack
 
     def drive(twist: Twist) -> None:
@@ -61,8 +61,8 @@ def commands(port: int, node: Node) -> None:
 
 
 def bare(_port: int, node: Node) -> None:
-    """What the driver talks through, and nothing behind it."""
-    from diagnostic_msgs.msg import DiagnosticArray  # the other floors do without these
+    """Make the driver's topics and services, without any function."""
+    from diagnostic_msgs.msg import DiagnosticArray  # the other floors do not need these
     from rclpy.executors import SingleThreadedExecutor
     from std_msgs.msg import Bool, Float32MultiArray, String
     from std_srvs.srv import SetBool, Trigger
@@ -88,7 +88,7 @@ def bare(_port: int, node: Node) -> None:
 
 
 def main() -> None:
-    """Until the line hangs up, or it is killed."""
+    """Relay until the line hangs up or the process is killed."""
     what, path, namespace = sys.argv[1:]
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     rclpy.init()

@@ -2,7 +2,7 @@
 
 """Commands two robots in turn, 40 times a second each, for a number of seconds.
 
-Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's
+Arguments: seconds, namespaces. It prints one JSON array per namespace, of pairs: the steady clock's
 time in s at which a command was published, and its forward speed in the board's units.
 """
 
@@ -14,13 +14,13 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 PERIOD_S = 0.0247
-"""No multiple of the board's tick: every moment between two of its readings is met."""
+"""Period of the commands in s, not a multiple of the board's tick, so that all phases occur."""
 FASTEST = 30
 LSB_PER_MPS = 70.0
 
 
 def main() -> None:
-    """Alternate: at any moment each has waited as long as the other."""
+    """Command in turn, with the same wait before each robot."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, int]]] = [[] for _ in namespaces]

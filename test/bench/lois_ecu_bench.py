@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU's part of ``make bench``: what its stream costs, and how late a command is.
+"""The LOIS ECU's part of ``make bench``: processor time of its stream, and latency of commands.
 
-Both boards say the same, which a simulated one said before that stood still.
+Both boards send the same bytes, recorded from a simulated board at rest.
 """
 
 import bisect
@@ -30,7 +30,7 @@ SETTLING_S: Final = 10.0
 
 
 class Stage:
-    """Boards on pseudo-terminals at ``paths``; ``heard``: reads of what came back, with times."""
+    """Boards on pseudo-terminals at ``paths``; ``heard``: their reads of commands, with times."""
 
     def __init__(self, boards: int) -> None:
         board = SimulatedLois(LoisSettings(running=True))
@@ -76,7 +76,7 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """All figures; no further sections."""
+    """Return all figures, and no further sections."""
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:
         parameters = {"board": "lois_ecu", "port": stage.paths[0], "motion_monitor": "false"}
@@ -111,7 +111,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 def _latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """µs from each command to the first read that brought its line."""
+    """Return the time from each command to the first read with its line, in µs."""
     found = []
     times = [at for at, _ in heard]
     for at, speed in sent:

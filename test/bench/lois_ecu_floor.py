@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The floor for a LOIS ECU: the smallest program that does the same without looking at it.
+"""The floor for a LOIS ECU: the smallest program with the same output, without any checks.
 
-``PORT NAMESPACE``: publishes an Odometry and a JointState for every group of odometry, trusting
-each line, and writes a line for every cmd_vel.
+``PORT NAMESPACE``: publish an Odometry and a JointState for every group of odometry, trusting each
+line, and write a line for every cmd_vel.
 """
 
 import math
@@ -22,7 +22,7 @@ RPM_PER_MPS = 60.0 / math.tau / WHEEL_RADIUS_M
 
 
 def rpm_line(speed_mps: float) -> bytes:
-    """Both wheels ahead."""
+    """Return the command for both wheels forward at this speed."""
     text = f":02{2 * f'{round(RPM_PER_MPS * speed_mps):04x}'}".encode()
     check = 0
     for character in text:
@@ -31,7 +31,7 @@ def rpm_line(speed_mps: float) -> bytes:
 
 
 def relay(port: int, node: Node) -> None:
-    """A blocking read, prefilled messages, publish."""
+    """Read, and publish prefilled messages for each group."""
     odometries = node.create_publisher(Odometry, "odom", 10)
     joints = node.create_publisher(JointState, "joint_states", 10)
     odometry = Odometry(child_frame_id="base_link")
@@ -43,7 +43,7 @@ def relay(port: int, node: Node) -> None:
 
 
 def main() -> None:
-    """Until the line hangs up, or it is killed."""
+    """Relay until the line hangs up or the process is killed."""
     path, namespace = sys.argv[1:]
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     rclpy.init()

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller's part of ``make bench``: how late a command is, and what the polls cost.
+"""The MART controller's part of ``make bench``: latency of commands, and cost of the polls.
 
-Two simulated controllers on UDP, one for the driver and one for the smallest relay that asks as
-often. A new speed goes out behind the reply to the query that is outstanding, and by what was
-counted; a stop waits for nothing.
+There are two simulated controllers on UDP: one for the driver, one for the smallest relay that
+polls as often. A new speed waits for the reply to the outstanding query, and is computed from the
+encoder's count; a stop does not wait.
 """
 
 import time
@@ -22,13 +22,13 @@ from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 WINDOW_S: Final = 20.0
 SETTLING_S: Final = 8.0
 LATEST_S: Final = 0.9
-"""What comes later belongs to the next command."""
+"""Longest latency in s; a later datagram belongs to the next command."""
 LARGE: Final = 3
-"""Units; a smaller change holds the heading."""
+"""Smallest change of a speed, in units; smaller changes hold the heading."""
 
 
 class Heard(SimulatedMart):
-    """``heard``: datagrams of the command port, with the steady clock's time."""
+    """A controller that keeps the datagrams of its command port in ``heard``, with steady times."""
 
     def __init__(self) -> None:
         super().__init__(MartSettings())
@@ -41,7 +41,7 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """All figures; no further sections."""
+    """Return all figures, and no further sections."""
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]
@@ -93,7 +93,7 @@ def _medians(late: list[list[float]], windows: int) -> list[list[float]]:
 def _latencies(
     sent: list[tuple[float, float]], heard: list[tuple[float, bytes]], *, stops: bool
 ) -> list[float]:
-    """µs from each speed to the datagram that says it, where the robot drove before."""
+    """Return the time from each speed to its datagram, in µs, where the robot drove before."""
     found = []
     for (_, before), (at, speed) in pairwise(sent):
         if not before or (speed == 0.0) is not stops:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The floor for a MART controller: the smallest program that does the same without looking at it.
+"""The floor for a MART controller: the smallest program with the same output, without checks.
 
-``HOST PORT NAMESPACE``: asks encoder and heading 16 times a second each, publishes an Odometry and
-a JointState for each count, trusting each datagram, and sends RM or RMCS for every cmd_vel.
+``HOST PORT NAMESPACE``: poll encoder and heading 16 times a second each, publish an Odometry and a
+JointState for each count, trusting each datagram, and send RM or RMCS for every cmd_vel.
 """
 
 import socket
@@ -22,7 +22,7 @@ MPS_PER_UNIT = 0.0078
 
 
 class Relay:
-    """One socket for everything."""
+    """A relay with one socket for everything."""
 
     def __init__(self, address: tuple[str, int], node: Node) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -32,7 +32,7 @@ class Relay:
         self._joints = node.create_publisher(JointState, "joint_states", 10)
 
     def command(self, twist: Twist) -> None:
-        """Change both motors, or begin."""
+        """Change the speed of both motors, or start them."""
         units = round(twist.linear.x / MPS_PER_UNIT)
         if self._units:
             self._socket.send(b"RMCS %d %d" % (units - self._units, units - self._units))
@@ -41,14 +41,14 @@ class Relay:
         self._units = units
 
     def ask(self) -> None:
-        """The encoder and the heading, in turn."""
+        """Poll the encoder and the heading in turn."""
         while True:
             for word in (b"ENC", b"RMRA"):
                 self._socket.send(word)
                 time.sleep(PERIOD_S)
 
     def listen(self) -> None:
-        """A blocking read, prefilled messages, publish."""
+        """Receive, and publish prefilled messages."""
         odometry = Odometry(child_frame_id="base_link")
         joint = JointState(name=["left_wheel_joint", "right_wheel_joint"], position=[0.0] * 2)
         while True:
@@ -59,7 +59,7 @@ class Relay:
 
 
 def main() -> None:
-    """Until it is killed."""
+    """Relay until the process is killed."""
     host, port, namespace = sys.argv[1:]
     rclpy.init()
     node = Node("floor", namespace=namespace, start_parameter_services=False, enable_rosout=False)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands two MART robots in turn: another speed once a second, at times none.
+"""Commands two MART robots in turn: another speed once a second, sometimes zero.
 
-Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's
+Arguments: seconds, namespaces. It prints one JSON array per namespace, of pairs: the steady clock's
 time in s at which a speed was first published, and the speed in m/s.
 """
 
@@ -14,13 +14,13 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""m/s; at the end the robot stands long enough to start anew."""
+"""Speeds in m/s; the rest at the end is long enough for a new start."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Both hear each speed at the same time, but for the one that is first."""
+    """Command each speed to both robots, one right after the other, and time its first message."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]
@@ -29,7 +29,7 @@ def main() -> None:
         twist = Twist()
         twist.linear.x = SPEEDS[number % len(SPEEDS)]
         until = time.monotonic() + (AHEAD_S if number % len(SPEEDS) == 0 else HOLD_S)
-        until += 0.0137 * (number % 7)  # no multiple of any poll
+        until += 0.0137 * (number % 7)  # not a multiple of any poll's period
         first = True
         while time.monotonic() < until:
             for which, publisher in enumerate(publishers):

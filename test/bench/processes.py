@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Processes that are measured, and what /proc tells of them."""
+"""Processes to be measured, and their figures from /proc."""
 
 import json
 import os
@@ -15,7 +15,7 @@ PATIENCE_S = 5.0
 
 
 class Program:
-    """A program of this directory, or a module, until the end of the ``with``."""
+    """A program of this directory, or a module, that runs until the end of its ``with``."""
 
     def __init__(self, *arguments: str, environment: dict[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
@@ -42,35 +42,35 @@ class Program:
                 pipe.close()
 
     def line(self) -> str:
-        """The next line it prints."""
+        """Return the next line that it prints."""
         assert self.process.stdout is not None
         return self.process.stdout.readline()
 
     def result(self) -> Any:
-        """Close its input; returns its output."""
+        """Close its input; return its output, decoded from JSON."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         return json.loads(self.line())
 
     @property
     def busy_s(self) -> float:
-        """Processor time so far, with its threads and children."""
+        """Processor time so far, with its threads and children, in s."""
         return _busy_s(self.process.pid)
 
     @property
     def resident_mb(self) -> float:
-        """Resident memory of the process itself."""
+        """Resident memory of the process itself, in MB."""
         return memory_mb(self.process.pid)[0]
 
     @property
     def children(self) -> list[int]:
-        """Their process ids."""
+        """Process ids of its children."""
         tasks = Path(f"/proc/{self.process.pid}/task").iterdir()
         return [int(pid) for task in tasks for pid in (task / "children").read_text().split()]
 
 
 def driver(path: str, namespace: str, before: str = "", **environment: str) -> Program:
-    """The driver as users start it, on this port; ``before`` is Python to be run in it first."""
+    """Start the driver on this port as users do; ``before``: Python that is run in it first."""
     program = ["-m", "omnibot_driver.driver"]
     if before:
         main = "import sys, omnibot_driver.driver as driver; sys.exit(driver.main())"
@@ -80,24 +80,24 @@ def driver(path: str, namespace: str, before: str = "", **environment: str) -> P
 
 
 def floor(what: str, path: str, namespace: str) -> Program:
-    """The smallest relay on this port."""
+    """Start the smallest relay on this port."""
     return Program(str(HERE / "floor.py"), what, path, namespace)
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """The smallest relay with this one step more."""
+    """Start the smallest relay with this step."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 
 def ear(*namespaces: str) -> Program:
-    """A listening process, ready when this returns."""
+    """Start a subscribing process; it is ready when this returns."""
     program = Program(str(HERE / "ear.py"), *namespaces)
     program.line()
     return program
 
 
 def memory_mb(pid: int) -> tuple[float, float]:
-    """Resident memory of a process, and its proportional share of it."""
+    """Return a process's resident memory and its proportional share, in MB."""
     rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     kb = {row.split()[0]: float(row.split()[1]) for row in rows[1:]}
     return kb["Rss:"] * 1.024e-3, kb["Pss:"] * 1.024e-3

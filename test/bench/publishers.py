@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Publishers of ``cmd_vel`` for the hands, which are processes of their own."""
+"""Publishers of ``cmd_vel`` for the processes that command robots."""
 
 import time
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ from rclpy.node import Node
 
 
 def connected(namespaces: Sequence[str]) -> list[Any]:
-    """One publisher for each namespace, a second after all have subscribers. Begins ROS."""
+    """Initialize ROS; return one publisher per namespace, a second after all have subscribers."""
     rclpy.init()
     node = Node("hand", start_parameter_services=False, enable_rosout=False)
     publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]
     while any(publisher.get_subscription_count() == 0 for publisher in publishers):
-        time.sleep(0.01)  # a subscriber raises no event without an executor
-    time.sleep(1.0)  # the subscribers find the publishers, too
+        time.sleep(0.01)  # without an executor a new subscriber raises no event
+    time.sleep(1.0)  # the subscribers must find the publishers, too
     return publishers

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Figures against a floor: the median of alternating pairs, and how far they scatter."""
+"""Figures compared with a floor: the median of alternating pairs, and their spread."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """``ours[n]`` and ``floor[n]`` were measured together; ``goal``: the ratio's upper bound."""
+    """``ours[n]`` and ``floor[n]`` were measured together; ``goal``: upper bound of the ratio."""
 
     name: str
     unit: str
@@ -28,7 +28,7 @@ class Figure:
 
     @property
     def row(self) -> str:
-        """The ratio as a row of the table."""
+        """The figure as a row of the table."""
         low, high = min(self._ratios), max(self._ratios)
         if len(self._ratios) > 3:
             low, _, high = quantiles(self._ratios, n=4, method="inclusive")
@@ -43,7 +43,7 @@ class Figure:
 
 
 def table(figures: Sequence[Figure]) -> list[str]:
-    """The whole table."""
+    """Return the complete table."""
     return [
         "| figure | ours | floor | ratio (median) | quartiles | goal |",
         "|---" * 6 + "|",
@@ -66,5 +66,5 @@ def alternate(
 
 
 def short(value: float) -> str:
-    """The number with three digits, or all digits of a large one."""
+    """Format a number with three digits, or all digits of a large one."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

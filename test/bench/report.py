@@ -2,8 +2,8 @@
 
 """The performance report: ``make bench`` writes it into docs/internals/performance.md.
 
-Every figure is measured beside its floor on the same machine in the same minutes. ``--quick`` makes
-everything short, to see whether it runs. Ends with 1 when a goal is missed.
+Every figure is measured together with its floor on the same machine. ``--quick`` makes everything
+short, to see whether it runs. The exit code is 1 when a goal is missed.
 """
 
 import argparse
@@ -13,7 +13,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # users have their bytecode
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # users have their bytecode, too
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # its generator of streams
 
@@ -25,7 +25,7 @@ from ratios import Figure, table
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
-"""By the name of the board: the module that measures it."""
+"""By the board's name: the module that measures it."""
 SCALES = (1, 2, 4, 8)
 
 
@@ -35,7 +35,7 @@ def say(what: str) -> None:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """All figures with a floor, and the sections behind their table."""
+    """Return all figures with a floor, and the sections after their table."""
     windows = 2 if quick else 6
     figures: list[Figure] = []
     for adapter in ADAPTERS:
@@ -63,7 +63,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 
 
 def main() -> int:
-    """Run the measurements, print and write them."""
+    """Run the measurements, and print and write them; return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=("omnibot", *OTHERS), default="omnibot", help="that is measured"

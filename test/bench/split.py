@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Where the driver's processor time goes: timers of its reader's own time, around the stages.
+"""Processor time of the driver's reader by stage, measured with timers around the stages.
 
-Run in the driver's process before it starts; at its end it writes a JSON object of seconds per
-stage, and how many reads there were, to the file that SPLIT names.
+It is run in the driver's process before the driver starts. At the end it writes a JSON object to
+the file that SPLIT names: seconds per stage, and the number of reads.
 """
 
 import atexit
@@ -28,7 +28,7 @@ reads = {"count": 0}
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Count the time of this method for its stage, without that of the stages called from it."""
+    """Count the time of this method for its stage, without the stages that it calls."""
     method: Callable[..., Any] = getattr(owner, name)
 
     def measured(*arguments: Any) -> Any:

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards that say the nominal stream on pseudo-terminals, each at a moment of its own in the tick.
+"""Boards that send the nominal stream on pseudo-terminals, each at its own phase of the tick.
 
-They take turns within the 10 ms, so their readers are measured in alternation; all have the same
-kind of adapter. Every IMU frame carries a number in its first word; nothing else of a board is
-simulated.
+They take turns within the 10 ms, so that their readers are measured in alternation; all have the
+same kind of adapter. Every IMU frame has a number in its first word; a board has no other function.
 """
 
 import heapq
@@ -29,21 +28,21 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""The number goes up and down between 0 and this."""
+"""Upper end of the number, which goes up and down from 0."""
 NOISE = 997
-"""Readings of noise, used over and over."""
+"""Number of noise readings, used repeatedly."""
 
 
 _IMU, _DELTA, _POSE = (struct.Struct(form) for form in (">BB6h", ">BB3hB", ">BB3fB"))
 
 
 def number_of(tick: int) -> int:
-    """The number in the IMU frame of this tick."""
+    """Return the number in the IMU frame of this tick."""
     return TURN - abs(TURN - tick % (2 * TURN))
 
 
 def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
-    """What the board sends in this tick: an IMU frame, often a delta, sometimes a pose."""
+    """Return what the board sends in this tick: an IMU frame, often a delta, sometimes a pose."""
     u, v, w, x, y = noise[tick % NOISE]
     data = _IMU.pack(0xFF, 0xFA, number_of(tick), 30 * x, 16384 + 8 * y, u, v, w)
     if tick % 4 == 3:
@@ -54,7 +53,7 @@ def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
 
 
 def imu_ends() -> Iterator[int]:
-    """After how many bytes of the line each tick's IMU frame is complete."""
+    """Yield for each tick the number of bytes after which its IMU frame is complete."""
     begun = 0
     for tick in count():
         yield begun + IMU_BYTES
@@ -62,10 +61,10 @@ def imu_ends() -> Iterator[int]:
 
 
 class Stage:
-    """``said[n]``: for board n, when the last byte of each tick's IMU frame was handed over, in the
-    order of ticks; ``heard[n]``: reads of what came back.
+    """Boards on pseudo-terminals at ``paths``; times are of the steady clock, in s.
 
-    ``paths``: the terminals. Times are of the steady clock, in s.
+    ``said[n]``: for board n, when the last byte of each tick's IMU frame was delivered, by tick.
+    ``heard[n]``: reads of the commands to board n.
     """
 
     def __init__(self, boards: int, adapter: Adapter = pieces) -> None:
@@ -117,7 +116,7 @@ class Stage:
             while end[board] <= sent[board]:
                 self.said[board].append(now)
                 end[board] = next(ends[board])
-            with suppress(BlockingIOError):  # it is not read yet
+            with suppress(BlockingIOError):  # the reader is late
                 os.write(self._ends[board][0], data)
 
     def _hear(self) -> None:

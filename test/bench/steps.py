@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The floor again, doing one thing more at each step: what an honest relay cannot leave out.
+"""The floor with one more task at each step, up to those that an honest relay needs.
 
 Arguments: which step (a key of STEPS), port, namespace. It publishes bytes and writes nothing.
 """
@@ -38,7 +38,7 @@ Estimates = list[ImuEstimate | OdometryEstimate]
 
 
 class Relay:
-    """``publish`` is given what a step made of a read."""
+    """The methods are steps: each publishes what it makes of a read."""
 
     def __init__(self, node: Node) -> None:
         values = boards.check_all({})
@@ -72,7 +72,7 @@ class Relay:
                 self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def trust(self, data: bytes) -> None:
-        """What looks like a frame is one; its first word is all that is looked at."""
+        """Publish whatever looks like a frame; only its first word is read."""
         estimates: Estimates = []
         at, data = 0, self._begun + data
         while at + 1 < len(data) and at + LENGTHS.get(kind := data[at + 1], 1) <= len(data):
@@ -87,7 +87,7 @@ class Relay:
         self.publish(estimates)
 
     def decode(self, data: bytes) -> None:
-        """Decode frames and prove them."""
+        """Decode and verify the frames, and publish them."""
         estimates: Estimates = []
         for frame in self._decoder.feed(data, time.monotonic()):
             if isinstance(frame, ImuFrame):
@@ -99,7 +99,7 @@ class Relay:
         self.publish(estimates)
 
     def measure(self, data: bytes) -> None:
-        """... stamped, checked and integrated; and the session gets the rest."""
+        """Decode, stamp, check and integrate, and let the session react; publish the result."""
         now = time.monotonic()
         self.publish(list(self._session.inbound.hear(data, now)))
         self._session.inbound.process(now)
@@ -117,7 +117,7 @@ STEPS: Final[dict[str, tuple[str, Callable[[Relay, bytes], None], bool]]] = {
 
 
 def main() -> None:
-    """Until the line hangs up, or it is killed."""
+    """Relay until the line hangs up or the process is killed."""
     step, path, namespace = sys.argv[1:]
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     rclpy.init()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver as a process on a pseudo-terminal, beside the floor."""
+"""Measurements of the driver as a process on a pseudo-terminal, together with the floor."""
 
 import bisect
 import json
@@ -33,12 +33,12 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""By adapter: of latency (median, 99th percentile), processor time, and cmd_vel."""
+"""Goals by adapter: latency (median, 99th percentile), processor time, and cmd_vel."""
 MPS2_PER_COUNT = 9.80665 / 16384
 
 
 def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
-    """Measure the way from wire to callback, processor time, and the driver's memory."""
+    """Measure the time from line to callback, processor time, and the driver's memory."""
     with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear("ours", "floor"))
         programs = [
@@ -92,7 +92,7 @@ def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
 
 
 def memory() -> list[str]:
-    """Rows of a table: driver and guard, beside a bare node with the same topics and services."""
+    """Return rows of a table: driver and guard, compared with a node with the same interface."""
     with Stage(2) as stage, ExitStack() as stack:
         stack.enter_context(ear("ours"))
         ours = stack.enter_context(driver(stage.paths[0], "ours"))
@@ -109,7 +109,7 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Rows of a table from the floor to the driver, one step after another."""
+    """Return rows of a table from the floor to the driver, with one more step in each."""
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear(*names))
@@ -144,7 +144,7 @@ def steps(windows: int) -> list[str]:
 
 
 def commands(adapter: str, windows: int) -> Figure:
-    """Measure the time from a published cmd_vel to bytes on the board's side."""
+    """Measure the time from a published cmd_vel to its bytes on the board's side."""
     with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         stack.enter_context(driver(stage.paths[0], "ours"))
         stack.enter_context(floor("commands", stage.paths[1], "floor"))
@@ -160,7 +160,7 @@ def commands(adapter: str, windows: int) -> Figure:
 
 
 def imports(times: int) -> Figure:
-    """Importing the driver, against importing what no such node can do without."""
+    """Measure the import of the driver, compared with the imports that any such node needs."""
     floor_names = "rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_srvs.srv"
 
     def seconds(names: str) -> float:
@@ -188,7 +188,7 @@ def starts(times: int) -> Figure:
 
 
 def scale(counts: Sequence[int], seconds: float) -> list[str]:
-    """Rows of a table for many drivers, each with its own board."""
+    """Return rows of a table for many drivers, each with its own board."""
     rows = [
         "| drivers | ms per robot and second | of one alone | IMU Hz, least | odom Hz, least |",
         "|---" * 5 + "|",
@@ -220,7 +220,7 @@ def scale(counts: Sequence[int], seconds: float) -> list[str]:
 
 
 def split(seconds: float) -> list[str]:
-    """Where the processor time goes; rows of a table."""
+    """Return rows of a table: the driver's processor time by stage."""
     with TemporaryDirectory() as folder, Stage(1) as stage, ear("ours") as listener:
         told = Path(folder) / "split"
         before = f"import sys; sys.path.insert(0, {str(HERE)!r}); import split"
@@ -246,7 +246,7 @@ def split(seconds: float) -> list[str]:
 def _latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """For each message: when its frame was written, and how many µs later it was heard."""
+    """Return for each message when its frame was written, and its latency in µs."""
     found = []
     for at, value in heard:
         number = round(value / unit)
@@ -261,7 +261,7 @@ def _latencies(
 def _command_latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """µs from each command to the first read that brought its frame."""
+    """Return the time from each command to the first read with its frame, in µs."""
     found = []
     frames = [
         (at, struct.unpack_from(">h", data, begin + 3)[0])

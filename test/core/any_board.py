@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A session with any board's other half, in simulated time: what the motion rules are tested on."""
+"""Test bench in simulated time: a session with the simulated robot of any board.
+
+The motion rules are tested on it.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -26,7 +29,7 @@ TICK_S = 0.01
 
 
 class Robot(Protocol):
-    """The other half. ``way_m``: the length of its true way ahead."""
+    """The simulated robot at the other end. ``way_m``: length of its true way forward, in m."""
 
     @property
     def stands(self) -> bool: ...
@@ -40,7 +43,7 @@ class Robot(Protocol):
 
 
 class OmniBotRobot:
-    """The simulated OmniBot, as the toys' robots are."""
+    """The simulated OmniBot, with the interface of ``Robot``."""
 
     def __init__(self) -> None:
         from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
@@ -73,8 +76,9 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    late_s: its controller winds up for 0.5 s until a wheel turns, and as long until it is fast; a
-    metre at 0.3 m/s is 0.97 m (firmware), 0.96 m (documented) of 1.2 m.
+    late_s: the time that a start costs, in s: the controller integrates for 0.5 s until a wheel
+    turns, and as long again until it is fast. Of a commanded 1.2 m (4 s at 0.3 m/s) the robot
+    drives 0.97 m (firmware) or 0.96 m (documented).
     """
 
     late_s = 0.75
@@ -107,7 +111,7 @@ def lois_ecu(firmware: str) -> tuple[Board, Any]:
 
 
 class MartRobot:
-    """The simulated MART controller; five of its ticks in one of ours."""
+    """The simulated MART controller; it makes five ticks in one tick of the bench."""
 
     def __init__(self, firmware: Any) -> None:
         from omnibot_driver.simulator.mart import QUIRKS, MartSettings, SimulatedMart
@@ -137,7 +141,7 @@ def mart(firmware: str) -> tuple[Board, Any]:
 
 
 class FejemisRobot:
-    """The simulated Fejemis; five of its ticks in one of ours."""
+    """The simulated Fejemis; it makes five ticks in one tick of the bench."""
 
     def __init__(self, sums: bool) -> None:
         from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
@@ -177,16 +181,16 @@ MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }
-"""A new board of each kind, and its robot."""
+"""By name: makes a new board and its robot."""
 CORE = Path(core.__file__).parent
 BOARDS = [
     name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
 ]
-"""Those that are there: a board is a folder that can be removed."""
+"""Names of the boards that exist: each board is a folder that can be removed."""
 
 
 class AnyBench:
-    """``hears`` and ``speaks`` cut every line in one direction: to the robot, and from it."""
+    """A session and a robot. ``hears``, ``speaks``: whether the robot receives, and sends."""
 
     def __init__(self, board: Board, robot: Robot) -> None:
         self.robot = robot
@@ -227,7 +231,7 @@ class AnyBench:
             self.settle()
 
     def stall(self, seconds: float) -> None:
-        """The process stalls, and reads all that waits at once then."""
+        """Stall the process for a time, then read at once all that has arrived meanwhile."""
         waiting: list[Packet] = []
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
@@ -266,7 +270,7 @@ class AnyBench:
 
 
 def nominal(name: str) -> AnyBench:
-    """A board that stands, and obeys."""
+    """Return a bench whose robot is at rest and accepts commands."""
     bench = AnyBench(*MAKERS[name]())
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")

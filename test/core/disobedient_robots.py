@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots that do not do what they are commanded, and how long it takes until they are stopped."""
+"""Robots that do not do as commanded, and the time until the driver stops them."""
 
 import math
 from collections.abc import Callable
@@ -12,12 +12,12 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
 Triple = tuple[float, float, float]
 PERIOD_S = 0.1
-"""Of the commands."""
+"""Period of the commands, in s."""
 SLOWLY: Triple = (0.05, 0.0, 0.0)
 
 
 def started(board: BoardSettings, **options: object) -> Bench:
-    """A robot that stands, on its side of the line as configured."""
+    """Return a bench with a robot at rest, its notices cleared."""
     bench = Bench(board, **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -31,7 +31,7 @@ def by_velocity(bench: Bench, command: Triple) -> None:
 
 
 def by_wheels(bench: Bench, command: Triple) -> None:
-    """The wheel rates of this twist."""
+    """Command the wheel rates that correspond to this twist."""
     x, y, yaw = command
     along_x, along_y, turn = math.cos(math.radians(30)) * x, y / 2, 0.143 * yaw
     bench.turn_wheels(
@@ -42,7 +42,10 @@ def by_wheels(bench: Bench, command: Triple) -> None:
 
 
 def goes_astray(bench: Bench, command: Triple) -> bool:
-    """Whether it is 0.05 m/s or 0.15 rad/s from everything between rest and the command."""
+    """Return whether the robot leaves the range between rest and the command.
+
+    It does from a distance of 0.05 m/s or 0.15 rad/s on.
+    """
     truth, (x, y, yaw) = bench.board.truth, command
     square = x * x + y * y
     part = (truth.vx_mps * x + truth.vy_mps * y) / square if square else 0.0
@@ -55,7 +58,7 @@ def goes_astray(bench: Bench, command: Triple) -> bool:
 def stopped_after_s(
     bench: Bench, command: Triple, by: Callable[[Bench, Triple], None] = by_velocity
 ) -> float:
-    """Board time from the first tick in which it goes astray until Stop is on the wire."""
+    """Return the board time from the first deviating tick until Stop is written, in s."""
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick
     while bench.now < begun + 3.0:
@@ -70,7 +73,10 @@ def stopped_after_s(
 
 
 def on_the_wrong_switch(frame: str, delta_period_s: float = 0.04) -> Bench:
-    """It stands on position, and the robot has been driven 3 m from its origin."""
+    """Return a bench whose board is on position control, with the driver set to velocity.
+
+    The robot has been driven 3 m from its origin.
+    """
     board = BoardSettings(
         running=True,
         control="position",
@@ -82,7 +88,7 @@ def on_the_wrong_switch(frame: str, delta_period_s: float = 0.04) -> Bench:
 
 
 def try_to_drive(bench: Bench, seconds: float) -> int:
-    """A sender that goes on at 10 Hz; how many of its commands are taken."""
+    """Command at 10 Hz for ``seconds``, and return how many commands are accepted."""
     taken = 0
     for _ in range(round(seconds / PERIOD_S)):
         try:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots under way on a line that loses frames, and when their odometry is settled again."""
+"""Robots that drive on a line that loses frames, until their odometry is right again."""
 
 from itertools import pairwise
 
@@ -14,12 +14,12 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""Of the deltas since the last pose."""
+"""Rounding errors of the deltas since the last pose, in m and rad."""
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 
 
 def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "earth") -> Line:
-    """Two seconds under way, on a board that has driven before."""
+    """Return a line after two seconds of driving; the board had a pose before."""
     board = BoardSettings(seed=seed, frame=frame, running=True, initial_pose=DRIVEN)
     found = Line(board, settings_, seed=seed)
     found.run(2.0 + seed % 5 * PERIOD_S)
@@ -27,7 +27,7 @@ def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "ear
 
 
 def lose(on: Line, seconds: float, *headers: bytes) -> None:
-    """Lose all bytes, or frames that begin like this, for a while."""
+    """Lose all bytes, or only frames with these headers, for ``seconds``."""
     on.loses = lambda data, _now: not headers or data[:2] in headers
     on.run(seconds)
     on.loses = loses_nothing
@@ -39,7 +39,7 @@ def settled(on: Line) -> bool:
 
 
 def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Time from one to the next, and what the pose did in it."""
+    """Return the time in s, and the difference of poses, between consecutive estimates."""
     return [
         (after.stamp_s - before.stamp_s, after.pose - before.pose)
         for before, after in pairwise(estimates)
@@ -47,7 +47,7 @@ def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
 
 
 def attached(settings_: OdometrySettings | None = None) -> Odometry:
-    """A board that stands at zero and has said so twice."""
+    """Return odometry that has received two poses of a board that stands at zero."""
     odometry = Odometry(settings_ or OdometrySettings())
     odometry.settle(PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.0, 0.0, 0.0))

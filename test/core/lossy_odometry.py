@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated robot, a line that loses frames, and the odometry at its other end."""
+"""A simulated robot, a line that loses frames, and the odometry that receives the others."""
 
 import math
 from collections.abc import Callable
@@ -24,7 +24,7 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 
 
 class Line:
-    """Whole frames are lost, by what ``loses`` says of their bytes and time."""
+    """A simulated board and odometry; ``loses`` decides by bytes and time which frames are lost."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class Line:
             assert isinstance(reading, PausedReading)
 
     def _command(self) -> None:
-        """Smooth curves at up to 0.45 m/s along each axis and 0.45 rad/s, or Stop."""
+        """Command smooth curves of up to 0.45 m/s along each axis and 0.45 rad/s, or Stop."""
         sizes = (30, 30, 225)
         words = [
             round(self._commanding * size * math.sin(self.now * speed + phase)) & 0xFFFF
@@ -92,12 +92,12 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """A paused board could take a letter in a command for a request."""
+        """Whether to send commands: a paused board could take a letter within one for a request."""
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property
     def error(self) -> Pose:
-        """Difference of odom at its last displacement from the board's own pose."""
+        """Difference between odom at its last displacement and the board's own pose."""
         wanted = self.attached.way_to(self.told)
         got = self.estimates[-1].pose
         off = got - wanted

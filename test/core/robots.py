@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots at the beginning of a test: on the workbench, standing or driving."""
+"""Benches with a robot at the beginning of a test: at rest, paused or driving."""
 
 from session_bench import Bench
 
@@ -17,7 +17,7 @@ def standing() -> Bench:
 
 
 def paused() -> Bench:
-    """A board that is not to run and says that it does not."""
+    """Return a bench whose board is paused, reports it, and is not to be started."""
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state("paused")
@@ -25,7 +25,7 @@ def paused() -> Bench:
 
 
 def driving(**settings: object) -> Bench:
-    """A board that carries out 0.4 m/s, commanded just now."""
+    """Return a bench with a robot that has just been commanded to drive, and drives, at 0.4 m/s."""
     bench = Bench(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board's byte stream with known sampling times, and the ways it reaches a host.
+"""A board's byte stream with known sampling times, and the ways in which it reaches a host.
 
-Written from the manual, with no code of the driver's: 10 ms ticks of the board's own crystal, IMU,
-delta (every fourth tick) and pose (every twentieth) back to back at 115200 baud. Times are host
-seconds.
+It is written from the manual and shares no code with the driver. The board's crystal has ticks of
+10 ms. Frames are sent back to back at 115200 baud: IMU in every tick, delta in every fourth, pose
+in every twentieth. Times are host times in s.
 """
 
 import math
@@ -23,7 +23,11 @@ Chunker = Callable[[list[Byte], random.Random], Iterator[Read]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
-    """``skew``: its crystal against the host's; ``loss``: the part of frames that never arrives."""
+    """A simulated stream of frames.
+
+    ``skew``: relative error of the board's clock against the host's. ``loss``: fraction of frames
+    that never arrive.
+    """
 
     seconds: float
     skew: float = 0.0
@@ -36,7 +40,7 @@ class Board:
         return self.begins_at + (tick - self.first_tick) * TICK_S * (1.0 + self.skew)
 
     def stream(self, rng: random.Random) -> list[Byte]:
-        """Every byte, and when its stop bit has passed."""
+        """Return every byte with the time at which its stop bit ends."""
         line: list[Byte] = []
         free_at = 0.0
         for tick in range(self.first_tick, self.first_tick + round(self.seconds / TICK_S)):
@@ -51,7 +55,7 @@ class Board:
         return line
 
     def _frames(self, tick: int, rng: random.Random) -> list[bytes]:
-        """The tick's number stands in the readings: accelerometer x and y."""
+        """Return the frames of a tick; the accelerometer's x and y contain the tick's number."""
         gyro = [rng.randrange(-3, 40) for _ in range(3)]
         frames = [struct.pack(">2B6h", 0xFF, 0xFA, tick % 8192, tick // 8192, 16384, *gyro)]
         if not self.imu_only and tick % 4 == 0:
@@ -62,7 +66,7 @@ class Board:
 
 
 def bursts(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """An ideal line: everything between two idle gaps at once, with its last byte."""
+    """Yield what arrives on an ideal line: all bytes between two idle gaps in one read."""
     held = bytearray()
     last = line[0][0]
     for at, byte in line:
@@ -99,8 +103,10 @@ def blocks(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 def ftdi(
     *, latency_s: float = 0.016, restarted_by_data: bool = False, skew: float = 0.0
 ) -> Chunker:
-    """A USB adapter: packets of 62 bytes when they are full, or of what is there when its timer
-    expires. The timer runs freely on the adapter's crystal, or begins with a packet's first byte.
+    """Return a chunker like a USB adapter.
+
+    It delivers packets of 62 bytes when they are full, and a shorter one when its timer expires.
+    The timer runs freely on the adapter's crystal, or begins with a packet's first byte.
     """
 
     def chunk(line: list[Byte], rng: random.Random) -> Iterator[Read]:
@@ -133,9 +139,9 @@ def late(
     jitter_s: float = 0.0,
     stalls: list[tuple[float, float]] | None = None,
 ) -> Iterator[Read]:
-    """A host that wakes up late: a little at every read, and not at all during ``stalls``.
+    """Delay reads like a host that wakes up late: a little each time, and until the end of a stall.
 
-    What came in meanwhile is read at once.
+    What has arrived meanwhile is read at once.
     """
     pending = bytearray()
     wakes = -math.inf

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A session and a simulated board on one workbench, wired to each other in simulated time."""
+"""Test bench in simulated time: a session connected to a simulated OmniBot."""
 
 from dataclasses import replace
 from typing import Any, Literal
@@ -27,12 +27,12 @@ OPENING = STOP
 
 
 def bare(data: bytes) -> bytes:
-    """A transmission without the zeros before it."""
+    """Return a transmission without the zeros before it."""
     return data.lstrip(b"\0")
 
 
 class Bench:
-    """``hears`` and ``speaks`` cut the line in one direction: to the board, and from it."""
+    """A session and a board. ``hears``, ``speaks``: whether the board receives, and sends."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class Bench:
         self.settle()
 
     def settle(self) -> None:
-        """What the shell does after every input."""
+        """Do what the shell does after every input: write the output and collect the events."""
         data = joined(self.session.take_output(self.now))
         if data:
             self.written.append((self.now, data))
@@ -120,12 +120,12 @@ class Bench:
             self.run(TICK_S)
 
     def configure(self, **changed: Any) -> None:
-        """Fields of SessionSettings; the others are as at first."""
+        """Change fields of SessionSettings; the others keep their first values."""
         self.session.configure(replace(self._settings, **changed), self.now)
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Fields of OmniBotSettings; the others are the defaults."""
+        """Change fields of OmniBotSettings; the others have their defaults."""
         board = self.board.settings
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed
@@ -134,15 +134,15 @@ class Bench:
         self.settle()
 
     def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
-        """Read deltas as if they were in this frame."""
+        """Interpret deltas as given in this frame."""
         self.session.configure(self._settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def last_words(self, on_exit: OnExit) -> bytes:
-        """What is written before the port is closed."""
+        """Return what is written before the port is closed."""
         return joined(self.session.shutdown.sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:
-        """What was written after the first ``mark`` writes."""
+        """Return what was written after the first ``mark`` writes."""
         return b"".join(data for _, data in self.written[mark:])
 
     def still(self) -> bool:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A stream of set-points with frames that mean nothing, and who serves it."""
+"""Test bench for a stream of set points whose frames are arbitrary bytes."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ TIMEOUT_S = 0.5
 
 
 class Words:
-    """An encoder of orders that are their own bytes."""
+    """An encoder whose orders are already bytes."""
 
     def stop(self) -> Packets:
         return packed(STOP)
@@ -44,7 +44,7 @@ class Words:
 
 
 class Stream(CommandPolicy):
-    """The policy with a stream of set-points, in bytes."""
+    """A command policy with a stream of set points in bytes."""
 
     def __init__(self, settings: CommandSettings) -> None:
         proof = StopProof()
@@ -66,7 +66,7 @@ def make_stream() -> Stream:
 
 
 def run(stream: Stream, start: float, end: float) -> list[tuple[float, bytes]]:
-    """Serve the stream whenever it wants to be, as the pacer does."""
+    """Serve the stream each time it is due, as the pacer does; return what it writes, and when."""
     written = []
     now = start
     while now <= end:

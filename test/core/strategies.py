@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What tests of all boards draw: twists, rates, moves, and any chunking of a line."""
+"""Hypothesis strategies for all boards: twists, wheel rates, moves, and pieces of a byte stream."""
 
 from collections.abc import Sequence
 
@@ -18,11 +18,11 @@ axis_signs = st.tuples(*[st.sampled_from([1, -1])] * 3)
 
 headings = st.floats(-10, 10)
 small_moves = st.builds(Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-1.5, 1.5))
-"""Displacements of one 40 ms period, in body axes; generous."""
+"""Displacements in one period of 40 ms, in body axes; larger than real ones."""
 
 
 def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
-    """The displacements among readings."""
+    """Draw readings that are displacements."""
     return st.builds(
         DisplacementReading,
         dx_m=st.floats(-0.1, 0.1),
@@ -35,11 +35,11 @@ def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
 
 
 def chunkings(data: bytes) -> st.SearchStrategy[list[bytes]]:
-    """The same bytes, cut anywhere, empty chunks included."""
+    """Draw ways to cut the bytes into pieces, empty ones included."""
     cuts = st.lists(st.integers(0, len(data)), max_size=30).map(sorted)
     return cuts.map(lambda at: cut(data, at))
 
 
 def cut(data: bytes, at: Sequence[int]) -> list[bytes]:
-    """The pieces between ascending places."""
+    """Return the pieces between cuts at ascending positions."""
     return [data[start:end] for start, end in zip([0, *at], [*at, len(data)], strict=True)]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Streams of the simulated board, their frames by the manual's tables, and what a decoder makes."""
+"""Byte streams of the simulated board, split into frames by the manual's tables, and decoded."""
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
@@ -17,21 +17,21 @@ BYTE_S = 10 / 115200
 REST = ImuFrame((120, -80, -16384), (1, 2, 3))
 HEADER_BYTES = b"\xff\xfa\xfb\xfc"
 LEAD_IN = encode(REST) * 2
-"""Enough to bring a decoder into step, with nothing in it that looks like a header."""
+"""Enough frames to synchronize a decoder, without bytes that look like a header."""
 
 
 def velocity(x: int, y: int, omega: int) -> bytes:
-    """A body velocity command, typed from the manual."""
+    """Encode a body velocity command, typed from the manual."""
     return bytes.fromhex("FF FE 01") + struct.pack(">3h", x, y, omega)
 
 
 def record(board: SimulatedBoard, seconds: float) -> list[bytes]:
-    """What the board sends in each tick."""
+    """Return what the board sends in each tick."""
     return [board.step() for _ in range(round(seconds * 100))]
 
 
 def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
-    """The same with a new random velocity every half second."""
+    """Drive with a new random velocity every 0.5 s; return what the board sends in each tick."""
     random, ticks = Random(7), []
     for _ in range(round(seconds * 2)):
         board.receive(velocity(*(random.randint(-24, 24) for _ in range(2)), random.randint(-9, 9)))
@@ -40,7 +40,7 @@ def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
 
 
 def life(board: SimulatedBoard) -> list[bytes]:
-    """Boot, start, drive, pause, un-pause, reset: every mode and every change of it."""
+    """Boot, start, drive, pause, resume and reset: go through all modes and all changes of mode."""
     ticks = record(board, 2.6)
     board.receive(bytes(8) + b"S")
     ticks += drive(board, 2.0)
@@ -76,7 +76,7 @@ def ticks_of(name: str) -> tuple[bytes, ...]:
 
 
 def lengths_of(stream: bytes) -> list[int]:
-    """The lengths of the frames of an undamaged stream, from the manual's tables."""
+    """Return the lengths of the frames of an undamaged stream, from the manual's tables."""
     lengths, at = [], 0
     while at < len(stream):
         kind = stream[at + 1]
@@ -88,7 +88,7 @@ def lengths_of(stream: bytes) -> list[int]:
 
 
 def frames_of(stream: bytes) -> list[tuple[int, Frame]]:
-    """Each frame of an undamaged stream with the place where it begins."""
+    """Return each frame of an undamaged stream with the position at which it begins."""
     found, at = [], 0
     for length in lengths_of(stream):
         frame = decode(stream[at : at + length])
@@ -99,7 +99,7 @@ def frames_of(stream: bytes) -> list[tuple[int, Frame]]:
 
 
 def decoded(chunks: Iterable[bytes], *, step_s: float = TICK_S) -> list[Frame]:
-    """All that a fresh decoder makes of chunks that arrive ``step_s`` apart."""
+    """Return all frames that a new decoder decodes from chunks that arrive ``step_s`` apart."""
     made, now, found = FrameDecoder(), 100.0, []
     for chunk in chunks:
         found += made.feed(chunk, now)
@@ -108,7 +108,7 @@ def decoded(chunks: Iterable[bytes], *, step_s: float = TICK_S) -> list[Frame]:
 
 
 def byte_by_byte(ticks: Sequence[bytes]) -> list[Frame]:
-    """Deliver the bytes one by one, at the pace of 115200 baud."""
+    """Decode the bytes one by one, at the pace of 115200 baud."""
     made, found = FrameDecoder(), []
     for number, tick in enumerate(ticks):
         for place in range(len(tick)):

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board made up for the odometry: it turns body twists into what the manual's firmware sends.
+"""A synthetic board for odometry tests: body twists in, readings of the manual's firmware out.
 
-Written with rotation matrices and independent of the code under test.
+It uses rotation matrices and shares no code with the code under test.
 """
 
 import math
@@ -27,7 +27,7 @@ def close(values: Triple, tolerance: float = 1e-9) -> object:
 
 
 def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
-    """Displacement under a constant twist, by the integral of the rotation matrix."""
+    """Return the displacement under a constant twist, by the integral of the rotation matrix."""
     if abs(turn) < 1e-6:
         return vx - vy * turn / 2, vy + vx * turn / 2
     a, b = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
@@ -35,7 +35,7 @@ def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
 
 
 class Trip:
-    """A board that has the given pose already, sends earth deltas, and whose axes have signs."""
+    """A board with a given initial heading, whose axes may have the opposite signs."""
 
     def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
         self.board = (12.0, -34.0, heading)
@@ -43,7 +43,7 @@ class Trip:
         self._signs = signs
 
     def move(self, dx: float, dy: float, turn: float, frame: str = "earth") -> DisplacementReading:
-        """One period of constant twist in the true body's axes; what the board makes of it."""
+        """Move for one period of constant twist in true body axes; return the board's reading."""
         self.truth = self._moved(self.truth, dx, dy, turn)
         x, y, yaw = self._signs
         before = self.board
@@ -56,7 +56,7 @@ class Trip:
 
     @property
     def pose(self) -> PoseReading:
-        """The board's own."""
+        """The board's own pose."""
         return PoseReading(*self.board)
 
     @staticmethod
@@ -80,7 +80,7 @@ def heading(yaw: float) -> PoseReading:
 
 
 def attach(odometry: Odometry, pose: PoseReading) -> list[OdometryEstimate]:
-    """The board says twice where it is."""
+    """Deliver the board's pose twice, so that it is confirmed; return the estimates."""
     assert odometry.settle(pose) == []
     return odometry.settle(pose)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry that finds its heading, is attached anew, and is reset."""
+"""Odometry that finds its heading, attaches to a board's frame again, and is reset."""
 
 import math
 from dataclasses import replace
@@ -31,7 +31,7 @@ from omnibot_driver.core.readings import PoseReading
 
 @given(st.lists(small_moves, min_size=1, max_size=5), headings)
 def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
-    """They come out with it, turned as if it had come before them."""
+    """Deltas are held until the heading is known, then published as if the pose had come first."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     for move in moves:
         assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []
@@ -42,7 +42,7 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 
 
 def test_the_first_pose_must_be_confirmed_too() -> None:
-    """A damaged one turns nothing: the first two that agree tell the heading."""
+    """A single damaged pose must not turn the odometry, so two that agree are needed."""
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.0, 0.1), 0.0) == []
     assert odometry.settle(heading(-1.0)) == []
@@ -56,14 +56,14 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 
 
 def test_a_board_that_was_paused_is_no_doubt_where_the_odometry_begins() -> None:
-    """The time of its first displacement is unknown, but there is nothing yet that it can spoil."""
+    """The duration of the first displacement is unknown, but it cannot add any uncertainty yet."""
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
     assert attach(odometry, trip.pose)[-1].covariance == Covariance()
 
 
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
-    """The next one was lost; after a second it is taken for true."""
+    """If the next pose is lost, the single one is accepted after a second."""
     odometry = Odometry(SETTINGS)
     odometry.settle(heading(math.pi / 2))
     for _ in range(25):
@@ -73,7 +73,7 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 
 
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
-    """25 deltas come out together, later ones at once."""
+    """The first 25 deltas are published together, later ones at once."""
     odometry = Odometry(SETTINGS)
     for _ in range(24):
         assert odometry.displace(earth(0.01, 0.0), 0.0) == []
@@ -86,7 +86,7 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """What was driven on the assumption stays; what follows is right."""
+    """The pose that was driven on the assumption stays; later motion has the right heading."""
     odometry = Odometry(SETTINGS)
     for _ in range(25):
         odometry.displace(earth(0.0, 0.0), 0.0)
@@ -97,7 +97,7 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """One damaged pose does not turn the odometry; two that agree tell of another earth frame."""
+    """One damaged pose does not turn the odometry; two that agree mean a new earth frame."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     x, y, yaw = trip.board
@@ -112,7 +112,7 @@ def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) ->
 
 
 def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
-    """Each is damaged in its own way."""
+    """Each of the poses is damaged in its own way."""
     odometry = Odometry(SETTINGS)
     attach(odometry, heading(0.0))
     for yaw in (1.0, 2.0, -1.0):
@@ -131,7 +131,7 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 
 
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
-    """The pose counts, not the sum of rounded displacements; five steps take it over."""
+    """The pose is right, not the sum of rounded displacements; it is approached in five steps."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.01, -0.005, 0.02))
@@ -142,7 +142,7 @@ def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
-    """It is ignored before the first valid one and after it."""
+    """This holds before the first valid pose and after it."""
     odometry = Odometry(SETTINGS)
     odometry.displace(earth(0.0, 0.1), 0.0)
     assert odometry.settle(PoseReading(0.0, 0.0, bad)) == []
@@ -164,7 +164,7 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
 def test_a_board_that_restarts_goes_on_from_here(
     before: list[Pose], after: list[Pose], initial: float, signs: tuple[int, int, int]
 ) -> None:
-    """It counts from zero; the odometry knows no seam."""
+    """The board counts from zero again, while odom continues without a jump."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
     attach(odometry, trip.pose)
     for move in before:
@@ -181,7 +181,7 @@ def test_a_board_that_restarts_goes_on_from_here(
 
 
 def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
-    """Pose and covariance; forward is forward afterwards too."""
+    """Pose and covariance are zero afterwards, and the x axis points forward."""
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     attach(odometry, trip.pose)
     for _ in range(10):
@@ -206,7 +206,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """The change makes goals in the old frame invalid."""
+    """Each such change makes goals in the old frame invalid."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
     counted = [odometry.alignments]
@@ -225,7 +225,7 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 
 
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
-    """It is unknown before two of them agree, after a long gap, and while it is assumed."""
+    """The heading is unknown before two poses agree, after a long gap, and while it is assumed."""
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known
     attach(odometry, heading(1.0))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Minutes over a bad line, in simulated time: bytes are lost alone and in bursts."""
+"""Minutes of driving on a bad line, in simulated time: bytes are lost alone and in bursts."""
 
 import math
 import struct
@@ -17,7 +17,7 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, FaultyLin
 
 
 class Drive:
-    """Curves at up to 0.4 m/s on a board that has driven before."""
+    """Curves at up to 0.3 m/s along each axis, on a board that has driven before."""
 
     def __init__(self, frame: str, faults: LineFaults) -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)
@@ -28,7 +28,7 @@ class Drive:
         self.bench.board.step = lambda: self.line.carry(step())  # type: ignore[method-assign]
         self.attached = self.told()
         self.errors: list[Pose] = []
-        """Of the newest odom against the board's own pose, wherever it is of the same tick."""
+        """Differences of the newest odom from the board's own pose, when both are of one tick."""
         self.bench.open()
         self.bench.run(1.0)
         self.line = FaultyLine(faults, seed=3)
@@ -50,7 +50,7 @@ class Drive:
                 self.errors.append(Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau)))
 
     def wrong_imu(self) -> int:
-        """Readings that are none of those sent, in the order in which they were sent."""
+        """Count IMU readings that differ from those sent, or are out of order."""
         scale, number, sent = ImuScale(), 0, list[object]()
         for frame in self.bench.board.sent:
             if frame.data[:2] == b"\xff\xfa":
@@ -70,7 +70,7 @@ class Drive:
 @pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 3), ("body", 1)])
 def test_after_minutes_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: int) -> None:
-    """One byte in a thousand and five bursts in ten thousand are lost; then a second without."""
+    """One byte in 1000 and five bursts in 10,000 are lost, until 1.5 s before the last check."""
     drive = Drive(frame, LineFaults(lose=0.001, burst=0.0005))
     drive.run(60.0 * minutes)
     assert drive.line.lost > 4000 * minutes

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a board may tell besides displacements: its own odometry, its button, that it was reset."""
+"""Readings besides displacements: a board's own odometry, its e-stop button, and its reset."""
 
 import math
 from dataclasses import replace
@@ -31,7 +31,7 @@ STANDS = DisplacementReading(0.0, 0.0, 0.0, "body", 0.2, 0)
 
 
 class Teller(line_board.LineBoard):
-    """Tells what ``next`` holds with its next bytes, and its odometry ten times a second."""
+    """A board that returns the readings in ``next`` with its next bytes, and odometry at 10 Hz."""
 
     traits = replace(
         line_board.LineBoard.traits, own_odometry=True, requests=frozenset({Request.RESET})
@@ -84,7 +84,7 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
 
 
 def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
-    """It has its own rate, covariance and variances of the twist."""
+    """It keeps its own rate, covariance and variances of the twist."""
     before = len(bench.odometry)
     bench.drive_on(0.3, 2.0)
     told = bench.odometry[before:]
@@ -94,7 +94,7 @@ def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: Any
 
 
 def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
-    """The robot is driven no further."""
+    """Only received data lets the driver continue to drive the robot."""
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from the board|connecting"):
@@ -103,7 +103,7 @@ def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> 
 
 
 def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
-    """Its frame begins where the robot stands."""
+    """The new frame begins where the robot stands."""
     bench.drive_on()
     bench.run(1.5)
     assert bench.odometry[-1].pose.x_m > 0.1
@@ -127,7 +127,7 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
-    """Data that was on its way at the request does not count."""
+    """Data that was already on its way at the request is ignored."""
     bench.session.request(Request.RESET, "token", bench.now)
     bench.settle()
     tell(bench, ResetReading())
@@ -141,7 +141,7 @@ def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
 
 
 def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
-    """The number of displacements does not matter."""
+    """This holds however many such displacements there are."""
     proof = StopProof()
     proof.stopped(0.0)
     for step in range(1, 20):
@@ -150,7 +150,7 @@ def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
 
 
 def test_a_proof_takes_as_long_as_the_board_needs() -> None:
-    """The board needs three displacements of 0.2 s, which is 0.6 s."""
+    """A board with displacements of 0.2 s that needs 0.6 s needs three of them."""
     proof = StopProof(0.6)
     proof.stopped(0.0)
     proved = []
@@ -161,7 +161,10 @@ def test_a_proof_takes_as_long_as_the_board_needs() -> None:
 
 
 def test_the_estop_is_not_released_while_the_button_is_held(bench: AnyBench) -> None:
-    """The button's last event counts, even from before a lost line; the refusal says what to do."""
+    """The button's last event is valid even if it came before a disconnection.
+
+    The refusal says what to do.
+    """
     tell(bench, EStopButtonReading(True))
     with pytest.raises(RequestRefused, match="release the button, then call again"):
         bench.estop(False)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A compiled core and an interpreted one say the same, bit for bit, of the same bytes and times."""
+"""The compiled core and the interpreted one have equal output, bit for bit, for equal input."""
 
 import hashlib
 import os
@@ -23,7 +23,7 @@ LOST = (0.0, 0.001, 0.01)
 
 
 def told(piece: int, lost: float) -> str:
-    """A digest of all that a session says and writes in the life of a board."""
+    """Return a digest of all events and bytes of a session during the life of a board."""
     random, bench = Random(piece), Bench()
     session, now = bench.session, 1000.0
     session.opened(now)
@@ -46,7 +46,7 @@ def told(piece: int, lost: float) -> str:
 @pytest.mark.parametrize("lost", LOST)
 @pytest.mark.parametrize("piece", PIECES)
 def test_both_cores_say_the_same(piece: int, lost: float) -> None:
-    """The sources in this repository, in a process of their own, are the interpreted one."""
+    """The interpreted core is the source in this repository, run in a process of its own."""
     path = os.pathsep.join(str(ROOT / part) for part in (".", "test", "test/core"))
     script = f"import test_compiled as t; print(t.core_kind(), t.told({piece}, {lost}))"
     done = subprocess.run(

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The motion rules, on every kind of board: the robot moves on nothing but a fresh command."""
+"""The motion rules, on every kind of board: only a fresh command moves the robot."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 ENDS_S = 1.0
-"""Within it a robot comes to a stand that heard that it has to."""
+"""Longest time in which a robot comes to rest after it has received a stop, in s."""
 
 
 @pytest.fixture(params=BOARDS)
@@ -30,7 +30,7 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """0.3 m/s for four seconds, less what a controller takes until the wheels have that speed."""
+    """The speed is 0.3 m/s for 4 s, less the time until the controller reaches it."""
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
     assert bench.robot.stands
@@ -40,7 +40,7 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """None of a hundred commands is refused."""
+    """All of a hundred commands are accepted."""
     for _ in range(100):
         bench.drive(0.2)
         bench.run(0.05)
@@ -48,7 +48,7 @@ def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) 
 
 
 def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
-    """Motion does not return by itself."""
+    """The robot does not start again by itself."""
     bench.drive_on()
     assert not bench.robot.stands
     bench.run(0.6)
@@ -57,7 +57,7 @@ def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: A
 
 
 def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
-    """It is a command like any other, and never waits."""
+    """Zero is a command like any other, and is never delayed."""
     bench.drive_on()
     for _ in range(10):
         bench.drive(0.0)
@@ -70,7 +70,7 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
     bench: AnyBench, seconds: float
 ) -> None:
-    """However much waits to be read then; a guard stops the robot meanwhile, here nothing does."""
+    """This holds for any amount of unread data; the bench has no guard that stops the robot."""
     for _ in range(2):
         bench.drive_on()
         bench.stall(seconds)
@@ -83,7 +83,7 @@ def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:
-    """The release does not."""
+    """The release does not move it."""
     bench.drive_on()
     bench.estop(True)
     with pytest.raises(CommandRefused, match="e-stop"):
@@ -112,7 +112,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """The kind of command before the event does not matter."""
+    """This holds whatever command came before the event."""
     bench.drive_on()
     event(bench)
     bench.settle()
@@ -122,7 +122,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None:
-    """It still hears us, so it is stopped, and what comes is refused."""
+    """The board still receives, so it is stopped, and new commands are refused."""
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from|nothing was heard|connecting"):
@@ -138,7 +138,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """It may have driven on with its last command."""
+    """The robot may have continued with its last command."""
     bench.drive_on()
     bench.speaks = bench.hears = False
     bench.run(5.0)
@@ -148,7 +148,7 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 
 
 def test_what_is_no_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
-    """The command before it holds."""
+    """The command before it stays in force."""
     bench.drive_on()
     with pytest.raises(CommandRefused, match="NaN or infinity"):
         bench.session.command_twist(BodyTwist(math.nan, 0.0, 0.0), bench.now)
@@ -157,7 +157,7 @@ def test_what_is_no_number_is_refused_and_stops_nothing(bench: AnyBench) -> None
 
 
 def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
-    """0.5 m/s, and what the wheels need to get there."""
+    """The limit is 0.5 m/s; 5 % more is allowed for the measurement."""
     bench.drive_on(100.0, 2.0)
     before = bench.robot.way_m
     bench.drive_on(100.0, 2.0)
@@ -165,7 +165,7 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """Stop is sent until the robot is seen to stand, then the last words."""
+    """Stop is sent until the robot is seen at rest; then the final bytes are written."""
     bench.drive_on()
     bench.session.shutdown.begin(bench.now)
     bench.settle()
@@ -180,7 +180,7 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench, seed: int) -> None:
-    """While the robot drives, turns and backs, at any moment."""
+    """The line is cut at random moments while the robot drives, reverses and stands."""
     random = Random(seed)
     for _ in range(6):
         bench.drive_on(random.choice([0.3, -0.2, 0.0]), random.uniform(0.1, 2.0))

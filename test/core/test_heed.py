@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is left of a read after its IMU readings: mostly nothing, and nothing is missed."""
+"""Reads of which nothing is left after the IMU readings: the session then has no output."""
 
 from contextlib import suppress
 
@@ -30,7 +30,7 @@ def opened() -> Session:
 
 @pytest.mark.parametrize("drives", [False, True])
 def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool) -> None:
-    """This holds while the board starts, runs, is paused and started again."""
+    """This holds while the board starts, runs, is paused and is started again."""
     session, board = opened(), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0
     for tick in range(3000):
@@ -56,7 +56,7 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:
-    """Heard, but not yet heeded: running is only what runs afterwards."""
+    """Data received before the request but processed after it is too old to be its answer."""
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):
         session.inbound.receive(board.step(), tick * TICK_S)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry over pauses, restarts and hours, and from wheel counts, against the simulated board."""
+"""Odometry over pauses, restarts and an hour, and from wheel counts, on the simulated board."""
 
 import math
 import struct
@@ -27,7 +27,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """P, 1.3 s, P: the robot rolls out meanwhile, heard or not."""
+    """The robot rolls out during 1.3 s of pause, whether or not its frames are received."""
     on = line(seed)
     if hidden:
         on.loses = lambda _data, _now: True
@@ -43,7 +43,7 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """Text, SEQ and pose from zero; also when text or first frames are lost."""
+    """Text, SEQ and pose begin at zero; this holds also when text or the first frames are lost."""
     on = line(seed)
     on.drives = False
     on.run(1.0)
@@ -64,7 +64,7 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 
 def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
-    """How the robot rolled out stays unknown."""
+    """How the robot rolled out remains unknown."""
     on = line(1)
     before = on.estimates[-1].covariance
     on.board.receive(b"R")
@@ -87,7 +87,7 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """The robot is at zero where the bridge had it when it was asked for: 14 to 42 mm off."""
+    """Zero is where odom had the robot at the reset, although that was 14 to 42 mm off."""
     for seed in range(4):
         on = line(seed)
         lose(on, 1.0)
@@ -100,7 +100,7 @@ def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
 
 
 def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """It drove on for three seconds during the silence."""
+    """The robot drives for three seconds during the silence."""
     on = line(2)
     on.loses = lambda _data, _now: True
     on.run(3.0)
@@ -118,7 +118,7 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
 def test_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
     frame: str, count: int
 ) -> None:
-    """Each of 90,000 is rounded to 0.1 mm and 0.1 mrad, with a pose after every fifth."""
+    """Each delta is rounded to 0.1 mm and 0.1 mrad; a pose follows every fifth one."""
     odometry = attached()
     x = y = yaw = worst_m = worst_rad = 0.0
     for number in range(1, count + 1):
@@ -147,7 +147,7 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """A turn of every wheel by -1/8 turns the robot by 2πr/8L; B against A drives it ahead."""
+    """A turn of every wheel by -1/8 turns the robot by 2πr/8L; B against A drives it forward."""
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)
     odometry = Odometry(OdometrySettings())

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When a board was heard last: a silence is found once, and a stall of this process is none."""
+"""Liveness of a board: a silence is reported once, and a stall of this process is not a silence."""
 
 import math
 
@@ -14,7 +14,7 @@ UNHEARD_S, SILENCE_S = 0.5, 2.0
 
 @pytest.fixture
 def liveness() -> Liveness:
-    """A liveness whose line was opened at 10 s."""
+    """Return a liveness whose line was opened at 10 s."""
     made = Liveness(
         Traits(
             imu_period_s=None,
@@ -29,7 +29,7 @@ def liveness() -> Liveness:
 
 
 def test_a_silence_is_found_once(liveness: Liveness) -> None:
-    """It is found when the limit has passed."""
+    """It is found as soon as the limit of 2 s has passed."""
     assert [liveness.fell_silent(now) for now in (11.9, 12.0, 12.1, 99.0)] == [
         False,
         True,
@@ -39,7 +39,7 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 
 
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
-    """It is counted from that reading on."""
+    """Its time is counted from that reading."""
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0
     assert not liveness.fell_silent(21.9)
@@ -47,14 +47,14 @@ def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
 
 
 def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
-    """The length of the silence does not matter."""
+    """The board has its full time again, however long the silence was."""
     assert liveness.fell_silent(12.0)
     liveness.begin(12.0)
     assert liveness.wake_at(driven=False) == 14.0
 
 
 def test_a_stall_is_no_silence_of_the_board(liveness: Liveness) -> None:
-    """The board has its whole time again."""
+    """The board has its full time again, since its data may wait to be read."""
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
     assert not liveness.fell_silent(51.9)
@@ -70,7 +70,7 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """A command is to be ended long before all belief is."""
+    """A command ends after 0.5 s without data, long before the board is called silent after 2 s."""
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5
     assert liveness.unheard(10.5)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a board takes long for: one at a time, and what ends it."""
+"""Long tasks of a board: one at a time, and what ends it."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ NAME = next(name for name in BOARDS if name == "two lines")
 
 
 def test_it_is_answered_once() -> None:
-    """Only the first end counts."""
+    """Only the first end is reported to the client."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.is_current("token")
@@ -29,7 +29,7 @@ def test_it_is_answered_once() -> None:
 
 
 def test_a_second_one_is_refused() -> None:
-    """The refusal has a reason."""
+    """The refusal names the task that is under way."""
     task = LongTask()
     task.begin("record of RPM", "one", 120.0, 0.0)
     with pytest.raises(RequestRefused, match="a record of RPM is under way"):
@@ -73,7 +73,7 @@ ENDS: dict[str, Callable[[AnyBench], object]] = {
 
 @pytest.mark.parametrize("words", ENDS)
 def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
-    """It ends at once, with a reason."""
+    """It fails at once, with the reason in its message."""
     bench = nominal(NAME)
     if "stopped" in words:
         bench.drive_on()
@@ -89,7 +89,7 @@ def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
 
 
 def test_none_is_begun_under_the_estop_or_without_a_board() -> None:
-    """It could not be done."""
+    """The task could not be carried out."""
     bench = nominal(NAME)
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop is latched"):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A line that is opened, and a board that is found on it: zeros, Stop, S, and the state by name."""
+"""Opening a line and finding the board on it: zeros, Stop, S, and the state's names."""
 
 import pytest
 from robots import standing
@@ -17,7 +17,7 @@ def bench() -> Bench:
 
 
 def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
-    """A board that boots swallows what it hears first; no command may be cut by that."""
+    """A booting board ignores its first bytes; the sequence must not cut a command."""
     bench = Bench(BoardSettings(boot_time_s=2.0))
     bench.open()
     bench.run(1.25)
@@ -27,7 +27,7 @@ def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
 
 
 def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
-    """Disconnected, connecting, paused, nominal: in the names the interface promises."""
+    """The states are disconnected, connecting, paused and nominal, as the interface names them."""
     bench = Bench(run=False)
     assert bench.session.state == "disconnected"
     bench.open()
@@ -40,7 +40,7 @@ def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
 
 
 def test_without_auto_start_a_paused_board_stays_paused() -> None:
-    """The opening then has no S."""
+    """The opening then does not contain S."""
     bench = Bench(run=False)
     bench.open()
     bench.run(3.0)
@@ -49,7 +49,7 @@ def test_without_auto_start_a_paused_board_stays_paused() -> None:
 
 
 def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
-    """The board never says so itself."""
+    """The board itself does not report this mode."""
     bench = Bench(BoardSettings(imu_only=True))
     bench.open()
     bench.run_until_state("imu_only")
@@ -58,7 +58,7 @@ def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
 
 
 def test_garbage_is_not_an_understood_board() -> None:
-    """The port is open and bytes flow, but the state goes on being ``connecting``."""
+    """The port is open and bytes arrive, but the state remains ``connecting``."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -71,7 +71,7 @@ def test_garbage_is_not_an_understood_board() -> None:
 
 
 def test_a_silent_board_is_told_once() -> None:
-    """It is reported again only after data in between."""
+    """It is reported again only after data has arrived in between."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -85,7 +85,7 @@ def test_a_silent_board_is_told_once() -> None:
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
-    """Brown-out while driving: what was commanded before the restart is not sent after it."""
+    """After a brown-out while driving, the command from before the restart is not sent again."""
     bench.drive(0.5)
     bench.run(0.2)
     bench.board.reboot()
@@ -102,7 +102,7 @@ def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -
 
 
 def test_a_paused_robot_is_still_paused_after_a_reconnect(bench: Bench) -> None:
-    """The wanted mode outlives the port."""
+    """The wanted mode is kept while the port is closed."""
     bench.ask(Request.PAUSE, 5.0)
     bench.close()
     bench.open()

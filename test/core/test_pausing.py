@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pausing a board whose P is a toggle: never the wrong way, and believed only when it is shown."""
+"""Pausing a board whose P is a toggle: it never resumes by mistake, and a pause needs proof."""
 
 import pytest
 from robots import drive_on, paused, standing
@@ -17,7 +17,7 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """Stop at once, P once data shows that the board runs."""
+    """Stop is sent at once, P when data shows that the board runs."""
     bench.drive(0.5)
     bench.run(0.3)
     start = len(bench.written)
@@ -29,7 +29,7 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
-    """The second time no P is sent, and the answer still rests on a new notice."""
+    """The second time no P is sent, and the answer waits for a new notice."""
     bench.ask(Request.PAUSE, 5.0)
     start, asked_at = len(bench.written), bench.now
     answer = bench.ask(Request.PAUSE, 5.0)
@@ -42,7 +42,7 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """The belief says nominal; only data that comes in after the request allows a P."""
+    """The driver still believes nominal, but only data received after the request allows a P."""
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
     assert bench.ask(Request.PAUSE, 5.0).success
@@ -51,7 +51,7 @@ def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
 
 
 def test_a_lost_p_is_said_again(bench: Bench) -> None:
-    """Data that flows for longer than the time between two notices shows that P was lost."""
+    """If data continues for longer than the time between two notices, P was lost."""
     bench.hears = False
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.settle()
@@ -65,7 +65,7 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Somebody else has just paused it: our P, sent for data from before, un-pauses it."""
+    """Another program has just paused the board; our P, sent because of older data, resumes it."""
     data = bench.board.step()
     bench.board.receive(b"P")
     notice = bench.board.step()
@@ -86,7 +86,7 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
-    """S is in flight, and the notice was sent before it was obeyed."""
+    """S is in flight, and the board sent the notice before it obeyed S."""
     bench = paused()
     notice = b""
     while not notice:
@@ -106,7 +106,7 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
 
 
 def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
-    """It said P and slept for three seconds; what it reads then was sent before P was obeyed."""
+    """The host sent P and slept for 3 s; the data it then reads is from before P was obeyed."""
     on_its_way = b"".join(bench.board.step() for _ in range(10))
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.session.inbound.receive(on_its_way[:80], bench.now)
@@ -123,7 +123,7 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """Somebody wanted it to be still: P goes on, motion is refused, and the sentence says so."""
+    """The caller wants it at rest: P is repeated, motion is refused, and the answer says so."""
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -137,7 +137,7 @@ def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None
 
 
 def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
-    """A fresh command moves it again."""
+    """A fresh command moves the robot again."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     bench.hears = True
@@ -151,7 +151,7 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
 
 
 def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:
-    """It was asked to be paused; meanwhile motion is refused."""
+    """The request to pause is still in force; motion is refused meanwhile."""
     assert bench.ask(Request.PAUSE, 5.0).success
     bench.board.receive(b"S")
     bench.run(0.2)

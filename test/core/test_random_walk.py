@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random services, commands, cuts, losses, restarts and stalls: what holds whatever happens."""
+"""Random requests, commands, cuts, losses, restarts and stalls, with rules that always hold."""
 
 import contextlib
 from collections import deque
@@ -30,7 +30,7 @@ class Asked:
 
 
 class Walk(Bench):
-    """A bench whose line is slow and may lose bytes, and which judges every write."""
+    """A bench whose line is slow and may lose bytes, and which checks every write."""
 
     def __init__(self, seed: int, latency_s: float, board: BoardSettings, *, run: bool) -> None:
         super().__init__(board, run=run)
@@ -72,7 +72,7 @@ class Walk(Bench):
             self.judge_time()
 
     def stall(self, seconds: float) -> None:
-        """The session is not served; the line goes on."""
+        """Do not serve the session for a time, while the line carries data."""
         for _ in range(round(seconds / TICK_S)):
             self.step_board()
         if self.session.estop_active:
@@ -157,7 +157,7 @@ class Walk(Bench):
         self.board.reboot()
 
     def act_letter(self) -> None:
-        """Send a letter that the driver did not."""
+        """Send a letter that is not from the driver."""
         self.meddled_at = self.now
         self.board.receive(self.random.choice([b"P", b"S", b"R"]))
 
@@ -244,9 +244,11 @@ STEPS = st.lists(
 def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wanted_mode(
     steps: list[tuple[str, float]], seed: int, latency_s: float, run: bool, boot_time_s: float
 ) -> None:
-    """Never motion that is old, discarded or unfit for the mode; every request answered in time;
-    P never for a board that is not known to run; healed, the board comes to the wanted mode and the
-    robot stands.
+    """Check every write and answer during random actions.
+
+    Motion is never old, discarded or unfit for the mode; every request is answered in time; P is
+    never sent to a board that is not known to run. After the faults are over, the board reaches the
+    wanted mode and the robot stands still.
     """
     walk = Walk(seed, latency_s, BoardSettings(boot_time_s=boot_time_s, seed=seed), run=run)
     walk.open()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Start and reset, and what is true of every request: one at a time, proved or refused in time."""
+"""Start, reset, and rules for all requests: one at a time, proved or refused in time."""
 
 import itertools
 
@@ -36,7 +36,7 @@ def test_on_a_silent_board_every_request_is_answered_in_time(
 
 
 def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> None:
-    """Cut in the direction to the board: pause, start and reset all say so in time."""
+    """The line to the board is cut: pause and reset both fail in time."""
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -46,7 +46,7 @@ def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> 
 
 
 def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
-    """The second is refused at once and told why."""
+    """The second request is refused at once, with the reason."""
     bench.session.request(Request.RESET, object(), bench.now)
     with pytest.raises(RequestRefused, match="a reset is under way"):
         bench.session.request(Request.PAUSE, object(), bench.now)
@@ -67,7 +67,7 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """Stop and R had not been written yet."""
+    """Stop and R, which had not been written yet, are discarded."""
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.closed(bench.now)
@@ -78,7 +78,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """This holds while a board is started, paused or reset, and for a silent one."""
+    """Needless wake-ups cost CPU time; this holds during any request and in silence."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -90,7 +90,7 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 
 
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """S is harmless while running, and said against a P in flight; the current command goes on."""
+    """S is harmless while running and undoes a P in flight; the current command continues."""
     bench.drive(0.3)
     start = len(bench.written)
     assert bench.ask(Request.START, 1.0).message == "running (nominal)"
@@ -100,7 +100,7 @@ def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench)
 
 
 def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Bench) -> None:
-    """Stop, R, the notice, the opening, data; the board counts from zero, odom does not."""
+    """The board counts from zero after Stop, R and its opening; odom continues from its pose."""
     for _ in range(20):
         bench.drive(0.5)
         bench.run(0.1)
@@ -118,7 +118,7 @@ def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Ben
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
-    """Whether it was found so or asked to be; and the answer says so."""
+    """This holds whether it was found paused or paused by request; the answer says so."""
     bench = standing() if asked else paused()
     if asked:
         assert bench.ask(Request.PAUSE, 5.0).success
@@ -132,7 +132,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """Its notices go on counting, as they did before."""
+    """The numbers in its notices continue, so it has not restarted."""
     bench = Bench(run=False)
     bench.open()
     bench.run(2.5)
@@ -157,7 +157,7 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """There was no restart, so the earlier request to pause still holds."""
+    """The board has not restarted, so the earlier request to pause is still in force."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     assert not bench.ask(Request.RESET, 10.0).success
@@ -169,7 +169,7 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 
 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
-    """Connecting, until it is known that it has not restarted."""
+    """The state is connecting until it is known that the board has not restarted."""
     bench.hears = False
     bench.events.clear()
     shown = [bench.session.state]

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board at the end of a line that can be broken, and a record of the truth.
+"""A simulated board on a line that can be broken, with a record of what was really sent.
 
-Knows bytes only as bytes. A ``Damage`` is what happens to those of one tick, or of one write.
+The module knows nothing of frames. A ``Damage`` changes the bytes of one tick, or of one write.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
 
 TICK_S: Final = 0.01
 BYTES_PER_TICK: Final = 115
-"""At 115200 baud."""
+"""Bytes of one tick at 115200 baud."""
 
 Damage = Callable[[bytes], bytes]
 
@@ -54,12 +54,12 @@ def gaining(rate: float, random: Random) -> Damage:
 
 
 def noise(random: Random) -> Damage:
-    """A wrong baudrate or a broken wire: as many bytes as the line carries, none of them true."""
+    """Replace the bytes as a wrong baud rate or a broken wire does: as many as the line carries."""
     return lambda _data: random.randbytes(BYTES_PER_TICK)
 
 
 def late(ticks: int) -> Damage:
-    """An adapter that holds everything for this time, then delivers it at once."""
+    """Hold back all data for this number of ticks, then deliver it at once, as some adapters do."""
     held: list[bytes] = []
 
     def damage(data: bytes) -> bytes:
@@ -74,10 +74,10 @@ def late(ticks: int) -> Damage:
 
 
 class BreakableLine:
-    """A board as its terminal sees it: ``receive`` and ``advance`` go through damage.
+    """A board behind a line: ``receive`` and ``advance`` go through the damage.
 
-    ``sent``: every frame and text the board sent, whole or damaged later; ``driven_at``: the last
-    tick in which its motors had a command to turn.
+    ``sent``: every frame and text that the board sent, before damage. ``driven_at``: the last tick
+    in which its motors had a command to turn.
     """
 
     tick_s = TICK_S
@@ -105,7 +105,7 @@ class BreakableLine:
         self.sent += self._kind.sent(self.board)
         if self.board.driven:
             self.driven_at = self.board.tick
-        if len(self.channels) == 1:  # damage may say something where the board says nothing
+        if len(self.channels) == 1:  # damage may add bytes where the board sends none
             packets = [(0, b"".join(data for _, data in packets))]
         arrived = [(channel, self.from_board(data)) for channel, data in packets]
         return [(channel, data) for channel, data in arrived if data]

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A busy computer: busy loops on every core, and an adapter that hands over four bytes at a time.
+"""A busy computer: busy loops on every core, and an adapter that delivers four bytes at a time.
 
-The line is undamaged, so everything that the board sent is published, and nothing else; and no
-message blames the cable.
+The line is undamaged, so exactly what the board sent must be published, and no message may name the
+cable as a cause.
 """
 
 import math
@@ -23,15 +23,18 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""A busy computer can keep the simulated board silent for so long that the driver is right."""
+"""Pause of the simulated board from which a report of its silence is right, in s."""
 TRANSIT: Final = 200
-"""Frames that may be under way when the comparison begins."""
+"""Number of frames that may be on their way when the comparison begins."""
 REACH: Final = 200
-"""Of the frames sent; a message that is not among the next of this number was never sent."""
+"""Number of sent frames among which the next message must be; otherwise it was never sent."""
 
 
 class PiecesTerminal(Terminal):
-    """A few bytes at a time, at the pace of the line. ``silent_s``: the longest pause so far."""
+    """A terminal that delivers a few bytes at a time, at the line's pace.
+
+    ``silent_s``: its longest pause so far.
+    """
 
     silent_s = 0.0
     _sent_at = math.inf
@@ -48,7 +51,7 @@ class PiecesTerminal(Terminal):
 
 
 class PiecesRig(Rig):
-    """The board is behind such an adapter."""
+    """A rig whose board is behind such an adapter."""
 
     def _make_terminal(self) -> Terminal:
         return PiecesTerminal(self.line, self.port)  # type: ignore[arg-type]
@@ -72,9 +75,9 @@ def busy_loops() -> Iterator[None]:
 
 
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
-    """Of what was published; and of what was sent between the first and the last message.
+    """Count the messages that were never sent, and the sent ones that are missing in between.
 
-    At constant speed many frames are alike, so each that may be the first message is tried.
+    At constant speed many frames are equal, so each possible first one is tried.
     """
     starts = [n for n, key in enumerate(sent) if same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))
@@ -93,7 +96,7 @@ def _compared(published: list[Key], sent: list[Key]) -> tuple[int, int]:
 
 
 def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
-    """The computer is busy while the robot is driven."""
+    """Drive the robot on a busy computer, and compare all messages with what was sent."""
     rig.drive()
     before = max(0, len(rig.line.sent) - TRANSIT)
     imu, odom, line = len(rig.imu), len(rig.odom), len(rig.driver.lines)

@@ -2,9 +2,9 @@
 
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
-Every scripted fault, random input, random walks over several seeds; with ``--minutes`` a soak of
-random walks alone. Drivers wait for real time, so the pieces run side by side, each with drivers
-and boards of its own and in a ROS domain of its own. Ends with 1 when anything went wrong.
+It has every scripted fault, random input, and random walks with several seeds; with ``--minutes``
+only a long random walk. Drivers wait for real time, so the pieces run in parallel, each with its
+own drivers, boards and ROS domain. The exit code is 1 when anything was wrong.
 """
 
 import argparse
@@ -41,7 +41,7 @@ ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
-"""Of each stop on a line that loses bytes towards the board."""
+"""Number of runs of each kind of stop on a line that loses bytes towards the board."""
 LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
 BUSY: Final = ("busy_computer", ())
@@ -49,7 +49,7 @@ BUSY: Final = ("busy_computer", ())
 
 @dataclass(slots=True)
 class Row:
-    """A row is one line of the table."""
+    """One row of the table."""
 
     name: str
     tried: int = 0
@@ -63,9 +63,10 @@ class Row:
 
 @dataclass(slots=True)
 class Outcome:
-    """Of some pieces: rows of the table, and everything anybody complained of.
+    """Result of some pieces: rows of the table, and all complaints.
 
-    ``published``: messages that were compared with what the board sent; ``wrong`` of them.
+    ``published``: number of messages that were compared with what the board sent. ``wrong``: how
+    many of these were wrong.
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -74,7 +75,7 @@ class Outcome:
     wrong: int = 0
 
     def add(self, more: "Outcome") -> None:
-        """Rows of the same name are one."""
+        """Add another result; rows of the same name are combined."""
         mine = {row.name: row for row in self.rows}
         for row in more.rows:
             if (same := mine.get(row.name)) is None:
@@ -88,7 +89,7 @@ class Outcome:
         self.wrong += more.wrong
 
     def table(self) -> str:
-        """The table in Markdown."""
+        """Return the table in Markdown."""
         lines = ["| fault | tried | robot stood after at most | |", "|---|---|---|---|"]
         lines += [str(row) for row in self.rows]
         lines += [
@@ -100,7 +101,7 @@ class Outcome:
 
 
 class Campaign(Outcome):
-    """Run one piece of the campaign in this process."""
+    """Runs one piece of the campaign in this process, and collects its result."""
 
     def __init__(self, kind: RigBoard) -> None:
         super().__init__()
@@ -109,22 +110,22 @@ class Campaign(Outcome):
 
     @property
     def outcome(self) -> Outcome:
-        """What of it another process may have."""
+        """The part of the result that can be sent to another process."""
         return Outcome(self.rows, self.complaints, self.published, self.wrong)
 
     def rig(self, kind: type[Rig] = Rig, before: str = "") -> Rig:
         return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), self._kind, before=before)
 
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
-        """Run one try."""
+        """Run a case once, and collect its complaints."""
         try:
             case(rig)
             row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
             if again:
                 rig.expect_obeys_again()
-        except Exception as error:  # whatever it is, the others are tried nevertheless
+        except Exception as error:  # whatever it is, the others still run
             rig.findings.expect(False, f"{row.name}: {error!r}")
-            rig.line.heal()  # judged: the next case has a line of its own
+            rig.line.heal()  # it is judged: the next case has an undamaged line
         row.tried += 1
         rig.findings.stood_after_s.clear()
         complaints = [f"{row.name}: {complaint}" for complaint in rig.findings.take()]
@@ -135,7 +136,7 @@ class Campaign(Outcome):
             print("the log ends:", *rig.driver.lines[-20:], sep="\n    ", flush=True)
 
     def judge(self, rig: Rig, *, damaged_bytes: bool = True) -> None:
-        """Judge the messages that one rig published."""
+        """Compare the messages that one rig published with those sent."""
         rig.judge_stream(damaged_bytes)
         self.published += rig.findings.published
         self.wrong += rig.findings.wrong
@@ -146,7 +147,7 @@ class Campaign(Outcome):
         return self.rows[-1]
 
     def faults_of_the_line(self) -> None:
-        """Each fault in each round, in one driver's life."""
+        """Run each fault of the line in each round, with one driver."""
         self._one_life(Rig, self._kind.cases or survivable, damaged_bytes=True)
 
     def faults_of_the_network(self) -> None:
@@ -196,7 +197,7 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Each stop with losses towards the board that last until the verdict."""
+        """Run each kind of stop with losses towards the board, which last until the verdict."""
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
         for number in numbers:
@@ -207,7 +208,7 @@ class Campaign(Outcome):
                     self.run(rows[name], case, rig, again=False)
 
     def busy_computer(self) -> None:
-        """Run on a busy computer; the line itself is good."""
+        """Run on a busy computer with an undamaged line."""
         row = self.row(
             f"{LOOPS} busy loops for {TICKS // 100} s, the line in pieces of {PIECE} bytes"
         )
@@ -235,7 +236,7 @@ class Campaign(Outcome):
             self.judge(rig)
 
     def soak(self, minutes: float) -> None:
-        """Run random walks within one driver's life."""
+        """Run random walks with one driver for this time."""
         row = self.row(f"soak: random walks of {SOAK_STEPS} faults")
         end, seed = time.monotonic() + 60 * minutes, 0
         with self.rig() as rig:
@@ -257,11 +258,11 @@ class Campaign(Outcome):
 
 
 Piece = tuple[str, tuple[Any, ...]]
-"""A method of ``Campaign`` and its arguments."""
+"""Name of a method of ``Campaign``, and its arguments."""
 
 
 def losses() -> list[Piece]:
-    """Fault cases with losses, in groups of ten drivers."""
+    """Return the pieces with losses towards the board, each of ten drivers."""
     starts = range(0, LOSSES, LOSSES_AT_ONCE)
     return [
         ("losses", (life, range(start, start + LOSSES_AT_ONCE)))
@@ -271,7 +272,7 @@ def losses() -> list[Piece]:
 
 
 def pieces() -> list[Piece]:
-    """The pieces in the order of the table, without the busy computer, which must run alone."""
+    """Return the pieces in the order of the table, without the busy computer, which runs alone."""
     return [
         ("faults_of_the_line", ()),
         ("faults_of_the_network", ()),
@@ -287,7 +288,7 @@ def pieces() -> list[Piece]:
 
 
 def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
-    """Run one piece in a process and a ROS domain of its own."""
+    """Run one piece in its own process and ROS domain."""
     number, (method, arguments) = numbered
     os.environ["ROS_DOMAIN_ID"] = str(1 + (os.getppid() + number) % 101)
     rclpy.init()
@@ -300,7 +301,7 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 
 
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
-    """Those that apply to the board. The longest come first."""
+    """Run the pieces that apply to the board in parallel; the longest come first."""
     total, without = Outcome(), load(board).without
     wanted = [piece for piece in wanted if without.isdisjoint((piece[0], *map(str, piece[1])))]
     with get_context("spawn").Pool(processes, maxtasksperchild=1) as pool:
@@ -315,7 +316,7 @@ def _walk(seed: int, steps: int, rig: Rig) -> None:
 
 
 def main() -> int:
-    """Run the campaign, print and write it."""
+    """Run the campaign, and print and write its table; return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=BOARDS, default="omnibot", help="that this is measured on"

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The faults, scripted: what happens while somebody drives, and what has to come of it.
+"""Scripted faults: events while a commander drives, and what must follow.
 
-A case gets a rig whose robot stands and leaves it so; ``findings`` collects what it has to say.
+A case gets a rig whose robot is at rest, and leaves it at rest; ``findings`` collects complaints.
 """
 
 import signal
@@ -25,15 +25,15 @@ Case = Callable[[R], object]
 
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
-"""How long the guard waits for a heartbeat."""
+"""Time without a heartbeat after which the guard acts, in s."""
 DAMAGED_S: Final = 1.1
-"""After the last command the robot stands by then, and the rig's grace, on a damaged line."""
+"""Time after the last command until the robot is at rest on a damaged line, in s, plus grace."""
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
-"""In the log of a driver that the board does not hear."""
+"""Log lines of a driver whose board does not receive."""
 NEXT_ATTEMPT_S: Final = 2.0
-"""The latest time after which a lost port is opened again."""
+"""Latest time after which a lost port is opened again, in s."""
 SILENCE_S: Final = 1.5
-"""How long a board may be silent before the driver takes it for lost."""
+"""Time without data after which the driver regards a board as silent, in s."""
 
 
 def ticks(seconds: float) -> int:
@@ -94,7 +94,7 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """The line damages bytes for a while, and then until the robot has to stand."""
+    """Damage bytes for a while, and further until the robot must be at rest."""
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board
@@ -106,7 +106,10 @@ def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, 
 
 
 def cut_to_the_board(rig: Rig) -> None:
-    """No stop can arrive, so the verdict is what the driver says of it; then the line heals."""
+    """Cut the line to the board: the driver must report it, since Stop cannot arrive.
+
+    The robot must stop when the line is whole again.
+    """
     rig.drive()
     mark = len(rig.driver.lines)
     rig.line.to_board = cut
@@ -143,7 +146,7 @@ def board_reboots(rig: Rig) -> None:
 
 
 def board_reboots_while_somebody_drives_on(rig: Rig) -> None:
-    """Commands go on arriving; none may reach a board that boots, whatever it takes them for."""
+    """Reboot the board while commands continue: none may reach a booting board."""
     rig.drive()
     rig.reboot_board()
     rig.probe.wait_for_state("nominal")
@@ -183,7 +186,7 @@ def unplugged_while_somebody_drives_on(rig: Rig) -> None:
 
 
 def estop(rig: Rig) -> None:
-    """Held through everything; released, the old command counts for nothing."""
+    """Latch the e-stop through all events; after its release the old command has no effect."""
     rig.drive()
     answer = rig.probe.call(SetBool, "estop", data=True)
     rig.findings.expect(answer.success, "the e-stop was refused")
@@ -217,7 +220,7 @@ def estop_by_topic(rig: Rig) -> None:
 
 
 def service_discards_the_command(service: str, rig: Rig) -> None:
-    """Pause and un-pause, or reset: who drove before has to command anew."""
+    """Pause and resume, or reset; the robot then waits for a fresh command."""
     rig.drive()
     rig.hand.leave()
     since = rig.line.tick
@@ -231,7 +234,7 @@ def service_discards_the_command(service: str, rig: Rig) -> None:
 
 
 def random_lines(seed: int) -> dict[str, Case[Rig]]:
-    """Damage to bytes; the random numbers are the seed's."""
+    """Return cases of random damage to bytes, by the seed."""
     random = Random(f"lines {seed}")
     return {
         "1 byte in 100 lost, both ways": partial(
@@ -272,7 +275,7 @@ SERVICES: Final[dict[str, Case[Rig]]] = {
 
 
 def driver_hangs(rig: Rig) -> None:
-    """Stopped like a machine that swaps; somebody drives on, and his commands queue up."""
+    """Stop the process, as swapping may do, while commands continue and queue up."""
     rig.drive()
     since = rig.line.tick
     rig.driver.process.send_signal(signal.SIGSTOP)
@@ -284,7 +287,7 @@ def driver_hangs(rig: Rig) -> None:
 
 
 def second_driver(rig: Rig) -> None:
-    """A second driver on the same port is refused, and the first one does not notice."""
+    """Start a second driver on the same port: it is refused, and the first is not disturbed."""
     rig.drive()
     with Driver(**rig.ports, **rig.kind.parameters) as other:
         said = other.wait_for_line("is in use")
@@ -304,5 +307,5 @@ HOST: Final[dict[str, Case[Rig]]] = {
 
 
 def survivable(seed: int) -> dict[str, Case[Rig]]:
-    """All that one driver goes through, one after the other."""
+    """Return all cases that one driver goes through."""
     return {**COMMANDS, **LINE, **TERMINAL, **random_lines(seed), **SERVICES, **HOST, **UNKIND}

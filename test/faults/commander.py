@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Somebody who commands the robot until he lets go."""
+"""Commanders: they command the robot until they leave."""
 
 import math
 import threading
@@ -13,17 +13,17 @@ from std_srvs.srv import SetBool
 
 DRIVE_HZ: Final = 20.0
 FAR_M: Final = 10.0
-"""A goal that no test reaches, for each m/s that was asked for."""
+"""Distance of a goal for each m/s commanded, in m; no test reaches it."""
 
 
 class Hand(Protocol):
-    """Any sender."""
+    """Any commander."""
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
-        """Send commands for about this time."""
+        """Command this motion until it leaves or another call follows."""
 
     def leave(self) -> None:
-        """Let go; whatever was commanded is to end."""
+        """Stop commanding, so that the motion ends."""
 
 
 class Stick:
@@ -45,7 +45,7 @@ class Stick:
             self._thread.start()
 
     def leave(self) -> None:
-        """The last command has been published when this returns."""
+        """Stop publishing; the last command has been published when this returns."""
         if self._thread is not None:
             self._left.set()
             self._thread.join()
@@ -57,9 +57,9 @@ class Stick:
 
 
 class Navigator:
-    """Sends the robot to a goal far away, once, when it first holds; leaves by e-stop and release.
+    """Sends a distant goal for each motion; leaves by latching and releasing the e-stop.
 
-    ``odom``: where the robot was; the newest is the last.
+    ``odom``: received odometry; its last message is the newest.
     """
 
     def __init__(self, probe: Probe, odom: list[Odometry]) -> None:
@@ -67,7 +67,7 @@ class Navigator:
         self._goals = probe.publisher(PoseStamped, "cmd_pose")
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
-        """A goal in this direction."""
+        """Send a goal in this direction."""
         self._probe.wait_for(lambda: self._odom)
         here = self._odom[-1].pose.pose
         yaw = 2 * math.atan2(here.orientation.z, here.orientation.w) + yaw_rate
@@ -79,6 +79,6 @@ class Navigator:
         self._goals.publish(goal)
 
     def leave(self) -> None:
-        """A goal has no timeout."""
+        """Latch and release the e-stop, since a goal has no timeout."""
         for data in (True, False):
             self._probe.call(SetBool, "estop", data=data)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the tests of the campaign share."""
+"""Fixtures of the campaign's tests."""
 
 from collections.abc import Iterator
 
@@ -20,5 +20,5 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """A test may run on a busy machine; ``make faults`` holds the driver to 0.1 s and 2 s."""
+    """Return larger limits for busy machines; ``make faults`` requires 0.1 s and 2 s."""
     return {"grace_s": 1.0, "ends_within_s": 10.0}

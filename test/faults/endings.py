@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a driver ends while the robot drives: asked to, by a defect, or by force.
+"""Ways in which a driver ends while the robot drives: on request, by a defect, or by force.
 
-Each ending names what is run in the driver's process first, and leaves a rig without a driver.
+Each ending names the Python that is first run in the driver's process, and leaves a rig without a
+driver.
 """
 
 import os
@@ -52,10 +53,10 @@ os.close(terminal)
 
 @dataclass(frozen=True)
 class Ending:
-    """``exit_codes``: what is right. Whatever happens, Stop is the last that the board heard.
+    """An end of the driver, with its right exit codes; Stop must be the last that is received.
 
-    ``allowed_s``, ``late_s``: how long the robot may drive on, and the process live on; ``full``:
-    the port is, of old commands. ``read``: it is the next read that fails.
+    ``allowed_s``: how long the robot may drive on. ``late_s``: how much later the process may end.
+    ``full``: the port is full of old commands. ``read``: the next read fails.
     """
 
     end: Callable[[Rig], object]
@@ -67,7 +68,7 @@ class Ending:
     read: bool = False
 
     def __call__(self, rig: Rig) -> None:
-        """End the driver while the robot drives."""
+        """End the driver while the robot drives, and check what the robot and the process do."""
         rig.drive()
         self.end(rig)
         since = rig.line.tick
@@ -90,7 +91,7 @@ def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """Signal the whole process group, as a shell or a launcher does, without a wait in between."""
+    """Signal the process group without pauses in between, as a shell or a launcher does."""
 
     def end(rig: Rig) -> None:
         for number in numbers:
@@ -100,20 +101,23 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Shut ROS down, whatever ``before`` has prepared."""
+    """Publish on the topic whose callback ``before`` has replaced."""
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))
 
 
 def by_signal_while_a_call_is_pending(rig: Rig) -> None:
-    """The test does not wait for its answer."""
+    """Send SIGTERM while a call of ``~/reset`` is pending."""
     rig.probe.call_async(Trigger, "reset")
     rig.probe.wait_for_state("connecting")
     rig.driver.process.send_signal(signal.SIGTERM)
 
 
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
-    """The robot drives on by its last command before the cable came out."""
+    """Send SIGINT after the cable is back, but before the driver has opened the port.
+
+    The robot still follows its last command.
+    """
     rig.unplug()
     rig.probe.wait_for_state("disconnected")
     rig.plug()
@@ -121,7 +125,7 @@ def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
 
 
 def while_full(end: Callable[[Rig], object], rig: Rig) -> None:
-    """The port accepts no data until the driver has ended."""
+    """End the driver while its port accepts no data."""
     with rig.terminal.full(rig.kind.old_command):
         end(rig)
         rig.driver.process.wait()
@@ -177,7 +181,7 @@ ENDINGS: Final[dict[str, Ending]] = {
 def terminal_is_closed(
     make_rig: Callable[[str], Rig], run: Callable[[Rig, Ending], object]
 ) -> None:
-    """A session over ssh that drops: SIGHUP, and no reader of its output."""
+    """Close the driver's terminal, as when an ssh session drops: SIGHUP, unread output."""
     master, slave = pty.openpty()
     with make_rig(TERMINAL.format(os.ttyname(slave))) as rig:
         os.close(slave)

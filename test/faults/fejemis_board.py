@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis, for the campaign: two ports, lines of text with sums, one robot.
+"""The Fejemis's part of the fault campaign: two ports, lines of text with sums, one robot.
 
-What it sends comes of two boards at rhythms of their own, so no message is compared with what was
-sent. It has no wheel command and no reset.
+Two boards send at rates of their own, so messages are not compared with what was sent. The robot
+has no wheel command and no reset.
 """
 
 import re
@@ -18,7 +18,7 @@ from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.fejemis import CHANNELS, FejemisSettings, SimulatedFejemis
 
 TICKS: Final = 5
-"""Of the simulated boards, in one of the rig's."""
+"""Ticks of the simulated boards in one of the rig's."""
 SILENCE_S: Final = 1.6
 ANGLE_S: Final = 0.2
 MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.MULTILINE)
@@ -27,7 +27,7 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 class Pair:
     """Both Teensys as one board with the ticks of the rig.
 
-    ``received``: lines of motion at the drive half, without sums and padding.
+    ``received``: lines of motion at the drive board, without sums and padding.
     """
 
     channels = CHANNELS
@@ -67,7 +67,7 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 
 
 def half_restarts(half: str) -> Any:
-    """Without further commands, as the half obeys again at once."""
+    """Make a case in which one half restarts; no commands follow, as it obeys again at once."""
 
     def case(rig: Rig) -> None:
         rig.drive()
@@ -81,7 +81,7 @@ def half_restarts(half: str) -> Any:
 
 
 def half_is(half: str, what: str, allowed_s: float) -> Any:
-    """One half alone; somebody drives on, in vain until it is well."""
+    """Make a case with one faulty half; commands have no effect until it works."""
 
     def case(rig: Rig) -> None:
         rig.drive()
@@ -118,7 +118,7 @@ CASES: Final = {
 
 
 def cases(seed: int) -> dict[str, Case[Rig]]:
-    """What is usual on a serial line, and each half alone."""
+    """Return the cases of a serial line, and those of each half."""
     return {**survivable(seed), **CASES}
 
 
@@ -146,9 +146,9 @@ BOARD: Final = RigBoard(
     without=frozenset(
         {
             "wheel_cmd has the wrong size",
-            "two commanders in turn",  # the other one uses wheel_cmd
+            "two commanders in turn",  # the second one uses wheel_cmd
             "~/reset",
-            "SIGTERM while a call is pending",  # of ~/reset
+            "SIGTERM while a call is pending",  # the call is that of ~/reset
             "full for long, and told once",  # each attempt hears the board for a moment
             "e-stop into a full port",  # judged by the OmniBot's frames
             "faults_of_the_network",

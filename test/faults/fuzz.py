@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random input from ROS: messages of any content and size, invalid bytes, calls."""
+"""Random input from ROS: messages of any content and size, invalid bytes, service calls."""
 
 import struct
 from collections.abc import Callable
@@ -17,14 +17,14 @@ from std_srvs.srv import SetBool, Trigger
 
 CALLS_ONE_IN: Final = 20
 BURST: Final = 10
-"""Messages to a tick: a thousand a second."""
+"""Number of messages per tick: 1000 a second."""
 HELD: Final = 0.99
-"""Of the readings, meanwhile and in the two seconds after; the board is reset in between."""
+"""Smallest share of readings published during the input and 2 s after it, resets included."""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
 def odd_float(random: Random) -> float:
-    """Anything that 64 bits can say, and the usual suspects."""
+    """Draw any 64-bit float, or one of the usual special values."""
     anything = struct.unpack("d", random.randbytes(8))[0]
     usual = (0.0, -0.0, 0.3, -0.3, 1e-300, 1e300, float("nan"), float("inf"), -float("inf"))
     return random.choice((*usual, anything))
@@ -53,12 +53,12 @@ def pose(random: Random) -> PoseStamped:
 
 
 def no_message(random: Random) -> bytes:
-    """Bytes that are not a valid message of this type, or barely one."""
+    """Draw bytes that are an invalid message of any type, or just a valid one."""
     return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
 
 
 def parameters(random: Random) -> SetParameters.Request:
-    """Values that may or may not be allowed; read-only ones and unknown names too."""
+    """Draw values that may be allowed or not, also of read-only and unknown parameters."""
     value = random.choice(
         (
             ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=odd_float(random)),
@@ -76,7 +76,7 @@ def coin(random: Random) -> bool:
 
 
 def fuzz(rig: Rig, count: int, random: Random) -> None:
-    """Send messages and calls: all calls are answered, the node lives, the readings go on."""
+    """Send messages and calls; check that calls are answered and that the node publishes on."""
     probe = rig.probe
     publishers = [
         (probe.publisher(Twist, "cmd_vel"), twist),
@@ -112,7 +112,7 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
         try:
             publisher.publish(no_message(random) if odd else message(random))
         except RCLError:
-            assert odd  # this side's own middleware would not send it
+            assert odd  # our own middleware refuses to send it
     for future in futures:
         probe.wait_for_future(future)
     probe.call(SetBool, "estop", data=False)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What discards a goal of position control: without another command the robot stands.
+"""Events that discard a goal of position control: until another command the robot is at rest.
 
-Each event returns the board's tick from which it has to.
+Each event returns the board's tick from which the robot must be at rest.
 """
 
 import signal
@@ -17,9 +17,9 @@ from std_srvs.srv import SetBool, Trigger
 from stuck import TAKES_NOTHING
 
 OLD_GOAL: Final = bytes.fromhex("FF FE 01 7F FF 7F FF 00 00")
-"""As far away as can be said."""
+"""The farthest goal that a frame can hold."""
 UNHEARD_S: Final = 0.3
-"""After this time without data from it the robot is not driven any further."""
+"""Time without data from the board after which the robot is no longer driven, in s."""
 HANGS_S: Final = 1.0
 
 
@@ -87,7 +87,7 @@ def hang(rig: GoalRig) -> int:
 
 
 def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) -> None:
-    """The goal stays discarded after everything works again."""
+    """Check that an event discards the goal, also after everything works again."""
     rig.drive()
     rig.wait_ticks(50)
     since = event(rig)
@@ -98,7 +98,7 @@ def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) ->
 
 
 def ended(number: signal.Signals, rig: GoalRig) -> None:
-    """The driver ends with and without a final Stop of its own."""
+    """Check that the robot stops when the driver ends, with a final Stop of its own or without."""
     rig.drive()
     since = rig.line.tick
     rig.driver.process.send_signal(number)

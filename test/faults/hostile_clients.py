@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""People and programs that do what they should not, while somebody drives."""
+"""Misuse by people and programs while a commander drives."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ NONSENSE: Final = (float("nan"), float("inf"), -1.0, 1e12)
 
 
 def two_commanders(rig: Rig) -> None:
-    """Body velocities and wheel rates in turn, then neither."""
+    """Command body velocities and wheel rates in turn, then neither."""
     publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
     rig.drive()
     for _ in range(40):
@@ -33,7 +33,7 @@ def two_commanders(rig: Rig) -> None:
 
 
 def other_type(rig: Rig) -> None:
-    """A TwistStamped on the same topic neither drives nor prolongs a command; it is reported."""
+    """Publish TwistStamped on the same topic: it has no effect, but is reported."""
     context = rclpy.Context()
     context.init()
     node = Node("other", namespace=rig.driver.namespace, context=context)
@@ -53,7 +53,7 @@ def other_type(rig: Rig) -> None:
 
 
 def flood_of_releases(rig: Rig) -> None:
-    """Publish ``false`` a thousand times a second: only the service releases."""
+    """Publish ``false`` 1000 times a second, while only the service may release the e-stop."""
     publisher = rig.probe.publisher(Bool, "estop")
     rig.drive()
     rig.probe.call(SetBool, "estop", data=True)
@@ -70,7 +70,10 @@ def flood_of_releases(rig: Rig) -> None:
 
 
 def everybody_calls_at_once(rig: Rig) -> None:
-    """Five clients, during a reconnection: each is answered, and none moves the robot."""
+    """Call every service from five clients during a reconnection.
+
+    Each call is answered, and none moves the robot.
+    """
     rig.drive()
     rig.hand.leave()
     rig.unplug()
@@ -99,7 +102,7 @@ def everybody_calls_at_once(rig: Rig) -> None:
 
 
 def nonsense_for_parameters(rig: Rig) -> None:
-    """Every limit and timeout, in one call and one by one; all are refused."""
+    """Set every limit and timeout to invalid values; all are refused."""
     rig.drive()
     parameters = [
         Parameter(
@@ -121,7 +124,7 @@ def nonsense_for_parameters(rig: Rig) -> None:
 
 
 def limit_lowered(rig: Rig) -> None:
-    """The limit is lowered to zero while commands continue."""
+    """Lower the limit to zero while commands continue."""
     rig.drive(yaw_rate=0.0)
     since = rig.line.tick
     for value in (0.0, 0.5):
@@ -135,7 +138,7 @@ def limit_lowered(rig: Rig) -> None:
 
 
 def flood_into_a_full_port(rig: Rig) -> None:
-    """Send 1,000 commands a second; then the port accepts data again, without commands."""
+    """Send 1000 commands a second into a full port, which then accepts data without commands."""
     publisher = rig.probe.publisher(Twist, "cmd_vel")
     fast = Twist()
     fast.linear.x = 0.4
@@ -152,7 +155,7 @@ def flood_into_a_full_port(rig: Rig) -> None:
 
 
 def guard_killed(rig: Rig) -> None:
-    """The driver drives on, with another one."""
+    """Kill the guard; the driver continues with another one."""
     rig.drive()
     (first,) = rig.driver.guards()
     os.kill(first, signal.SIGKILL)

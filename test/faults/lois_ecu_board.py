@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU, for the campaign: lines of text, no IMU, two wheels.
+"""The LOIS ECU's part of the fault campaign: lines of text, no IMU, two wheels.
 
-Its motors follow at the next of its control interrupts, 91 ms apart. What it sends is groups of
-which the driver predicts its odometry, so no message is compared with what was sent.
+Its motors follow at the next of its control interrupts, which are 91 ms apart. The driver predicts
+odometry from the board's groups of reports, so messages are not compared with what was sent.
 """
 
 from typing import Final
@@ -38,7 +38,7 @@ BOARD: Final = RigBoard(
         "reconnect_interval",
     ),
     off_within_s=0.1,
-    old_bytes_s=1.8,  # 20 kB at 115200 baud, which it hears byte by byte
+    old_bytes_s=1.8,  # 20 kB at 115200 baud, received byte by byte
     ends_later_s=1.5,  # it shows a stand after 0.6 s, which is waited for twice
     deaf_s=0.6,  # lines are lost while it sends; a lost port is open again after 0.5 s
     silent_s=0.2,  # between two groups

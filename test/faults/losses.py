@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes towards the board: before, during and after, up to the verdict.
+"""Stops on a line that loses bytes towards the board, from before the stop to the verdict.
 
-Real processes and a real pseudo-terminal. How rare a failure is cannot be seen here; that is
-measured in simulated time (test/integrity/outbound.py). Each driver meets another receiver.
+Processes and pseudo-terminal are real. Rates of failure cannot be measured here; they are measured
+in simulated time (test/integrity/outbound.py). Each driver has a board with another receiver.
 """
 
 import signal
@@ -18,34 +18,34 @@ from rig_board import RigBoard
 from std_srvs.srv import SetBool
 
 GRACE_S: Final = 0.1
-"""The rig's own, which it adds."""
+"""Grace that the rig itself adds, in s."""
 TIMED_OUT_S: Final = 1.2 - GRACE_S
 ESTOPPED_S: Final = 0.3 - GRACE_S
 ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
-"""What the end takes longer if the guard has to repeat Stop."""
+"""Additional time of an end in which the guard has to repeat Stop, in s."""
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
-    """A driver on a board of its own; the line is whole until the first stop."""
+    """Return a rig with a new driver and board; the line is undamaged until the first stop."""
     return Rig(folder, kind, settings=kind.lossy(number), **more)
 
 
 def lose(rig: Rig, number: int) -> None:
-    """Lose bytes from now on."""
+    """Lose bytes towards the board from now on."""
     rig.line.to_board = losing(RATES[number % len(RATES)], Random(number))
 
 
 def times_out(rig: Rig) -> None:
-    """The publisher ceases."""
+    """Let the publisher stop."""
     rig.drive()
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "timeout", TIMED_OUT_S)
 
 
 def is_estopped(rig: Rig) -> None:
-    """The e-stop is latched while commands continue."""
+    """Latch the e-stop while commands continue."""
     rig.drive()
     since = rig.line.tick
     answer = rig.probe.call(SetBool, "estop", data=True)
@@ -61,18 +61,18 @@ def _ends(by: signal.Signals, exit_code: int, rig: Rig) -> None:
     since = rig.line.tick
     rig.driver.process.send_signal(by)
     rig.expect_ended(exit_code, late_s=GUARD_S)
-    rig.wait_ticks(150)  # whatever the guard writes is on the line by then
+    rig.wait_ticks(150)  # by then all that the guard writes is on the line
     rig.expect_still(since, f"the driver ends by {by.name}", ENDED_S)
     rig.hand.leave()
 
 
 def is_interrupted(rig: Rig) -> None:
-    """Press ctrl-C."""
+    """Interrupt the driver, as ctrl-C does."""
     _ends(signal.SIGINT, 0, rig)
 
 
 def is_killed(rig: Rig) -> None:
-    """The guard is left."""
+    """Kill the driver; only its guard is left."""
     _ends(signal.SIGKILL, -signal.SIGKILL, rig)
 
 
@@ -80,4 +80,4 @@ LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
     {"timeout": times_out, "ctrl-C": is_interrupted},
     {"e-stop": is_estopped, "SIGKILL": is_killed},
 )
-"""What one driver goes through, one after the other; the last ends it."""
+"""Stops of one driver, one after the other; the last one ends it."""

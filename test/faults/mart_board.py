@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller, for the campaign: datagrams, no stream, and motions that block.
+"""The MART controller's part of the fault campaign: datagrams, no stream, and blocking motions.
 
-It has no line whose bytes break, but a network that loses, doubles and delays whole datagrams; what
-the network does beyond what the driver assumes is named so.
+It has no line whose bytes break, but a network that loses, doubles and delays complete datagrams.
+Faults beyond what the driver assumes of a network are named as such.
 """
 
 import socket
@@ -24,21 +24,21 @@ from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
 TICKS: Final = 5
-"""Of the simulated controller in one of the campaign's."""
+"""Ticks of the simulated controller in one of the campaign's."""
 LATE_S: Final = 0.3
-"""``network_delay``: each way of a datagram takes as long at the most."""
+"""Longest delay of a datagram each way, as the parameter ``network_delay`` has it, in s."""
 LOST_STOP_S: Final = 1.2
-"""Two stops in a row are lost, and the third is as late as can be."""
+"""Delay of the stop if two in a row are lost and the third is as late as possible, in s."""
 BLIND_S: Final = 2.0
-"""A robot that is not heard while it drives is stopped, also where an exchange takes long."""
+"""Time until a robot that drives without replies is stopped, also if exchanges are slow, in s."""
 NETWORK_S: Final = 90.0
-"""A start needs a young proof of the IMU, which a bad network rarely delivers in time."""
+"""Patience for a start, which needs a recent proof of the IMU that a bad network delays, in s."""
 STRAY_S: Final = 2.5
-"""A robot that another program drives is stopped, once in 3 s."""
+"""Time until a robot that another program drives is stopped, in s."""
 
 
 class Board(SimulatedMart):
-    """In the words of the campaign."""
+    """The simulated controller with the interface of the campaign."""
 
     def __init__(self, settings: MartSettings) -> None:
         super().__init__(settings)
@@ -50,12 +50,12 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Not what is judged here: polls go on behind the last stop."""
+        """Empty, since the last bytes are not judged here: polls follow the last stop."""
         return b""
 
 
 class MartLine:
-    """A controller and a network; in place of a ``BreakableLine``."""
+    """A controller and a network, in place of a ``BreakableLine``."""
 
     tick_s = TICK_S
 
@@ -69,7 +69,7 @@ class MartLine:
         self.network(NetworkFaults())
 
     def network(self, faults: NetworkFaults) -> None:
-        """It is so from now on."""
+        """Give the network these faults from now on."""
         self._paths = [FaultyNetwork(faults, f"{self.board.tick} {n}") for n in (0, 1)]
 
     @property
@@ -111,7 +111,7 @@ def line_of(rig: Rig) -> Any:
 
 
 def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
-    """The robot drives until the publisher ceases; what the network costs is time."""
+    """Drive until the publisher stops; a bad network may only cost time."""
     line_of(rig).network(faults)
     for twist in ((0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)):
         rig.hand.hold(twist[0], 0.0, twist[1])
@@ -123,7 +123,7 @@ def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
 
 
 def replies_are_cut(rig: Rig) -> None:
-    """No reply of the controller arrives; it receives the stop."""
+    """Cut the replies of the controller, which still receives the stop."""
     rig.drive()
     rig.line.from_board = cut
     rig.expect_still(rig.line.tick, "no replies come", BLIND_S)
@@ -133,7 +133,7 @@ def replies_are_cut(rig: Rig) -> None:
 
 
 def network_is_away(seconds: float, rig: Rig) -> None:
-    """Both ways; the robot drives on until it is reached again."""
+    """Cut the network both ways; the robot drives on until it can be reached again."""
     rig.drive()
     rig.line.from_board = rig.line.to_board = cut
     rig.wait_ticks(round(seconds / TICK_S))
@@ -144,7 +144,7 @@ def network_is_away(seconds: float, rig: Rig) -> None:
 
 
 def _wait_until_served(rig: Rig) -> None:
-    """Until the driver has heard the controller again."""
+    """Wait until the driver receives replies of the controller again."""
     rig.wait_ticks(400)
     rig.probe.wait_for_state("nominal")
 
@@ -173,7 +173,7 @@ def estop_through_a_restart(rig: Rig) -> None:
 
 
 def another_client(said: bytes, rig: Rig) -> None:
-    """Starts a motion while the robot stands."""
+    """Let another client start a motion while the robot is at rest."""
     rig.wait_ticks(350)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         port = int(rig.port.rpartition(":")[2])
@@ -183,7 +183,7 @@ def another_client(said: bytes, rig: Rig) -> None:
 
 
 def imu_dies(rig: Rig) -> None:
-    """While RM drives: the stop hangs the server, which is started again."""
+    """Let the IMU die while RM drives: the stop then hangs the server, which is restarted."""
     rig.drive()
     rig.wait_ticks(100)
     since = rig.line.tick
@@ -211,7 +211,7 @@ ASSUMED: Final = {
 
 
 def cases(_seed: int) -> dict[str, Case[Rig]]:
-    """All that one driver goes through."""
+    """Return all cases that one driver goes through."""
     mine = {name: case for name, case in COMMANDS.items() if not name.startswith("wheel_cmd")}
     return {
         **mine,
@@ -234,12 +234,12 @@ def cases(_seed: int) -> dict[str, Case[Rig]]:
 
 
 def serve(line: Any, url: str) -> ServedBoard[Any]:
-    """At this address. A port that another has just left may take a moment."""
+    """Serve the line at this address, for whose port another server may just have been closed."""
     return ServedBoard(line, udp_port=int(url.rpartition(":")[2]))
 
 
 def url(_folder: Path) -> str:
-    """Two ports in a row that are free."""
+    """Return the address of the first of two consecutive free ports."""
     for _ in range(100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
             first.bind(("127.0.0.1", 0))
@@ -263,7 +263,7 @@ BOARD: Final = RigBoard(
     wheels=0,
     services=frozenset({"reset_odometry", "estop"}),
     tuning=(),
-    off_within_s=0.3,  # a stop within a start is carried out when it has begun
+    off_within_s=0.3,  # a stop within a start waits for its beginning
     ends_later_s=2.0,
     imu=False,
     jump_stddevs=4.0,
@@ -273,7 +273,7 @@ BOARD: Final = RigBoard(
     cases=cases,
     without=frozenset(
         {
-            "faults_of_the_network",  # of a serial line's server
+            "faults_of_the_network",  # these are of a server of serial lines
             "faults_of_goals",
             "goal_ending",
             "losses",
@@ -282,7 +282,7 @@ BOARD: Final = RigBoard(
             "walk_with_goals",
             "busy_computer",
             "ctrl-C, plugged in but not yet open again",
-            "SIGTERM while a call is pending",  # of ~/reset
+            "SIGTERM while a call is pending",  # the call is that of ~/reset
             "SIGINT, the port full",
             "an exception, the port full",
             "SIGKILL, the port full",

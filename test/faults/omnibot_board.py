@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot, for the campaign."""
+"""The OmniBot's part of the fault campaign."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -26,7 +26,7 @@ def make(settings: BoardSettings | None) -> SimulatedBoard:
 
 
 def sent(board: SimulatedBoard) -> list[bytes]:
-    """The bytes that were sent in the last tick."""
+    """Return the frames that were sent in the last tick."""
     frames = []
     for frame in reversed(board.sent):
         if frame.tick != board.tick:
@@ -46,7 +46,7 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Lossy lines, each to another receiver."""
+    """Return settings with another receiver for each number, for lossy lines."""
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)
 
@@ -54,7 +54,7 @@ def lossy(number: int) -> BoardSettings:
 BOARD: Final = RigBoard(
     name="omnibot",
     make=make,
-    # 0.3 m/s and 0.2 rad/s, as the driver will have said again and again.
+    # 0.3 m/s and 0.2 rad/s, as repeated by the driver before
     old_command=bytes.fromhex("FF FE 01 00 15 00 00 00 64"),
     stop=STOP,
     opening=bytes(8) + STOP,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Rigs whose board is behind a network, or whose board's switch stands on position."""
+"""Rigs with a board behind a network, and with a board on position control."""
 
 import socket
 from pathlib import Path
@@ -15,7 +15,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 class NetworkRig(Rig):
-    """The board is behind a server on the network."""
+    """A rig whose board is behind a server on the network."""
 
     def __init__(self, folder: Path, kind: RigBoard, **options: Any) -> None:
         super().__init__(folder, kind, **options)
@@ -25,7 +25,7 @@ class NetworkRig(Rig):
 
     @property
     def server(self) -> Server:
-        """Start the server that the driver connects to."""
+        """The server to which the driver connects."""
         assert isinstance(self._terminal, Server)
         return self._terminal
 
@@ -34,7 +34,7 @@ class NetworkRig(Rig):
 
 
 class GoalRig(Rig):
-    """The board's switch stands on position: goals, not velocities."""
+    """A rig whose board is on position control: goals, not velocities."""
 
     def __init__(self, folder: Path, kind: RigBoard, **options: Any) -> None:
         settings = BoardSettings(control="position")
@@ -44,7 +44,7 @@ class GoalRig(Rig):
         return Navigator(self.probe, self.odom)
 
     def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
-        """A goal, sent until it is taken; then it is pursued without anybody's help."""
+        """Send a goal until the board follows it."""
         for _ in range(50):
             self.hand.hold(vx, vy, yaw_rate)
             if self.wait_for_board(lambda line: line.board.driven, 0.2):

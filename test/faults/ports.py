@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards whose port can be stuck, full, half-open or gone without a word.
+"""Boards whose port can be stuck, full, half-open or gone without notice.
 
-Knows descriptors and sockets; bytes only as bytes.
+The module uses descriptors and sockets, and knows nothing of frames.
 """
 
 import contextlib
@@ -28,11 +28,11 @@ from omnibot_driver.simulator.common.serving import PtyBoard
 
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27
 DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
-"""A packet filter of one instruction: return zero bytes."""
+"""A packet filter with one instruction: accept zero bytes."""
 
 
 class Terminal(PtyBoard):
-    """``deaf``: the adapter reads nothing from the kernel's buffer; it keeps sending."""
+    """A terminal. ``deaf``: the adapter does not read the kernel's buffer, but still sends."""
 
     deaf = False
 
@@ -42,7 +42,7 @@ class Terminal(PtyBoard):
 
     def _receive(self, timeout_s: float) -> Iterable[Packet]:
         if self.deaf:
-            time.sleep(timeout_s)  # in its place: the pause of a board's tick
+            time.sleep(timeout_s)  # in its place: the time of a board's tick
             return []
         heard = list(super()._receive(timeout_s))
         if not heard:
@@ -51,10 +51,10 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def full(self, old: bytes) -> Iterator[None]:
-        """Deaf for so long that the kernel's buffer is full of these words.
+        """Keep the kernel's buffer full of these commands, by not reading it.
 
-        They are 20 kB. At the end the board has heard them all: how long that takes says how busy
-        this process is.
+        They are about 20 kB. At the end, wait until the board has received them all, which takes
+        longer in a busy process.
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -69,7 +69,10 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """The same, and it accepts nothing when the driver has emptied it: its output is held."""
+        """Keep the buffer full as ``full`` does, also after the driver has discarded its content.
+
+        The terminal's output is suspended for this.
+        """
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
             with self.full(old):
@@ -85,8 +88,8 @@ class Terminal(PtyBoard):
 class Server(RunningBoard):
     """A board behind a serial-port server on the network.
 
-    ``deaf`` and ``mute``: it holds what goes to the board, or what comes from it.
-    ``accepted_at``: the board's tick at each connection.
+    ``deaf``, ``mute``: the server holds back data to the board, or from it. ``accepted_at``: the
+    board's tick at each connection.
     """
 
     deaf = mute = False
@@ -112,12 +115,12 @@ class Server(RunningBoard):
             each.close()
 
     def close_from_here(self) -> None:
-        """The server sends nothing more; it still accepts data."""
+        """Close the connection towards the driver; the server still accepts data."""
         with self.lock:
             self._peers[-1].shutdown(socket.SHUT_WR)
 
     def vanish(self) -> None:
-        """The network is cut: nothing comes in here, and nothing that goes out is confirmed."""
+        """Cut the network: packets are dropped in both directions without confirmation."""
         program = ctypes.create_string_buffer(DROP_ALL)
         rule = struct.pack("HP", 1, ctypes.addressof(program))
         self.deaf = self.mute = True
@@ -126,7 +129,7 @@ class Server(RunningBoard):
                 each.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, rule)
 
     def come_back(self) -> None:
-        """The server starts again without memory of its clients."""
+        """Restore the network, with a server that has forgotten its clients."""
         self._listener.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
         self.deaf = self.mute = False
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A real driver process on a breakable line, somebody who drives it, and the judgement of it all.
+"""A real driver process on a breakable line, a commander, and checks of both.
 
-What is judged: whether the robot stood still in time, whether every message published was sent by
-the board, whether the odometry went on without a jump, what the process costs.
+The checks: the robot is at rest in time, every published message was sent by the board, odometry
+does not jump, and the process does not grow.
 """
 
 import math
@@ -30,25 +30,25 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
 TIMEOUT_S: Final = 0.5
-"""``cmd_vel_timeout``."""
+"""The driver's ``cmd_vel_timeout`` in s."""
 GRACE_S: Final = 0.1
-"""Of stream, after the timeout."""
+"""Time after the timeout in which the robot must be at rest, in s of the stream."""
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
-"""Of x, soon after somebody had the odometry begin anew; an open gap adds to it."""
+"""Variance of x soon after a reset of odometry, in m²; acceleration in an open gap, in m/s²."""
 WRONG_ONE_IN: Final = 500
-"""Of the messages, while a byte in a hundred is lost."""
+"""At most one wrong message in this many, while one byte in 100 is lost."""
 ENDS_WITHIN_S: Final = 2.0
 
 
 @dataclass(slots=True)
 class Findings:
-    """The complaints; empty if all went well."""
+    """The complaints, empty if all went well, and figures."""
 
     complaints: list[str] = field(default_factory=list)
     stood_after_s: list[float] = field(default_factory=list)
-    """How late Stop reached the robot, by the board's clock."""
+    """How late the robot came to rest each time, in s of the board's clock."""
     published: int = 0
     wrong: int = 0
 
@@ -57,17 +57,17 @@ class Findings:
             self.complaints.append(complaint)
 
     def take(self) -> list[str]:
-        """The complaints since the last time."""
+        """Return the complaints since the last call."""
         complaints, self.complaints = self.complaints, []
         return complaints
 
 
 class Rig:
-    """Context manager. The driver's port is a symbolic link, as udev makes them.
+    """Context manager of a driver whose port is a symbolic link, as udev makes them.
 
-    ``kind``: of the board, which gets these ``settings``; ``before``: Python for the driver's
-    process; ``grace_s``: how late Stop may reach the robot; ``ends_within_s``: how long a driver
-    may take to end.
+    ``kind``: the board, which gets these ``settings``. ``before``: Python that is run first in the
+    driver's process. ``grace_s``: how much later than allowed the robot may be at rest.
+    ``ends_within_s``: how long a driver may take to end.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Rig:
         self._stack.close()
 
     def make_hand(self) -> Hand:
-        """The commander of the robot."""
+        """Make the commander of the robot."""
         stick = Stick(self.probe)
         self._stack.callback(stick.leave)
         return stick
@@ -128,12 +128,12 @@ class Rig:
 
     @property
     def ports(self) -> dict[str, str]:
-        """The driver's parameters that name them."""
+        """Parameters that name the driver's ports."""
         return dict(self.kind.ports(self.port))
 
     @property
     def terminal(self) -> Terminal:
-        """What is plugged in, where it is one."""
+        """The terminal that is plugged in; the board must have one."""
         assert isinstance(self._terminal, Terminal)
         return self._terminal
 
@@ -144,13 +144,13 @@ class Rig:
         self._terminal.deaf = False
 
     def unplug(self) -> None:
-        """The terminal goes away; the robot follows its last command."""
+        """Remove the terminal; the robot follows its last command."""
         if self._terminal is not None:
             self._terminal.__exit__(None, None, None)
             self._terminal, self._unplugged_at_s = None, time.monotonic()
 
     def plug(self) -> None:
-        """A new terminal, hardly of the old name, behind the old link."""
+        """Make a new terminal, with a new name, behind the old link."""
         if self._unplugged_at_s is not None:
             for _ in range(round((time.monotonic() - self._unplugged_at_s) / TICK_S)):
                 self.line.advance()
@@ -158,7 +158,7 @@ class Rig:
 
     @property
     def terminal_lock(self) -> Any:
-        """Held while something is done to the board."""
+        """Lock to hold while the board is changed."""
         return self._terminal.lock
 
     def _make_terminal(self) -> Any:
@@ -167,7 +167,7 @@ class Rig:
         return Terminal(self.line, self.port)
 
     def reboot_board(self) -> None:
-        """A power cycle."""
+        """Turn the board's power off and on."""
         assert self._terminal is not None
         with self._terminal.lock:
             self.line.board.reboot()
@@ -181,15 +181,15 @@ class Rig:
         end = self.line.tick + ticks
         assert self.wait_for_board(lambda line: line.tick >= end), "the board stands still"
 
-    # What is to be seen
+    # What can be seen
 
     def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
-        """Somebody drives until told to leave; returns once the motors turn."""
+        """Let the commander drive until it leaves; return when the motors turn."""
         self.hand.hold(vx, vy, yaw_rate)
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect that the motors run for this time from ``since_tick`` on, and not again."""
+        """Expect motors to run for at most this time from ``since_tick`` on, and not again."""
         ticks = round((allowed_s + self._grace_s) / TICK_S)
         self.wait_ticks(max(0, since_tick + ticks + 50 - self.line.tick))
         stood_s = max(0, self.line.driven_at - since_tick) * TICK_S
@@ -200,7 +200,7 @@ class Rig:
         )
 
     def wait_for_diagnosis(self, pattern: str) -> None:
-        """``/diagnostics`` say so of this port, from now on."""
+        """Wait for new ``/diagnostics`` with this message for this port."""
         mark = len(self._diagnostics)
         self.probe.wait_for(
             lambda: any(
@@ -211,12 +211,12 @@ class Rig:
         )
 
     def expect_said_once(self, pattern: str, mark: int) -> None:
-        """Expect it once in the lines of the log from number ``mark`` on."""
+        """Expect it exactly once in the lines of the log from number ``mark`` on."""
         times = sum(bool(re.search(pattern, line)) for line in self.driver.lines[mark:])
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 
     def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
-        """The driver leaves in time and with one of these."""
+        """Expect the driver to end in time with one of these exit codes."""
         begin_s = time.monotonic()
         try:
             code = self.driver.process.wait(PATIENCE_S)
@@ -230,16 +230,16 @@ class Rig:
         )
 
     def expect_obeys_again(self) -> None:
-        """A fresh command moves the robot; it stands when the hand leaves."""
+        """Expect a fresh command to move the robot, and rest after the commander has left."""
         self.probe.wait_for_state("nominal")
         self.drive()
         self.hand.leave()
         self.expect_still(self.line.tick, "afterwards")
 
     def judge_stream(self, damaged_bytes: bool = False) -> None:
-        """All that was published against all that was sent, and the odometry by itself.
+        """Compare everything published with everything sent, and check odometry by itself.
 
-        ``damaged_bytes``: bytes were lost or added; framing has a bound then, and it is not zero.
+        ``damaged_bytes``: bytes were lost or added, so that a few wrong frames are allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf
@@ -269,7 +269,7 @@ class Rig:
             int(number)
             for number in re.findall(r"implausible readings rejected: (\d+)", self.driver.output)
         )
-        self.findings.expect(  # what framing made up of damaged bytes may be among them
+        self.findings.expect(  # frames that damaged bytes imitate may be included
             refused <= (len(imu) or len(odom)) / one_in,
             f"{refused} readings were refused, and no bit was flipped",
         )
@@ -278,7 +278,7 @@ class Rig:
         self.findings.published += len(imu) + len(odom)
 
     def cost(self) -> tuple[int, int]:
-        """Open descriptors, and resident memory in kB."""
+        """Return the number of open descriptors, and the resident memory in kB."""
         folder = Path(f"/proc/{self.driver.process.pid}")
         status = (folder / "status").read_text()
         kilobytes = int(status.split("VmRSS:")[1].split()[0])

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the campaign needs of a kind of board, in values; a module ``<board>_board.py`` has each."""
+"""What the fault campaign must know of a kind of board; ``<board>_board.py`` has the values."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -14,27 +14,31 @@ NOTHING: Final[Mapping[str, object]] = {}
 
 @dataclass(frozen=True, kw_only=True)
 class RigBoard:
-    """``make``: a simulated one with these settings, or the usual; ``parameters``: the driver's.
+    """A kind of board in the campaign.
 
-    ``old_command``: bytes that drive it; ``stop``: what it hears last, however a driver ends;
-    ``opening``: what it hears first on a new line. ``wheels``: how many wheel_cmd has;
-    ``services``: of the common ones; ``tuning``: parameters that refuse nonsense. ``off_within_s``:
-    how long after a stop its motors are off; ``old_bytes_s``: how long it takes to hear
-    what a full port has kept; ``ends_later_s``: how much longer its driver takes to end;
-    ``deaf_s``: how long it may miss what is said on one line, so that the next one has to tell it.
-    ``silent_s``: how long it sends nothing, as a rule.
-    ``imu``: whether it sends readings of one; ``jump_stddevs``: by how many of its own standard
-    deviations an odometry that is predicted may be put right.
+    ``make``: makes a simulated board with these settings, or the usual ones. ``parameters``: those
+    of the driver. ``ports``: the parameters that name its ports, by the link to the terminal.
 
-    ``ports``: the driver's parameters that name its ports, by the link to the terminal.
+    ``old_command``: bytes of a motion command. ``stop``: the last bytes received when a driver
+    ends. ``opening``: the first bytes on a new line. ``wheels``: number of values in wheel_cmd.
+    ``services``: which of the common ones it has. ``tuning``: parameters that refuse invalid
+    values.
 
-    ``sent``: the frames of its last tick; ``not_sent``: of what was published, by kind, how many
-    messages were never sent, and of how many. ``lossy``: settings of board number n for a line that
-    loses bytes. ``without``: faults that do not apply, and pieces of the campaign.
+    ``off_within_s``: time from a stop until its motors are off. ``old_bytes_s``: time to receive
+    what a full port has kept. ``ends_later_s``: additional time for its driver to end. ``deaf_s``:
+    how long it may miss what is sent on a line, so that the next line must repeat it. ``silent_s``:
+    its longest usual pause between two transmissions.
 
-    ``line``, ``serve``, ``port``: in place of a breakable line of bytes, what carries it, and what
-    the driver's ``port`` is; ``cases``: all that one driver goes through in a round, by the number
-    of the round; None for what is usual on a serial line.
+    ``imu``: whether it has an IMU. ``jump_stddevs``: largest correction of predicted odometry, in
+    its own standard deviations.
+
+    ``sent``: returns the frames of its last tick. ``not_sent``: returns by kind how many published
+    messages were never sent, and their total. ``lossy``: returns settings of board number n for a
+    line that loses bytes. ``without``: faults and pieces of the campaign that do not apply.
+
+    ``line``, ``serve``, ``port``: replacements for a breakable line of bytes, its server, and the
+    driver's ``port``. ``cases``: returns all faults of one round by its number; None for those of a
+    serial line.
     """
 
     name: str
@@ -67,5 +71,5 @@ class RigBoard:
 
 
 def load(name: str) -> RigBoard:
-    """Load the rig of the board with this name."""
+    """Return the campaign's values for the board with this name."""
     return cast(RigBoard, import_module(f"{name}_board").BOARD)

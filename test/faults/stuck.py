@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ports that are open and take nothing: stuck adapters, full buffers, half-open sockets."""
+"""Ports that are open but accept no data: stuck adapters, full buffers, half-open sockets."""
 
 from collections.abc import Callable
 from functools import partial
@@ -16,7 +16,7 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Somebody drives on for a while, and leaves; then the adapter says all that it has held."""
+    """Drive for a while into a stuck adapter; after that it delivers everything it has held."""
     rig.drive()
     rig.terminal.deaf = True
     if mute:
@@ -29,7 +29,7 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
 
 def full(rig: Rig, *, mute: bool = False) -> None:
-    """Fill the port as after minutes; it accepts data again, with or without a reopening."""
+    """Fill the port as after minutes; it accepts data again, with or without reopening."""
     rig.drive()
     mark = len(rig.driver.lines)
     with rig.terminal.full(rig.kind.old_command):
@@ -43,11 +43,11 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """The port is opened repeatedly and the trouble reported once; then all is well."""
+    """Keep the port full: it is opened repeatedly, the fault is reported once, then all is well."""
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(rig.kind.old_command):
-        rig.probe.wait_for(lambda: len(rig.states) >= states + 6)  # opened in vain, twice
+        rig.probe.wait_for(lambda: len(rig.states) >= states + 6)  # opened twice without success
         rig.wait_for_diagnosis("accepted no data")
         rig.hand.leave()
     rig.probe.wait_for_state("nominal")
@@ -56,7 +56,7 @@ def full_for_long(rig: Rig) -> None:
 
 
 def estop_into_a_full_port(rig: Rig) -> None:
-    """The answer says that the stop is late; then it precedes every motion command."""
+    """Latch the e-stop with a full port: the answer warns, and it later precedes all motion."""
     rig.drive()
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "no command")
@@ -90,7 +90,7 @@ TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
 
 
 def server_holds(rig: NetworkRig, *, mute: bool) -> None:
-    """What is sent to it stays there, and comes all at once."""
+    """Let the server hold data back, and deliver it all at once later."""
     rig.drive()
     rig.server.deaf, rig.server.mute = True, mute
     rig.wait_ticks(200)
@@ -101,7 +101,7 @@ def server_holds(rig: NetworkRig, *, mute: bool) -> None:
 
 
 def server_closes_one_direction(rig: NetworkRig) -> None:
-    """The driver hears the end, and says its Stop into the other direction."""
+    """Close one direction: the driver notices it, and sends Stop in the other direction."""
     rig.drive()
     since, mark = rig.line.tick, len(rig.driver.lines)
     rig.server.close_from_here()
@@ -112,7 +112,7 @@ def server_closes_one_direction(rig: NetworkRig) -> None:
 
 
 def server_dies(rig: NetworkRig) -> None:
-    """No one reads the port for a while."""
+    """Close the server for a while, so that connections are refused."""
     rig.drive()
     mark = len(rig.driver.lines)
     rig.unplug()
@@ -124,7 +124,7 @@ def server_dies(rig: NetworkRig) -> None:
 
 
 def server_vanishes(rig: NetworkRig) -> None:
-    """The server ends without closing the connection, and returns without memory."""
+    """Cut the network without closing the connection; the server comes back without it."""
     rig.drive()
     before = len(rig.server.accepted_at)
     rig.server.vanish()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A busy computer loses nothing of a good line; ``make faults`` has half a minute of it."""
+"""A busy computer on a good line; ``make faults`` runs it for half a minute."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from omnibot_board import BOARD
 
 
 def test_a_busy_computer_loses_no_message(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """There are four busy loops, and pieces of four bytes."""
+    """There are four busy loops, and the adapter delivers four bytes at a time."""
     with PiecesRig(tmp_path, BOARD, **lenience) as rig:
         is_busy(rig, ticks=500)
         assert not rig.findings.take(), rig.driver.output

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""However the driver ends, the robot stands still."""
+"""Ends of the driver: after each, the robot is at rest."""
 
 from pathlib import Path
 
@@ -29,7 +29,10 @@ SOME = (
 def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """Stop first, then the port, with the right exit code, in time; by the guard if need be."""
+    """Stop comes first, then the port is closed, in time and with the right exit code.
+
+    Where the driver cannot do it, its guard stops the robot.
+    """
     with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
         assert not rig.findings.take(), rig.driver.output
@@ -38,7 +41,7 @@ def test_the_robot_stands_still_however_the_driver_ends(
 def test_a_terminal_that_is_closed_ends_the_driver_in_order(
     tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The driver cannot print any more."""
+    """The driver can no longer print."""
 
     def run(rig: Rig, end: Ending) -> None:
         end(rig)
@@ -48,7 +51,7 @@ def test_a_terminal_that_is_closed_ends_the_driver_in_order(
 
 
 def test_a_goal_ends_with_the_driver(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """The board would go on to it."""
+    """Otherwise the board would continue to the goal."""
     with GoalRig(tmp_path, BOARD, **lenience) as rig:
         GOAL_ENDINGS["a goal, and SIGKILL"](rig)
         assert not rig.findings.take(), rig.driver.output

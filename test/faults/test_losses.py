@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One of each stop on a line that loses bytes towards the board; ``make faults`` has thirty."""
+"""Each kind of stop once, on a line that loses bytes to the board; ``make faults`` has more."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from omnibot_board import BOARD
 def test_the_robot_stands_though_bytes_are_lost_on_the_way_to_it(
     number: int, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The line is not healed before the verdict."""
+    """The line still loses bytes when the result is judged."""
     with losing_rig(tmp_path, BOARD, number, **lenience) as rig:
         lose(rig, number)
         for case in LIVES[number].values():

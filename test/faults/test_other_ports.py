@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board behind a network, and one whose switch stands on position."""
+"""A board behind a network, and one with its switch on position control."""
 
 from collections.abc import Callable, Iterator
 from random import Random
@@ -19,7 +19,7 @@ SOME_GOALS = (
     "a goal, and e-stop and release",
     "a goal, and the driver hangs and goes on",
 )
-"""The others are in test_position_control, without a port; ``make faults`` has them all."""
+"""Cases run here; others are in test_position_control without a port, and in ``make faults``."""
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def network(
 def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
     case: Callable[[NetworkRig], None], network: NetworkRig
 ) -> None:
-    """The robot obeys as soon as bytes arrive again."""
+    """It obeys as soon as bytes arrive again."""
     case(network)
     network.expect_obeys_again()
     network.judge_stream()
@@ -55,7 +55,7 @@ def goals(
 def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
     case: Callable[[GoalRig], None], goals: GoalRig
 ) -> None:
-    """No second one is sent meanwhile."""
+    """The old goal is not sent again meanwhile."""
     case(goals)
     goals.expect_obeys_again()
     goals.judge_stream()
@@ -63,7 +63,7 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_and_faults_in_random_order(goals: GoalRig) -> None:
-    """A short walk."""
+    """This is a short walk; ``make faults`` and ``make soak`` have long ones."""
     walk(goals, Random(1), steps=3)
     goals.judge_stream(damaged_bytes=True)
     assert not goals.findings.take(), goals.driver.output

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the campaign knows of each board fits the campaign."""
+"""The campaign's settings of each board name only faults that exist."""
 
 import pytest
 from campaign import BOARDS, pieces
@@ -11,7 +11,7 @@ from rig_board import load
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """A name that is misspelt would leave out nothing."""
+    """A misspelt name would leave out nothing."""
     kind = load(board)
     own = (kind.cases or survivable)(0)
     assert own.keys() - kind.without

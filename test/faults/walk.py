@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Faults in random order, on top of each other, while somebody drives at random.
+"""Faults in random order, on top of each other, under random commands.
 
-Every few steps the hand leaves the stick: then the robot has to stand in time, come back to its
-state and obey a fresh command. The line heals before, but losses towards the board last until it
-has stood.
+Every few steps the commander leaves. Then the robot must be at rest in time, return to its state
+and obey a fresh command. The line's faults end before, but losses towards the board last until the
+robot is at rest.
 """
 
 from collections.abc import Callable
@@ -18,11 +18,11 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""A driver that heard nothing must first see that the robot moves."""
+"""Longest time to rest, in s: a driver that received nothing must first see the motion."""
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:
-    """Inject this many faults; returns their names in order."""
+    """Inject this many faults; return their names in order."""
     names = []
     for step in range(1, steps + 1):
         if random.random() < 0.8:
@@ -47,7 +47,7 @@ def _rest(rig: Rig, what: str) -> None:
     rig.expect_still(rig.line.tick, what, STANDS_AGAIN_S)
     rig.heal()
     rig.probe.call(SetBool, "estop", data=False)
-    for _ in range(TRIES):  # another request may be under way
+    for _ in range(TRIES):  # another request may be in progress
         answer = rig.probe.call(SetBool, "pause", data=False)
         if answer.success:
             break

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The numbers to reach, and how streams are run to compare with them."""
+"""The bounds of the integrity report, and how streams are run to compare with them."""
 
 from dataclasses import dataclass
 from random import Random
@@ -17,9 +17,9 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """At most one wrong frame in this many (None: none at all), at least this share delivered.
+    """At most one wrong frame in this many (None: none), and at least this share delivered.
 
-    All means all after the first two.
+    A share of 1.0 means all frames after the first two.
     """
 
     one_wrong_in_visible: int | None
@@ -28,16 +28,16 @@ class Bound:
     chunkers: tuple[str, ...] = tuple(CHUNKINGS)
 
     def one_wrong_in(self, chunker: str) -> int | None:
-        """The bound depends on whether the chunking keeps the line's idle gaps."""
+        """Return the bound, which depends on whether the chunking keeps the line's idle gaps."""
         visible = chunker in GAPS_VISIBLE
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
-        """The share to be delivered. Where both ends are late, a few frames wait in vain."""
+        """Return the share to deliver, which is smaller where adapter and reader are both late."""
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
     def holds(self, chunker: str, score: Score) -> bool:
-        """Whether this score reaches the bound."""
+        """Return whether the score reaches the bound."""
         if chunker not in self.chunkers:
             return True
         one_in = self.one_wrong_in(chunker)
@@ -60,17 +60,17 @@ BOUNDS: dict[str, Bound] = dict(
         strict=True,
     )
 )
-"""By fault. Added bytes: for reads that show what follows a frame."""
+"""Bounds by fault; for added bytes only with reads that contain what follows a frame."""
 
 Scores = dict[tuple[str, str, str], Score]
-"""By fault, chunking and scenario."""
+"""Scores by fault, chunking and scenario."""
 
 PLAIN_CHUNKING = "whole bursts"
-"""The plain parser makes the same of all chunkings."""
+"""Chunking for the plain parser, which makes the same of all chunkings."""
 
 
 def chunkings(fault: str) -> dict[str, Chunker]:
-    """How streams with this fault are handed over: busy readers with some faults only."""
+    """Return the chunkings for this fault; busy readers are run with some faults only."""
     return CHUNKINGS if fault in BUSY_FAULTS else CHUNKERS
 
 
@@ -90,7 +90,7 @@ def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
 
 
 def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
-    """The sum of all."""
+    """Return the sum over all scenarios."""
     total = Score()
     for scenario in SCENARIOS:
         total += scores[fault, chunker, scenario]
@@ -98,7 +98,7 @@ def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
 
 
 def over_chunkers(scores: Scores, fault: str, scenario: str) -> Score:
-    """The sum of all."""
+    """Return the sum over all chunkings."""
     total = Score()
     for chunker in chunkings(fault):
         total += scores[fault, chunker, scenario]

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A busy computer: the line is as good as ever, and the reader is scheduled late.
+"""A busy computer: the line is undamaged, but the reader is scheduled late.
 
-A read returns what is there when it is scheduled. So each of these takes the pieces in which an
-adapter hands bytes over, and says which read brings them when. Times in seconds.
+A read returns what is there when it is scheduled. Each of these chunkers takes the pieces that an
+adapter delivers, and returns which read has which bytes, and when. Times are in s.
 """
 
 from bisect import bisect_right
@@ -14,25 +14,25 @@ from carriage import CHUNKERS, Chunker, Chunks, Received
 from truth import BYTE_S
 
 LATE_SHARE, LATE_S = 0.02, (0.002, 0.030)
-"""Of the reads, and by how much: beside a navigation stack on a small computer."""
+"""Share of late reads, and their delay: as beside a navigation stack on a small computer."""
 STALL_SHARE, STALL_S = 0.002, (0.001, 0.300)
 JITTER_S = 60e-6
-"""Mean of what any wake-up takes, exponentially distributed."""
+"""Mean delay of any wake-up, exponentially distributed."""
 READ_S = 20e-6
-"""What a read takes that need not wait."""
+"""Duration of a read that need not wait."""
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
-"""Of the wake-ups beside busy loops, which wait for a turn of the scheduler, and for how long."""
+"""Share of wake-ups beside busy loops that wait for their turn, and the delay of these."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Of the wake-ups beside busy loops, behind which the process gets no more than its share."""
+"""Share of wake-ups beside busy loops after which the process is slowed, and for how long."""
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
-"""Then each read is late by this time, within 1 ms; and the time of each piece."""
+"""Delay of each read while the process is slowed, within 1 ms; and delay of each piece."""
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
-"""After this many the line is mixed again."""
+"""Number of bytes after which the kind of pieces changes."""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:
-    """Delay of one wake-up, in s."""
+    """Return the delay of one wake-up, in s."""
     late_s = random.expovariate(1.0 / JITTER_S)
     kind = random.random()
     if kind < LATE_SHARE:
@@ -43,13 +43,13 @@ def delay_s(random: Random, now: float = 0.0) -> float:
 
 
 class Turns:
-    """The wake-ups of one process beside busy loops; ``late_s``: while it is behind."""
+    """Wake-ups of a process beside busy loops; ``late_s``: range of delays while it is slowed."""
 
     def __init__(self, late_s: tuple[float, float]) -> None:
         self._late_s, self._steady_s, self._until_s = late_s, 0.0, 0.0
 
     def delay_s(self, random: Random, now: float) -> float:
-        """Delay of one wake-up, in s."""
+        """Return the delay of one wake-up, in s."""
         late_s = random.expovariate(1.0 / JITTER_S)
         kind = random.random()
         if kind < BEHIND_SHARE:
@@ -66,12 +66,12 @@ def read(
     most: Callable[[], int],
     delay_s: Callable[[Random, float], float] = delay_s,
 ) -> Chunks:
-    """A reader that takes what is there, but no more than ``most`` bytes at once."""
+    """Read what is there, but no more than ``most`` bytes at once."""
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []
     start, now = 0, 0.0
     while start < ends[-1]:
-        piece = bisect_right(ends, start)  # the first that is not taken whole
+        piece = bisect_right(ends, start)  # the first that has not been read completely
         now += READ_S
         if times[piece] > now:
             now = times[piece] + delay_s(random, times[piece])
@@ -82,7 +82,7 @@ def read(
 
 
 def few_bytes_straddling(received: Received, random: Random) -> Chunks:
-    """1 to 8 bytes, with the last of them, however long it takes to come."""
+    """Deliver 1 to 8 bytes together with the last of them, however long that takes."""
     chunks, at = [], 0
     while at < len(received.times_s):
         at = min(len(received.times_s), at + random.randint(1, 8))
@@ -96,13 +96,13 @@ def all_at_once(pieces: Chunker) -> Chunker:
 
 
 def in_parts(received: Received, random: Random) -> Chunks:
-    """Single bytes; of what is there, 1 to 8 bytes at a time."""
+    """Deliver single bytes; read 1 to 8 of those that are there."""
     pieces = CHUNKERS["single bytes"](received, random)
     return read(pieces, random, lambda: random.randint(1, 8))
 
 
 def each_by_itself(received: Received, random: Random) -> Chunks:
-    """Pieces of 1 to 8 bytes, none of which waits for another: each may be late."""
+    """Deliver pieces of 1 to 8 bytes that may each be late, independently of the others."""
     chunks: Chunks = []
     now = 0.0
     for end, time in few_bytes_straddling(received, random):
@@ -112,7 +112,7 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Read pieces of every kind, whole or in parts."""
+    """Read pieces of every kind, completely or in parts."""
     kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
     pieces: Chunks = []
     at, size = 0, len(received.data)
@@ -155,4 +155,4 @@ READERS: dict[str, Chunker] = {
     "all mixed": mixed,
 }
 BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
-"""Neither the adapter nor the reader is punctual, so times tell next to nothing."""
+"""By name: both adapter and reader are late, so times contain hardly any information."""

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What happens to the truth on its way: bytes are lost or added, and handed over in chunks.
+"""The line's effect on a byte stream: bytes are lost or added, and delivered in chunks.
 
-Knows bytes only as bytes.
+The module knows nothing of frames.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from random import Random
 from truth import BYTE_S, Truth
 
 Origins = list[int]
-"""For each byte that arrives where it stood in the truth, or -1 for one that was never sent."""
+"""For each byte that arrives: its position in the true stream, or -1 if it was never sent."""
 Fault = Callable[[int, Random], Origins]
 
 
@@ -31,7 +31,7 @@ def lost(rate: float) -> Fault:
 
 
 def added(rate: float) -> Fault:
-    """A byte of any value, anywhere."""
+    """Add single bytes of any value, each place with the same probability."""
 
     def fault(length: int, random: Random) -> Origins:
         origins: Origins = []
@@ -72,18 +72,18 @@ FAULTS: dict[str, Fault] = {
 
 @dataclass(slots=True)
 class Received:
-    """What arrives: bytes, their times, and the truth about them."""
+    """What arrives: bytes, their times in s, and the truth about them."""
 
     data: bytes
     times_s: list[float]
     origins: Origins
     intact: list[bool]
-    """For each frame of the truth, whether all its bytes arrived, with none among them."""
+    """For each true frame, whether all its bytes arrived without others among them."""
     truth: Truth
 
 
 def receive(truth: Truth, fault: Fault, random: Random) -> Received:
-    """The stream as the host's end of the line sees it."""
+    """Send the true stream through a faulty line; return it as the host receives it."""
     origins = fault(len(truth.data), random)
     data = bytes(truth.data[at] if at >= 0 else random.randrange(256) for at in origins)
     times, last = [], 0.0
@@ -104,19 +104,19 @@ def receive(truth: Truth, fault: Fault, random: Random) -> Received:
 
 
 Chunks = list[tuple[int, float]]
-"""Ends of chunks, and when each is handed over to the host."""
+"""The end of each chunk, and the time of its delivery to the host in s."""
 Chunker = Callable[[Received, Random], Chunks]
 
 
 def single_bytes(received: Received, random: Random) -> Chunks:
-    """Each byte as it comes."""
+    """Deliver each byte when it arrives."""
     return [(at + 1, time) for at, time in enumerate(received.times_s)]
 
 
 def few_bytes(received: Received, random: Random) -> Chunks:
-    """One to eight bytes with the arrival time of the last, wherever the line was idle.
+    """Deliver one to eight bytes with the last one's arrival time.
 
-    But no adapter keeps a byte for longer than 16 ms.
+    A chunk may span a pause of the line, but a byte is kept for 16 ms at most, as by any adapter.
     """
     times, chunks, at = received.times_s, [], 0
     while at < len(times):
@@ -128,14 +128,14 @@ def few_bytes(received: Received, random: Random) -> Chunks:
 
 
 def whole_bursts(received: Received, random: Random) -> Chunks:
-    """All that comes without a pause, as an adapter hands it over that watches for pauses."""
+    """Deliver all bytes up to a pause, like an adapter that waits for pauses."""
     times = received.times_s
     ends = [n for n in range(1, len(times)) if times[n] - times[n - 1] > 3e-3] + [len(times)]
     return [(end, times[end - 1]) for end in ends]
 
 
 def ftdi(received: Received, random: Random) -> Chunks:
-    """62 bytes, or what there is when the latency timer of 16 ms runs out."""
+    """Deliver 62 bytes, or what there is when the latency timer of 16 ms expires."""
     chunks: Chunks = []
     start, timer = 0, received.times_s[0] + random.uniform(0, 0.016)
     for at, time in enumerate(received.times_s):

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How long the motion monitor takes, in board time: a table for internals/motion_monitor.md.
+"""Reaction times of the motion monitor in board time: a table for internals/motion_monitor.md.
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-From the first tick in which the robot is 0.05 m/s or 0.15 rad/s from everything between rest and
-its command until Stop is on the wire; shortest and longest over all phases of the displacements.
+A time begins with the first tick in which the robot is 0.05 m/s or 0.15 rad/s outside the range
+between rest and its command, and ends when Stop is sent. The table has the shortest and the longest
+over all phases of the displacements.
 """
 
 from collections.abc import Callable
@@ -25,18 +26,18 @@ from session_bench import STOP, TICK_S, Bench
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 PERIODS_S = 0.04, 0.1
-"""Of the displacements."""
+"""Periods of the displacements, in s."""
 
 
 def robot(**settings: object) -> Callable[[float], Bench]:
-    """One that stands and runs."""
+    """Return a maker of robots at rest with these settings, by the period of displacements in s."""
     return lambda period_s: started(
         BoardSettings(running=True, delta_period_s=period_s, **settings)  # type: ignore[arg-type]
     )
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """Time from the tick in which an obeying robot starts to deviate until Stop."""
+    """Return the time in s from an obeying robot's first deviation until Stop."""
     if any(command):
         for _ in range(15):
             by_velocity(bench, command)
@@ -58,7 +59,7 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Print one row, over all phases."""
+    """Print one row, over all phases of the displacements."""
     shown = []
     for period_s in PERIODS_S:
         times = []

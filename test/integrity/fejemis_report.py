@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of ``make integrity``: its published values on lines that lose or add bytes.
+"""Integrity of the Fejemis's published values on lines with faults (``make integrity``).
 
-A simulated pair, which shares no code with the driver, is driven in curves by a session of its own;
-what both boards say then is played to another session, whole and damaged. A value is wrong that the
-whole lines did not bring. Odometry goes on from what is left, so it is judged by its distance from
-where the whole lines had it.
+A simulated pair of boards, which shares no code with the driver, is driven in curves by one
+session. The bytes of both boards are then played to other sessions, undamaged and damaged. A value
+is wrong if the undamaged lines do not have it. Odometry continues from what is left, so it is
+judged by its distance from the odometry of the undamaged lines.
 """
 
 from bisect import bisect_left
@@ -30,22 +30,25 @@ from omnibot_driver.parameters import session_settings
 from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
 
 TICKS: Final = 5
-"""Of the simulated boards, in one read."""
+"""Ticks of the simulated boards per read."""
 READ_S: Final = 0.01
 SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""With sums: the least delivered, as a part, and one wrong in how many at most; 0: none."""
+"""By fault, for lines with sums: the smallest share delivered, and at most one wrong in this many.
+
+0 means that none may be wrong.
+"""
 ASTRAY_M: Final = 0.02
 
 Stream = list[dict[int, bytes]]
-"""What comes in each read, by channel."""
+"""The bytes of each read, by channel."""
 
 
 @dataclass(slots=True)
 class Score:
-    """Counts; they add up. ``sent``: values of the whole lines. ``astray_m``: the largest."""
+    """Counts that can be added. ``sent``: undamaged values; ``astray_m``: greatest error."""
 
     sent: int = 0
     out: int = 0
@@ -62,7 +65,7 @@ class Score:
 
 
 def session() -> Session:
-    """With the defaults, and without limits that would refuse what is driven."""
+    """Make a session with the defaults, without the motion monitor, which could stop the robot."""
     values = check_all({"board": "fejemis", "motion_monitor": False})
     profile = load("fejemis")
     settings = session_settings(values, profile.kinematics(values))
@@ -70,7 +73,7 @@ def session() -> Session:
 
 
 def drive(sums: bool, seed: int, seconds: float) -> Stream:
-    """What a pair sends that is driven by another twist each second."""
+    """Return what a pair of boards sends that is commanded another twist each second."""
     random = Random(f"{sums} {seed}")
     firmware = Firmware(sums=sums)
     pair = SimulatedFejemis(FejemisSettings(firmware=firmware, seed=seed, front_m=4.0))
@@ -98,7 +101,7 @@ def drive(sums: bool, seed: int, seconds: float) -> Stream:
 
 
 def play(stream: Stream) -> Iterator[Event]:
-    """What is published of it."""
+    """Yield what a session publishes from a stream."""
     ours, now = session(), 1000.0
     ours.opened(now)
     for both in stream:
@@ -113,7 +116,7 @@ def play(stream: Stream) -> Iterator[Event]:
 
 
 def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
-    """Both lines, each damaged by itself."""
+    """Damage both lines of a stream independently."""
     drive, front = (
         pieces.damaged([both[channel] for both in stream], fault, random) for channel in (0, 1)
     )
@@ -121,18 +124,18 @@ def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
 
 
 def value_of(event: Event) -> str | None:
-    """What it says, without its stamp; None where that is not judged by itself."""
+    """Return the value without its stamp, or None where it is not judged by its value."""
     if isinstance(event, ImuEstimate):
         return f"imu {event.specific_force} {event.angular_velocity}"
     if isinstance(event, Extra) and isinstance(event.value, OrientedImuReading):
-        return f"orientation {event.value.orientation}"  # with the last sample that came
+        return f"orientation {event.value.orientation}"  # the stamp is that of the last sample
     if isinstance(event, Extra):
         return repr(event.value)
     return None
 
 
 def score(truth: list[Event], found: list[Event]) -> Score:
-    """Each value once for each time that it was sent."""
+    """Compare the published values; each is right as often as it was sent."""
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))
     for value in filter(None, map(value_of, found)):
@@ -153,7 +156,7 @@ def score(truth: list[Event], found: list[Event]) -> Score:
 
 
 def one(seconds: float, job: tuple[bool, int]) -> dict[tuple[str, bool], Score]:
-    """One stream with each fault."""
+    """Play one stream with each fault; return the scores."""
     sums, seed = job
     stream = drive(sums, seed, seconds)
     truth = list(play(stream))
@@ -167,7 +170,7 @@ def one(seconds: float, job: tuple[bool, int]) -> dict[tuple[str, bool], Score]:
 
 
 def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
-    """Rows of the table, and whether every bound holds."""
+    """Return the rows of the table, and whether every bound holds."""
     jobs = [(sums, seed) for seed in seeds for sums in SUMS]
     total = pieces.scores_of(partial(one, seconds), jobs)
     lines = [

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The judge: which frames that came out were sent there, and which intact ones are missing."""
+"""The judge: which decoded frames were really sent, and which intact ones are missing."""
 
 from bisect import bisect_left
 from collections.abc import Callable
@@ -13,11 +13,12 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Intact frames that a parser leaves out in a row, unless what follows shows that it did: a false
-frame may read as a true one that is still to come."""
+"""Most intact frames that a parser may leave out in a row, unless the next frame confirms it.
+
+A false frame may equal a true one that is sent later.
+"""
 REACH_BYTES = 600
-"""A frame that comes out was sent within this many bytes before the end of the delivered ones,
-or within the read itself."""
+"""Bytes before the end of the delivered ones, or the read itself, within which a frame was sent."""
 
 
 @dataclass(slots=True)
@@ -29,19 +30,19 @@ class Score:
     intact: int = 0
     delivered: int = 0
     texts: int = 0
-    """Intact ones, among the intact frames."""
+    """Number of texts among the intact frames."""
     texts_delivered: int = 0
     missed_beyond_two: int = 0
-    """Streams in which an intact frame after the first two is missing."""
+    """Number of streams in which an intact frame after the first two is missing."""
 
     @property
     def wrong_share(self) -> float:
-        """The share of wrong frames among those that came out."""
+        """Share of wrong frames among those decoded."""
         return self.wrong / max(1, self.out)
 
     @property
     def delivered_share(self) -> float:
-        """The share of intact frames that came out."""
+        """Share of intact frames that were decoded."""
         return self.delivered / max(1, self.intact)
 
     def __iadd__(self, other: "Score") -> "Score":
@@ -56,7 +57,7 @@ class Score:
 
 
 def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
-    """Hand over the stream and compare, in order, what comes out with what was sent."""
+    """Deliver the stream to a parser, and compare its frames, in order, with those sent."""
     frames, intact = received.truth.frames, received.intact
     origins, data = received.origins, received.data
     ends = [end for _, _, end in frames]
@@ -95,7 +96,7 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
 
 
 def _place(received: Received, key: Key, at: int, horizon: int) -> int:
-    """The next frame with this content, among those sent by then; beyond the last if none is."""
+    """Return the index of the next frame with this content sent by then, or else their number."""
     frames = received.truth.frames
     while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:
         at += 1

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU's part of ``make integrity``: its codec on a line that loses or adds bytes.
+"""Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board, which shares no code with the driver, drives in curves; the truth is what the
-decoder makes of the undamaged line. A report is wrong that was not sent there, in its order.
+The simulated board, which shares no code with the driver, drives in curves. The truth is what the
+decoder makes of the undamaged line. A report is wrong if the truth does not have it in this order.
 """
 
 from collections import Counter
@@ -21,17 +21,17 @@ from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, Si
 
 TICK_S: Final = 0.01
 STEER_EVERY: Final = 100
-"""Ticks."""
+"""Number of ticks between two commands."""
 LEAST_DELIVERED: Final = {"1 byte in 1,000 lost": 0.9, "1 byte in 100 lost": 0.5}
-"""Of the reports of the undamaged line; with these faults none may be wrong."""
+"""Smallest share of the undamaged line's reports; with these faults none may be wrong."""
 
 Stream = list[bytes]
-"""What comes in each tick."""
+"""The bytes of each tick."""
 
 
 @dataclass(slots=True)
 class Score:
-    """Counts; they add up. ``sent``: reports of the undamaged line."""
+    """Counts that can be added. ``sent``: reports of the undamaged line."""
 
     lines: int = 0
     lines_out: int = 0
@@ -46,11 +46,11 @@ class Score:
 
 
 def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
-    """What a board sends that is commanded another pair of wheel speeds each second."""
+    """Return what a board sends that is commanded another pair of wheel speeds each second."""
     random = Random(f"{firmware} {seed}")
     board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], seed=seed, running=True))
     stream = []
-    board.receive(b":233f80000066\n")  # low-pass 1: else nothing turns
+    board.receive(b":233f80000066\n")  # low-pass 1, without which nothing turns
     for tick in range(round(seconds / TICK_S)):
         if tick % STEER_EVERY == 0:
             left, right = (random.randrange(5, 40) for _ in range(2))
@@ -64,7 +64,7 @@ def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
 
 
 def decode(stream: Stream) -> tuple[list[Report], int]:
-    """All reports, and how many lines were right."""
+    """Return all reports, and the number of valid lines."""
     decoder, found = LoisDecoder(), list[Report]()
     for tick, data in enumerate(stream):
         found += decoder.feed(data, tick * TICK_S)
@@ -73,7 +73,7 @@ def decode(stream: Stream) -> tuple[list[Report], int]:
 
 
 def score(truth: list[Report], lines: int, stream: Stream) -> Score:
-    """In order: a report that comes out was sent after the one before it, or it is wrong."""
+    """Compare in order: a report is right if it was sent after the one before it."""
     found, lines_out = decode(stream)
     result = Score(lines=lines, lines_out=lines_out, sent=len(truth), out=len(found))
     left = Counter(map(repr, truth))
@@ -92,7 +92,7 @@ def score(truth: list[Report], lines: int, stream: Stream) -> Score:
 
 
 def one(seconds: float, job: tuple[Firmware, int]) -> dict[tuple[str, str], Score]:
-    """One stream with each fault."""
+    """Damage one stream with each fault; return the scores."""
     firmware, seed = job
     stream = drive(firmware, seed, seconds)
     truth, lines = decode(stream)
@@ -106,7 +106,7 @@ def one(seconds: float, job: tuple[Firmware, int]) -> dict[tuple[str, str], Scor
 
 
 def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
-    """Rows of the table, and whether every bound holds."""
+    """Return the rows of the table, and whether every bound holds."""
     jobs = [(firmware, seed) for seed in seeds for firmware in QUIRKS]
     total = scores_of(partial(one, seconds), jobs)
     lines = [

@@ -2,9 +2,9 @@
 
 """How honest the odometry of a LOIS ECU is: errors and NEES of many simulated drives.
 
-``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table; ``--nominal``:
-with wheels of the right size; ``--gains boot``: those that the board begins with. Seeds below 4000
-were used to choose constants: judge by others.
+``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. ``--nominal``:
+wheels have the right size. ``--gains boot``: the gains with which the board starts. Constants were
+chosen on seeds below 4000, so use others to judge.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from omnibot_driver.simulator.lois_ecu import QUIRKS
 
 
 def main() -> None:
-    """One row for each motion and firmware."""
+    """Print one row for each motion and firmware."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--drives", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1000)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller's part of ``make integrity``: what is published on a bad network.
+"""Integrity of what is published of a MART controller on a bad network (``make integrity``).
 
-A whole session with the simulated controller, which shares no code with the driver, in simulated
-time. A pose is wrong that is farther off than its covariance allows, as one honest pose in 200,000
-is; a voltage or a range, that differs from the truth.
+A complete session runs with the simulated controller, which shares no code with the driver, in
+simulated time. A pose is wrong if its error is beyond what one honest pose in 270,000 has by its
+covariance; a voltage or a range, if it differs from the truth.
 """
 
 import math
@@ -33,7 +33,7 @@ from omnibot_driver.core.mart.readings import (  # noqa: E402
 from omnibot_driver.simulator.common.network import NetworkFaults  # noqa: E402
 
 DRIVES_PER_SEED: Final = 3
-"""One on each variant of the server."""
+"""Number of drives per seed: one for each variant of the server."""
 FAULTS: Final = {
     "none": NetworkFaults(),
     "1 in 10 lost": NetworkFaults(lose=0.1),
@@ -48,16 +48,16 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""1 in 270,000 squares of three honest normal errors is beyond it."""
+"""Squared error over covariance above which a pose is wrong; 1 in 270,000 honest ones is."""
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
 STAY_M: Final = 1.5
-"""Farther from the beginning than this nothing new is driven: the wall is not to be hit."""
+"""Distance from the start up to which motions are commanded, so that the wall is not hit, in m."""
 
 
 @dataclass(slots=True)
 class Score:
-    """Counts; they add up. ``published``, ``wrong``: by kind of message."""
+    """Counts that can be added. ``published``, ``wrong``: by kind of message."""
 
     published: Counter[str] = field(default_factory=Counter)
     wrong: Counter[str] = field(default_factory=Counter)
@@ -72,13 +72,13 @@ class Score:
         return self
 
     def count(self, kind: str, wrong: bool) -> None:
-        """One message."""
+        """Count one message."""
         self.published[kind] += 1
         self.wrong[kind] += wrong
 
 
 def drive(name: str, seconds: float, seed: int) -> Score:
-    """Random motions, and rests between, in which sonars and battery are asked."""
+    """Drive random motions, with rests between in which sonars and battery are polled."""
     random, score = Random(f"{name} {seed}"), Score()
     bench = MartBench(
         FIRMWARES[seed % 3],
@@ -106,7 +106,7 @@ def drive(name: str, seconds: float, seed: int) -> Score:
 
 
 def _watch(bench: MartBench, score: Score) -> None:
-    """A tenth of a second, and all that was published in it; a pose when it was."""
+    """Run for 0.1 s, and judge everything published; a pose is judged when it is published."""
     seen = len(bench.events)
     for _ in range(10):
         told = len(bench.odometry)
@@ -125,7 +125,10 @@ def _watch(bench: MartBench, score: Score) -> None:
 
 
 def _is_true(sonar: SonarReading, x_m: float, yaw_rad: float) -> bool:
-    """One wall, across x, in front of where the robot began; from 254 inches on it reports -1."""
+    """Return whether a range agrees with the one wall, across x in front of the start.
+
+    The sonar reports -1 from 254 inches on.
+    """
     ahead = math.cos(yaw_rad) if sonar.side == "front" else -math.cos(yaw_rad)
     sees_m = (FRONT_M - x_m) / ahead if ahead > 0.3 else math.inf
     if math.isinf(sonar.distance_m):
@@ -134,7 +137,7 @@ def _is_true(sonar: SonarReading, x_m: float, yaw_rad: float) -> bool:
 
 
 def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
-    """Rows of the table, and whether nothing wrong was published and every robot stood."""
+    """Return the rows of the table, and whether nothing was wrong and every robot came to rest."""
     drives = range(seeds.start, seeds.start + DRIVES_PER_SEED * len(seeds))
     lines = [
         f"{len(drives)} drives of {seconds:g} s on each network:",

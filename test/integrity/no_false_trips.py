@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Hours of driving, in simulated time, with robots that obey: how often the motion monitor trips.
+"""Hours of simulated driving with robots that obey: how often does the motion monitor trip?
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
 
-``--first`` is the seed of the first robot, ``--period`` the seconds of a displacement. Ends with 1
-when one was stopped.
+``--first`` is the seed of the first robot, ``--period`` the period of displacements in s. The exit
+code is 1 when a robot was stopped.
 """
 
 import argparse
@@ -18,7 +18,7 @@ SECONDS_EACH = 300.0
 
 
 def main() -> int:
-    """Drive and count."""
+    """Drive all robots, and print what happened."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--hours", type=float, default=10.0)
     arguments.add_argument("--first", type=int, default=0)

@@ -2,10 +2,9 @@
 
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-Every scene is played by the real session and goes over a damaged line to every receiver; the fault
-stays on until the verdict. ``--share`` of the trials for a shorter run, which writes nothing;
-``--examples`` shows bytes that led to a complaint. Ends with 1 when a bound is missed on any
-receiver.
+The real session plays every scene over a damaged line to every receiver; the faults last until the
+verdict. ``--share``: run this part of the trials, and write nothing. ``--examples``: show the bytes
+that led to a fault. The exit code is 1 when a bound is missed on any receiver.
 """
 
 import argparse
@@ -27,17 +26,16 @@ OTHERWISE: Final = {
     "mart": "datagrams arrive whole or not at all; tests search all that their losses can do",
     "fejemis": "outbound lines carry a sum; tests try all losses of one and two characters",
 }
-"""Boards of which nothing is measured here, and why."""
+"""Boards for which nothing is measured here, and why."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest part of the time under uncommanded set-points, and one long one in this many
-    frames.
+    """Largest share of time under uncommanded set points, and one long one in this many frames.
 
-    Stray motion, false letters and robots that are still driven: none; at `overdue` False that is
-    only reported.
+    Stray motion, false letters and robots that still drive are never allowed. With ``overdue``
+    False, robots that still drive are only reported.
     """
 
     share: float = 1.0
@@ -45,7 +43,7 @@ class Bound:
     overdue: bool = True
 
     def missed(self, score: Score) -> list[str]:
-        """The figures beyond the bound."""
+        """Return the names of the figures beyond the bound."""
         found = {
             "stray motion": score.strayed,
             "false letters": score.false_letters,
@@ -66,27 +64,27 @@ BOUNDS: Final[dict[str, Bound]] = dict(
 
 
 def none_of(count: int, total: int) -> str:
-    """A count that is to be zero."""
+    """Format a count that should be zero."""
     return f"0 of {total:,}" if not count else f"**{count:,} of {total:,}**"
 
 
 def one_in(count: int, total: int) -> str:
-    """A rate."""
+    """Format a rate."""
     return f"1 in {total / count:,.0f}" if count else f"0 of {total:,}"
 
 
 def ms(seconds: float) -> str:
-    """A time."""
+    """Format a time."""
     return f"{1e3 * seconds:.1f} ms" if seconds else "-"
 
 
 def share(score: Score) -> str:
-    """The part of the time with an uncommanded set-point."""
+    """Format the share of time with an uncommanded set point."""
     return f"{score.uncommanded_s / score.driving_s:.3%}" if score.driving_s else "-"
 
 
 def table(scores: Scores) -> tuple[list[str], bool]:
-    """Rows of the tables, and whether every bound holds on every receiver."""
+    """Return the rows of the tables, and whether every bound holds on every receiver."""
     lines = [
         "| loss | receiver | trials with stray motion | still driving | uncommanded, of the time "
         "| longer than 2 ms, of the frames | longest | false letters | |",
@@ -186,7 +184,7 @@ def _others(scores: Scores) -> Iterator[str]:
 
 
 def main() -> int:
-    """Run the trials, print and write the figures."""
+    """Run the trials, and print and write the figures; return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=("omnibot", *OTHERWISE), default="omnibot", help="that is measured"

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A scene as the driver plays it: rehearsed once for all trials in which the board shows the same.
+"""What the driver writes in a scene; rehearsed once for all trials with the same board states.
 
-The line from the board is whole, so what the driver writes depends on nothing but what the board
-shows: its mode, and whether the robot moves. A `Course` is what the session writes while the board
-shows one thing after another. When it shows something else in a trial, that trial goes on with
+The line from the board is undamaged, so what the driver writes depends only on what the board
+shows: its mode, and whether the robot moves. A ``Course`` has what the session writes for one
+sequence of states shown. When the board shows something else in a trial, the trial continues with
 another course, which is rehearsed when it is first needed.
 """
 
@@ -22,8 +22,8 @@ from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 class Understood:
     """What a receiver makes of an undamaged course of writes.
 
-    held: by it after each write. alike_until: by write, the first one after it that is not of the
-    same kind (motion, or none), or is not understood as exactly what it says.
+    held: the bytes that it holds after each write. alike_until: for each write, the next one of
+    another kind (motion, or none), or the next that is not understood exactly as sent.
     """
 
     held: list[bytes]
@@ -31,7 +31,7 @@ class Understood:
 
 
 class Course:
-    """What the driver writes in a scene while the board shows this `history`."""
+    """What the driver writes in a scene while the board shows this ``history``."""
 
     def __init__(self, scene: Scene, history: History | None = None) -> None:
         self.scene = scene
@@ -44,7 +44,7 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """The course that this one becomes when the board shows something else from a tick on."""
+        """Return the course to continue with if the board shows something else from a tick on."""
         other = self._others.get((tick, shown))
         if other is None:
             other = Course(self.scene, (*self.history, (tick, shown)))
@@ -52,7 +52,7 @@ class Course:
         return other
 
     def understood(self, kind: ReceiverKind) -> Understood:
-        """The commands as a receiver of this kind understands them, awake and running."""
+        """Return what a receiver of this kind, awake and running, makes of the course."""
         if kind not in self._understood:
             self._understood[kind] = self._understand(kind)
         return self._understood[kind]

@@ -2,9 +2,8 @@
 
 """The driver's side of an outbound trial: what the real session writes, and when.
 
-A `Scene` says what is wanted of the driver. `rehearse` runs the session through it in simulated
-time, given what the board shows. What ends a driver, its link and its guard, is written here anew
-as pure words.
+A ``Scene`` is what the driver is asked to do. ``rehearse`` runs the session through it in simulated
+time, with what the board shows. The end of a driver, by its link and its guard, is imitated here.
 """
 
 import contextlib
@@ -29,17 +28,17 @@ from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import SILENCE_S, STANDS_WITHIN_S
 
 READ_S: Final = 0.002
-"""How long after a tick its bytes are read."""
+"""Time between a tick and the read of its bytes, in s."""
 STANDS: Final = Shown("running", False)
 CLOCK_S: Final = 1e-6
-"""A clock that is read again has gone on."""
+"""Time between two readings of the clock, in s."""
 History = tuple[tuple[int, Shown], ...]
 """What the board shows, each from a tick on."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Bytes that the driver or its guard writes; `flush`: what waits is dropped before."""
+    """Bytes that the driver or its guard writes; ``flush``: drop waiting bytes first."""
 
     at_s: float
     data: bytes
@@ -48,7 +47,7 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is wanted of the session at a time; a refusal is an answer like any other."""
+    """An action on the session at a time; it may be refused."""
 
     at_s: float
     do: Callable[[Session, float], object]
@@ -56,14 +55,13 @@ class Command:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """One script.
+    """One script of the driver's actions; times in s.
 
-    begins: what the board shows at first; run: whether the driver is to start it.
-    control: where the board's switch stands. linear_scale: LSB per m/s.
-    faults_from_s: the line is whole until then, and not again.
-    still_by_s: the robot has to stand by then.
-    exits_s, killed_s: when the driver ends, and how; on_exit: what it leaves behind.
-    guard_after_s: so soon after that its guard acts.
+    begins: what the board shows at first; run: whether the driver starts it. control: position of
+    the board's switch. linear_scale: LSB per m/s. faults_from_s: the line has faults from then on.
+    still_by_s: the robot must be at rest by then. exits_s, killed_s: when the driver ends, or is
+    killed; on_exit: what it does to the board. guard_after_s: time from that end until the guard
+    acts.
     """
 
     kind: str
@@ -84,7 +82,7 @@ class Scene:
 
 
 def rehearse(scene: Scene, history: History) -> list[Write]:
-    """All that is written from the opening of the port on."""
+    """Return everything that is written from the opening of the port on."""
     return [write for write in _Rehearsal(scene).run(dict(history)) if write.at_s < scene.ends_s]
 
 
@@ -108,7 +106,7 @@ class _Rehearsal:
         self._writes: list[Write] = []
 
     def run(self, changes: dict[int, Shown]) -> list[Write]:
-        """Run the events in the order of their times."""
+        """Run the events in the order of their times; return the writes."""
         scene, session = self._scene, self._session
         wishes = iter(sorted(scene.wishes, key=lambda wish: wish.at_s))
         wish = next(wishes, None)
@@ -147,8 +145,9 @@ class _Rehearsal:
         self._session.take_events()
 
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
-        """Leave as the link does: Stop until the robot is seen to stand, a last look, or the
-        guard.
+        """Leave as the link does: send Stop until the robot is at rest, then watch it in silence.
+
+        If it does not come to rest, the guard writes.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)
@@ -173,7 +172,7 @@ class _Rehearsal:
             self._writes += self._guards_words(now)
 
     def _guards_words(self, now: float) -> Iterator[Write]:
-        """What the guard writes; it drops what waits."""
+        """Yield what the guard writes; it drops waiting bytes first."""
         words = joined(self._bot.stop())
         if self._session.estop_active:
             words = joined(self._bot.emergency_stop()) + words

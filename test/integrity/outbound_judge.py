@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The judge of an outbound trial: what was understood, held against what was sent.
+"""The judge of an outbound trial: it compares what was understood with what was sent.
 
-- The driver *drives* from the first byte of a write with a motion frame until the next frame that
-  is none is due in full at the board; from then until the next such write it *stands*.
-- A set-point is *commanded* if, when it is understood, it is among the control frames of the write
-  on the line or of the write before. It stays so until another frame is understood, however old.
-- Any other is *uncommanded*, from when it is understood while the driver drives until the next one
-  that is commanded, or a pause or a reboot.
+- The driver *drives* from the first byte of a write with a motion frame until the next other frame
+  should have arrived completely at the board; then it *stands* until the next such write.
+- A set point is *commanded* if, when it is understood, it is among the control frames of the write
+  on the line or of the write before. It stays so at any age until another frame is understood.
+- Any other set point is *uncommanded*, from when it is understood while the driver drives until the
+  next commanded one, or a pause or a reboot.
 - A motion frame that is understood while the driver stands is *stray*.
-- A letter that acts is *false* if its byte is none of the letters sent, and *added* if the line has
-  added or changed that byte.
+- A letter that acts is *false* if its byte is not one of the letters sent, and *added* if the line
+  has added or changed that byte.
 """
 
 import math
@@ -29,14 +29,13 @@ _LONGEST: Final = ("stray_s", "longest_s")
 
 @dataclass(slots=True)
 class Score:
-    """Counts and times; they add up.
+    """Counts and times that can be added; times in s.
 
-    strayed: trials with stray motion; stray_s: the longest of it.
-    overdue, for_good: trials in which the robot was driven when it had to stand, and those in which
-        it was at the end.
-    driving_s, frames: how long the driver drove, and the control frames sent meanwhile.
-    uncommanded_s, uncommanded, long, longest_s: the time under uncommanded set-points, how many,
-        those beyond LONG_S, and the longest.
+    strayed: number of trials with stray motion. stray_s: its longest duration. overdue, for_good:
+    number of trials in which the robot was driven when it had to be at rest, and at the end.
+    driving_s, frames: time for which the driver drove, and number of control frames sent meanwhile.
+    uncommanded_s, uncommanded, long, longest_s: total time of uncommanded set points, their number,
+    the number of those longer than LONG_S, and the longest.
     """
 
     trials: int = 0
@@ -65,9 +64,9 @@ class Score:
 
 
 class Judge:
-    """Hears of every write and of everything that is understood, in the order of time.
+    """Follows every write, and everything that is understood, in the order of time.
 
-    ``driving``: whether the driver drives. ``calm``: no set-point is stray or uncommanded.
+    ``driving``: whether the driver drives. ``calm``: whether no set point is stray or uncommanded.
     """
 
     def __init__(self) -> None:
@@ -81,18 +80,18 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Whether no uncommanded set-point is in force."""
+        """Whether no uncommanded set point is in force."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":
-        """A judge of a further trial, which adds to this score."""
+        """Return a judge of a further trial, which adds to this score."""
         other = copy(self)
         other.score = score
         score.trials += 1
         return other
 
     def write(self, items: Items, start_s: float) -> None:
-        """The first byte of a write is on the line."""
+        """Note that the first byte of a write is on the line."""
         self._before, self._now = self._now, items
         if items.moves and not self.driving:
             self.driving = True
@@ -106,13 +105,13 @@ class Judge:
                 self.driving = False
 
     def writes(self, last: Items, frames: int) -> None:
-        """Some went by as they were, all of the same kind as the one before; the last of them."""
+        """Note writes that arrived undamaged, all of the kind before; ``last``: the newest."""
         self._now = last
         if self.driving:
             self.score.frames += frames
 
     def frame(self, frame: ControlFrame, at_s: float) -> str:
-        """A control frame is understood; what is wrong with it, if anything."""
+        """Note that a control frame is understood; return what is wrong with it, if anything."""
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)
             if not is_motion(frame.mode, frame.values):
@@ -133,7 +132,7 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """A letter acts, whose byte is the write's ``at``, or below zero if it is the line's."""
+        """Note a letter that acts; ``at``: its byte's place in the write, negative if added."""
         if at < 0:
             self.score.added_letters += 1
         elif (at, letter) not in self._now.letters:
@@ -142,7 +141,7 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the set-point in force."""
+        """End the set point in force."""
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s
@@ -156,7 +155,7 @@ class Judge:
             self._stray_from_s = None
 
     def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
-        """The scene is over; whether the robot was driven when it had to stand, or is now."""
+        """End the scene; return whether the robot is driven, or was when it had to be at rest."""
         self.no_setpoint(at_s)
         if self.driving:
             self.score.driving_s += at_s - self._driving_from_s

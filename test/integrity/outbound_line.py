@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What happens to the driver's bytes on their way to the board.
+"""The line from the driver to the board, with its faults.
 
-Knows bytes only as bytes.
+The module knows nothing of frames.
 """
 
 import math
@@ -14,21 +14,24 @@ ADDED: Final = -1
 CHANGED: Final = -2
 
 Arrival = tuple[int, float, int]
-"""A byte; its place among those of its write, a fraction for one in between; and its origin: that
-place, or ADDED or CHANGED."""
+"""A byte, its position in its write, and its origin.
+
+The position is a fraction for an added byte; the origin is the position, ADDED or CHANGED.
+"""
 Change = Callable[[bytes, int, Random], list[Arrival]]
 
 
 class Line(Protocol):
-    """One line in one trial. `whole`: how many bytes arrive as they are before the next fault.
+    """One line in one trial. ``whole``: bytes that arrive undamaged before the next fault.
 
-    A sender of a write that is no longer takes it off `whole`, and carries the others.
+    For a write of at most ``whole`` bytes the caller only subtracts its length from ``whole``;
+    other writes go through ``carry``.
     """
 
     whole: int
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """The bytes that arrive of a write."""
+        """Return the bytes of a write that arrive."""
 
 
 Fault = Callable[[Random], Line]
@@ -42,7 +45,7 @@ class SingleFaults:
         self._rate, self._change, self._random = rate, change, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """The bytes that arrive of a write."""
+        """Return the bytes of a write that arrive."""
         arrivals: list[Arrival] = []
         at = 0
         while at < len(data):
@@ -57,24 +60,24 @@ class SingleFaults:
 
 
 class NoFaults:
-    """A good line."""
+    """A line without faults."""
 
     whole = 1 << 62
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """The line without faults: all bytes arrive."""
+        """Return all bytes, undamaged."""
         return [(byte, at, at) for at, byte in enumerate(data)]
 
 
 class Bursts:
-    """Bytes in a row are lost, over any number of writes; `rate` of the bytes begin one."""
+    """A line that loses bytes in a row, also over several writes, with bursts at ``rate``."""
 
     def __init__(self, rate: float, longest: int, random: Random) -> None:
         self.whole, self._gone = _gap(rate, random), 0
         self._rate, self._longest, self._random = rate, longest, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """The bytes that arrive of a write."""
+        """Return the bytes of a write that arrive."""
         arrivals: list[Arrival] = []
         for at, byte in enumerate(data):
             if self.whole:
@@ -88,7 +91,7 @@ class Bursts:
 
 
 def _gap(rate: float, random: Random) -> int:
-    """The number of bytes before the next fault."""
+    """Return the number of bytes before the next fault."""
     return int(math.log(1.0 - random.random()) / math.log(1.0 - rate))
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which outbound trials are run, how many and on which boards; their scores by name."""
+"""The choice of outbound trials: scenes, numbers and boards; scores by name."""
 
 import math
 import os
@@ -20,19 +20,19 @@ from outbound_trial import BoardKind, Memo, Trial
 from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 
 SCRIPTS: Final = 6
-"""Of each scene, with other commands each."""
+"""Number of scripts per scene, each with other commands."""
 NEEDED: Final = 10_000
-"""Trials for each receiver and loss; at 1 byte in 100 for each of some endings."""
+"""Number of trials per receiver and loss; at 1 byte in 100, per scene of ``HURRIES``."""
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
 DRIVEN: Final = 150
-"""Trials of each script that only drives."""
+"""Number of trials of each script without an ending."""
 OTHER_TRIALS: Final = 20
-"""Of each script with faults that have no bound."""
+"""Number of trials of each script with faults that have no bound."""
 ESTOPS: Final = ("e-stop", "goal", "exit")
-"""Scenes in which it matters whether the board knows an emergency stop."""
+"""Scenes in which it matters whether the board obeys an emergency stop."""
 BOOTS: Final = ("reset", "exit")
-"""Scenes in which it may matter what the wake-up counts."""
+"""Scenes in which the bytes received during the boot may count as the wake-up bytes."""
 
 RECEIVERS: Final = {
     f"{framing.replace('_', ' ')}, letters {letters}": (framing, letters)
@@ -40,11 +40,11 @@ RECEIVERS: Final = {
     for letters in ("between", "anywhere")
 }
 Scores = dict[tuple[str, str, str], Score]
-"""By fault, receiver and scene."""
+"""Scores by fault, receiver and scene."""
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """What a receiver's name stands for in a scene, and the scene's name with each."""
+    """Yield the boards that a receiver's name means in a scene, each with the scene's name."""
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
         name = f"{scene}, {'obeyed' if obeys else 'ignored'}" if scene == "e-stop" else scene
@@ -54,7 +54,7 @@ def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
 
 
 def trials(fault: str, scene: str) -> int:
-    """The trials of each script, for each receiver."""
+    """Return the number of trials of each script, for each receiver."""
     if fault in OTHERS:
         return OTHER_TRIALS
     if scene in DRIVES:
@@ -66,7 +66,7 @@ def trials(fault: str, scene: str) -> int:
 def one(
     share: float, job: tuple[str, int], faults: Mapping[str, Fault] = FAULTS
 ) -> tuple[Scores, int]:
-    """One script on all boards with each fault, and how often it was rehearsed."""
+    """Run one script on all boards with each fault; return scores and the number of rehearsals."""
     scene, seed = job
     course = Course(SCENES[scene](Random(f"{scene} {seed}")))
     scores: Scores = {}
@@ -92,7 +92,7 @@ def add(total: Scores, more: Scores) -> None:
 
 
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
-    """The sum of one scene's, or of all that end; of one receiver's or of all."""
+    """Return the sum over one scene, or all with an ending, and over one receiver, or all."""
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():
         wanted = its_scene == scene if scene else its_scene not in DRIVES
@@ -102,7 +102,7 @@ def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> 
 
 
 def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
-    """All of it, on all processors; how often a session was rehearsed."""
+    """Run all trials on all processors; return scores and the number of rehearsals."""
     jobs = [(scene, seed) for seed in range(scripts) for scene in kinds]
     total: Scores = {}
     rehearsals = 0

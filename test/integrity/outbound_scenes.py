@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is wanted of the driver in the outbound trials: drives, and every way in which one ends.
+"""Scripts of the outbound trials: drives, and every way in which a drive ends.
 
-A scene is made of a seed. Speeds are random within the limits, and often such that a byte of the
-frame would be a letter or a header.
+A scene is made from a seed. Speeds are random within the limits, and often such that a byte of the
+frame equals a letter or a header.
 """
 
 import math
@@ -22,17 +22,17 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""The board runs and is known to run by then."""
+"""Time at which the board runs and the driver knows it, in s."""
 TIMEOUT_S: Final = 0.5
 STANDS_S: Final = 1.2
-"""After the last command the robot stands by then."""
+"""Time after the last command until the robot must be at rest, in s."""
 ESTOPPED_S: Final = 0.3
 EXITED_S: Final = 0.5
 DRIVE_S: Final = 1.5
 DRIVE_RATES_HZ: Final = (20.0, 50.0, 100.0)
 RATES_HZ: Final = (10.0, 20.0, 30.0, 50.0, 100.0)
 AWKWARD_LSB: Final = (-1, -2, -6, 80, 82, 83, -176, -174, -173, 250, 0)
-"""Whose bytes are FF, FE, or letters."""
+"""Yaw rates in LSB whose bytes are FF, FE or letters."""
 
 
 def _twist(random: Random) -> BodyTwist:
@@ -51,7 +51,7 @@ def _rates(random: Random) -> tuple[float, float, float]:
 def driving(
     random: Random, begin_s: float, end_s: float, *, by_wheels: bool = False, rate_hz: float = 0.0
 ) -> list[Command]:
-    """Commands at a random rate that change now and then."""
+    """Return commands at a random rate, which change now and then."""
     rate_hz, changes = rate_hz or random.choice(RATES_HZ), random.choice((0.0, 0.1, 0.1, 1.0))
     wishes = []
     now = begin_s
@@ -92,7 +92,7 @@ def _estop(active: bool) -> Callable[[Session, float], object]:
 
 
 def _common(random: Random) -> dict[str, object]:
-    """Settings that have an acceleration limit, another scale or another rate now and then."""
+    """Draw settings that sometimes have an acceleration limit, another scale or another rate."""
     return {
         "linear_scale": random.choice((70.0, 70.0, 233.0)),
         "rate_hz": random.choice((20.0, 20.0, 20.0, 10.0, 50.0)),
@@ -103,7 +103,7 @@ def _common(random: Random) -> dict[str, object]:
 
 
 def _leg(random: Random) -> tuple[list[Command], float]:
-    """A drive, and the time of its last command."""
+    """Return a drive and the time of its last command."""
     wishes = driving(random, FROM_S, FROM_S + random.uniform(0.1, 0.35), by_wheels=_wheels(random))
     return wishes, wishes[-1].at_s
 
@@ -125,7 +125,7 @@ def drive(rate_hz: float, random: Random) -> Scene:
 
 
 def timeout(random: Random) -> Scene:
-    """The commander ceases."""
+    """The commander stops sending."""
     wishes, last_s = _leg(random)
     return Scene(
         kind="timeout",
@@ -154,7 +154,7 @@ def zero(random: Random) -> Scene:
 
 
 def switch(random: Random) -> Scene:
-    """cmd_vel and wheel_cmd take turns, with pauses and without."""
+    """Commands on cmd_vel and wheel_cmd alternate, with and without pauses."""
     wishes: list[Command] = []
     now = FROM_S
     for number in range(4):
@@ -172,7 +172,7 @@ def switch(random: Random) -> Scene:
 
 
 def pause(random: Random) -> Scene:
-    """A scene with ``~/pause`` while the robot drives or stands."""
+    """``~/pause`` is called while the robot drives or is at rest."""
     wishes, last_s = _leg(random) if random.random() < 0.7 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
     wishes.append(Command(asked_s, _request(Request.PAUSE)))
@@ -186,7 +186,7 @@ def pause(random: Random) -> Scene:
 
 
 def start(random: Random) -> Scene:
-    """``~/start`` of a paused board, a drive, and its end."""
+    """``~/start`` is called for a paused board; a drive and its end follow."""
     wishes = [Command(FROM_S, _request(Request.START))]
     wishes += driving(random, FROM_S + 0.05, FROM_S + random.uniform(0.3, 1.0))
     last_s = wishes[-1].at_s
@@ -202,7 +202,7 @@ def start(random: Random) -> Scene:
 
 
 def reset(random: Random) -> Scene:
-    """``~/reset`` while it drives; the board comes back and is started."""
+    """``~/reset`` is called while it drives; the board comes back and is started."""
     wishes, last_s = _leg(random) if random.random() < 0.8 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
     wishes.append(Command(asked_s, _request(Request.RESET)))
@@ -216,7 +216,7 @@ def reset(random: Random) -> Scene:
 
 
 def estop(random: Random) -> Scene:
-    """The e-stop is latched while somebody drives on, and released."""
+    """The e-stop is latched while the commander still sends, and released."""
     begin_s = FROM_S + random.uniform(0.1, 0.3)
     released_s = begin_s + random.uniform(0.35, 0.6)
     wishes = driving(random, FROM_S, released_s - 0.05, by_wheels=_wheels(random))
@@ -231,7 +231,7 @@ def estop(random: Random) -> Scene:
 
 
 def goal(random: Random) -> Scene:
-    """A pose to drive to and another one; neither expires, so the e-stop ends it."""
+    """Two goal poses are sent; they do not expire, so the e-stop ends the drive."""
     wishes = [
         Command(at_s, partial(_go, Pose(*(random.uniform(-9, 9) for _ in range(3)))))
         for at_s in (FROM_S, FROM_S + random.uniform(0.05, 0.4), FROM_S + 0.4)
@@ -249,7 +249,7 @@ def goal(random: Random) -> Scene:
 
 
 def leave(random: Random) -> Scene:
-    """The driver ends while somebody drives; now and then its e-stop is latched."""
+    """The driver ends while the commander sends, sometimes with its e-stop latched."""
     exits_s = FROM_S + random.uniform(0.1, 0.3)
     wishes = driving(random, FROM_S, exits_s, by_wheels=_wheels(random))
     if random.random() < 0.2:
@@ -266,7 +266,7 @@ def leave(random: Random) -> Scene:
 
 
 def kill(random: Random) -> Scene:
-    """The driver is killed, also in the middle of a write; its guard writes."""
+    """The driver is killed, sometimes within a write; then its guard writes."""
     wishes, last_s = _leg(random)
     killed_s = last_s + random.choice((0.0002, 0.0007, 0.0012, 0.002, 0.02))
     if random.random() < 0.2:

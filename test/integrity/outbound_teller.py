@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's side of the line to the driver, as simple as it can be, without a line of the driver.
+"""A minimal simulation of what a board sends, without any code of the driver.
 
-It sends what a board sends that is booting, paused or running, and whose robot stands or moves.
-Moving, it does what the last motion frame that was written says, at once and without slip: whether
-it does something else is not shown, so the driver gets no help from noticing it.
+The board is booting, paused or running, and its robot moves or is at rest. A moving robot follows
+the last written motion frame at once and without slip. So the driver is never helped by seeing the
+robot do something else.
 """
 
 import math
@@ -23,21 +23,21 @@ ANGULAR_SCALE = 500.0
 BASE_RADIUS_M = 0.143
 GYRO_LSB_PER_DPS = 131.0
 GOAL_MPS = 0.2
-"""So fast it drives to a goal."""
+"""Speed on the way to a goal, in m/s."""
 ACCEL_Z = -16384
-"""Upside down."""
+"""Gravity as the upside-down sensor measures it, in LSB."""
 
 
 class Shown(NamedTuple):
-    """What anybody could tell of a board from what it sends."""
+    """The state of a board as far as it is visible from what it sends."""
 
     mode: str
-    """booting, paused, running."""
+    """Mode: booting, paused or running."""
     moves: bool
 
 
 class Teller:
-    """One board; `linear_scale`: LSB per m/s; `goals`: its switch stands on position."""
+    """One board. ``linear_scale``: LSB per m/s; ``goals``: whether its switch is on position."""
 
     def __init__(self, linear_scale: float, *, goals: bool = False) -> None:
         self._linear_scale, self._goals = linear_scale, goals
@@ -46,7 +46,7 @@ class Teller:
         self._reboot()
 
     def moves_as(self, mode: int, words: Triple) -> None:
-        """The robot's motion from now on, while it moves."""
+        """Set the twist of the robot while it moves, from a motion frame."""
         a, b, c = words
         if self._goals:
             way = math.atan2(1e-3 * b - self._y, 1e-3 * a - self._x) - self._yaw

@@ -2,10 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind it.
 
-The board is what follows from a command for its mode and its set-point. It has no motors: it shows
-that the robot moves while the driver drives, and afterwards while a set-point says so. What it
-shows follows its state after a tick or two, as a robot would; a set-point that is gone sooner shows
-in nothing.
+The board is modelled by its mode and its set point. It has no motors. It shows that the robot moves
+while the driver drives, and afterwards while its set point is a motion. What it shows follows its
+state after one or two ticks; a shorter set point is not visible.
 """
 
 import math
@@ -34,13 +33,16 @@ MEMO: Final = 100_000
 
 Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
-"""What one kind of receiver, running, makes of bytes in a row, by what it holds and whether a pause
-was before: what it holds then, and frames by the byte that completes them. None: letters act."""
+"""Memo of receivers: the result of consecutive bytes in one kind of running receiver.
+
+Key: the bytes that it holds, whether a pause came before, and the new bytes. Value: the bytes that
+it holds then, and frames by the byte that completes them; None if letters act.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class BoardKind:
-    """How the board finds commands, and whether it knows an emergency stop."""
+    """How the board finds commands, and whether it obeys an emergency stop."""
 
     receiver: ReceiverKind
     obeys_estop: bool = True
@@ -48,7 +50,7 @@ class BoardKind:
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """What was wrong in a trial, and the last writes before: when, what was sent, what arrived."""
+    """What was wrong in a trial, and the last writes before: time, bytes sent, bytes received."""
 
     scene: str
     board: BoardKind
@@ -68,7 +70,7 @@ class Example:
 
 
 class Trial:
-    """Up to where the faults begin; each ``run`` goes on from there.
+    """A trial, played until its faults begin; each ``run`` continues from there.
 
     ``memo`` may be shared by trials of one kind of receiver.
     """
@@ -127,7 +129,7 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Pass over writes that arrive whole and say again what is so; all but the last of them."""
+        """Skip writes that arrive undamaged and change nothing, except for the last of them."""
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1
         if (
@@ -156,7 +158,7 @@ class Trial:
         self._number = last
 
     def _write(self) -> None:
-        """The next write goes over the line."""
+        """Carry the next write over the line."""
         course, number = self._course, self._number
         write, items = course.writes[number], course.items[number]
         self._number += 1
@@ -264,13 +266,13 @@ class Trial:
         self._changed(at_s)
 
     def _boot(self) -> None:
-        """The boot is over."""
+        """End the boot."""
         at_s, self._boots_at_s = self._boots_at_s, math.inf
         self._mode = "paused"
         self._changed(at_s)
 
     def _changed(self, at_s: float) -> None:
-        """Something that the board may show is different from now on."""
+        """Note that what the board shows may have changed."""
         if self._driven_when_due is None and at_s > self._course.scene.still_by_s:
             self._driven_when_due = self._driven
         if self._shows_at_s <= at_s:
@@ -292,7 +294,7 @@ class Trial:
         self._understood = self._course.understood(self._board.receiver)
 
     def _example(self, what: str) -> None:
-        """Show the bytes of the first few of a score."""
+        """Keep the bytes of the score's first few faults."""
         examples = self._judge.score.examples
         if len(examples) < EXAMPLES:
             examples.append(Example(self._course.scene.kind, self._board, what, tuple(self._last)))

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What stands in the driver's writes, read by the manual's layout alone.
+"""Parser of the driver's writes, by the manual's layout alone.
 
-Knows zeros, control frames and letters; none of the driver's code.
+It knows zeros, control frames and letters, and uses no code of the driver.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ Words = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """Control frames (offset of the last byte, mode, words), letters by offset.
+    """Control frames (offset of the last byte, mode, words), and letters by offset.
 
     moves, stops: whether there is a motion frame, or only other frames.
     """
@@ -24,12 +24,12 @@ class Items:
 
 
 def is_motion(mode: int, words: Words) -> bool:
-    """Zeros in mode 01 are motion too: with the board's switch on position they are a goal."""
+    """Return whether a frame is motion; zeros in mode 01 are, as a goal on position control."""
     return mode == 0x01 or (mode == 0x02 and any(words))
 
 
 def parse(data: bytes) -> Items:
-    """Raises ValueError where a write has anything but zeros, whole frames and letters."""
+    """Parse a write; raise ValueError at anything but zeros, full frames and letters."""
     frames: list[tuple[int, int, Words]] = []
     letters: list[tuple[int, int]] = []
     at = 0

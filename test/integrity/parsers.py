@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two parsers under test, brought to one shape: the driver's, and one that trusts headers."""
+"""The two parsers under test with one interface: the driver's, and one that trusts headers."""
 
 import struct
 
@@ -12,7 +12,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 
 
 def key_of(frame: Frame) -> Key:
-    """The content of a decoded frame as the generator of truth writes it."""
+    """Return the content of a decoded frame in the form of the true frames."""
     match frame:
         case ImuFrame(accel, gyro):
             return ("imu", accel, gyro)
@@ -25,7 +25,7 @@ def key_of(frame: Frame) -> Key:
 
 
 def driver() -> tuple[Feed, Feed]:
-    """The driver's decoder."""
+    """Make the driver's decoder; return its functions to feed and to flush."""
     decoder = FrameDecoder()
     return (
         lambda data, now: [key_of(frame) for frame in decoder.feed(data, now)],
@@ -34,7 +34,7 @@ def driver() -> tuple[Feed, Feed]:
 
 
 def plain() -> tuple[Feed, Feed]:
-    """Scan for a header, take as many bytes as it asks for, believe them."""
+    """Make a parser that finds a header, takes as many bytes as it requires, and trusts them."""
     held = bytearray()
 
     def feed(data: bytes, now: float) -> list[Key]:

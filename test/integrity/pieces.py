@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the reports of all boards share: damage to a line in pieces, and scores that add up.
+"""Common parts of the boards' integrity reports: damage to a line in pieces, and sums of scores.
 
-Knows bytes only as bytes, and scores only as what ``+=`` adds.
+The module knows nothing of frames, and uses scores only by ``+=``.
 """
 
 import os
@@ -18,7 +18,7 @@ Job = TypeVar("Job")
 
 
 def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes]:
-    """The same pieces without the bytes that are lost, and with those that are added."""
+    """Return the pieces without the bytes that are lost, and with those that are added."""
     whole = b"".join(pieces)
     ends, at = [], 0
     for piece in pieces:
@@ -42,7 +42,7 @@ def add(total: dict[Key, Any], more: Mapping[Key, Any]) -> None:
 
 
 def scores_of(one: Callable[[Job], Mapping[Key, Any]], jobs: Iterable[Job]) -> dict[Key, Any]:
-    """The sums of all jobs, which run side by side on all cores."""
+    """Run the jobs in parallel on all cores; return the sums of their scores."""
     total: dict[Key, Any] = {}
     with Pool(os.cpu_count()) as pool:
         for scores in pool.imap_unordered(one, jobs):

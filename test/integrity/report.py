@@ -2,9 +2,9 @@
 
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-Arguments: ``--seconds`` of each stream, how many ``--seeds`` and the ``--first`` of them; the costs
-were tuned on seeds from 1000 on. The codecs of other boards have modules of their own. Ends with 1
-when a bound is missed in any scenario.
+Arguments: ``--seconds`` per stream, the number of ``--seeds`` and the ``--first`` seed. Costs were
+tuned on seeds from 1000 on. The codecs of other boards have modules of their own. The exit code is
+1 when a bound is missed in any scenario.
 """
 
 import argparse
@@ -25,9 +25,9 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 
 OTHERS = {"lois_ecu": "lois_ecu_report", "mart": "mart_report", "fejemis": "fejemis_report"}
-"""By the name of the board: the module that measures its codec."""
+"""By the board's name: the module that measures its codec."""
 SEEDS_OF_THE_PLAIN_PARSER = 4
-"""It is wrong so often that a few streams tell."""
+"""Number of streams for the plain parser; its many errors show in a few streams."""
 
 Job = tuple[str, int, str]
 
@@ -39,12 +39,12 @@ def one(seconds: float, job: Job) -> tuple[str, Scores]:
 
 
 def rate(score: Score) -> str:
-    """Wrong frames among those that came out."""
+    """Return the share of wrong frames among those decoded, as text."""
     return f"1 in {score.out / score.wrong:,.0f}" if score.wrong else f"0 of {score.out:,}"
 
 
 def bound_of(fault: str, chunker: str) -> str:
-    """The bound in words."""
+    """Return the bound as text."""
     bound = BOUNDS[fault]
     if chunker not in bound.chunkers:
         return "none"
@@ -55,7 +55,7 @@ def bound_of(fault: str, chunker: str) -> str:
 
 
 def table(ours: Scores, plain: Scores) -> tuple[list[str], bool]:
-    """Rows of the tables, and whether every bound holds in every scenario."""
+    """Return the rows of the tables, and whether every bound holds in every scenario."""
     lines = [
         "| fault | chunking or reader | wrong | delivered | bound for each scenario "
         "| most wrong in one scenario | least delivered in one "
@@ -95,7 +95,7 @@ def table(ours: Scores, plain: Scores) -> tuple[list[str], bool]:
 
 
 def main() -> int:
-    """Run the streams, print and write the figures."""
+    """Measure the streams, and print and write the figures."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=60.0)
     arguments.add_argument(
@@ -134,7 +134,7 @@ def main() -> int:
 
 
 def write(figures: str, begin: str, all_hold: bool) -> int:
-    """Print, and replace what is between these marks of the document."""
+    """Print the figures, write them between the document's marks, and return the exit code."""
     print(figures)
     before, rest = DOCUMENT.read_text().split(begin)
     after = rest.split(END, 1)[1]

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots that obey, on bad floors and among people: what the motion monitor says while they drive.
+"""Robots that obey, on bad floors and among people: does the motion monitor stop them?
 
-Each has motors, controllers, scales and a line of its own, 5 % slip and a slope; its commander
-changes every few seconds; somebody holds, carries and pushes it. All of it in simulated time.
+Each has its own motors, controllers, scales and line, 5 % slip and a slope. Its commander changes
+manners every few seconds; people hold, carry and push it. Everything is in simulated time.
 """
 
 import math
@@ -23,12 +23,12 @@ from omnibot_driver.simulator.omnibot.motors import MotorConstants, WheelGains
 
 SLIP: Final = 0.05
 STEEPEST_PWM: Final = 200.0
-"""5 % of the motors' full effort."""
+"""Greatest effort against a slope: 5 % of the motors' full effort."""
 HARDEST_BUMP_PWM: Final = 600.0
 HARDEST_PUSH_PWM: Final = 150.0
-"""Against a robot that drives."""
+"""Greatest effort of a push against a driving robot."""
 FASTEST_CARRY_MPS: Final = 0.5
-"""Of one that stands."""
+"""Greatest speed of a robot at rest that is carried, in m/s."""
 SECONDS_BETWEEN_HANDS: Final = 20.0
 
 HANDS: Final = ("push", "bump", "hold", "carry")
@@ -39,7 +39,7 @@ BEGUN_S: Final = 1000.0
 
 @dataclass(slots=True)
 class Outcome:
-    """``said``: what the motion monitor had to say; ``happened``: what people did to the robot."""
+    """Result of a drive. ``said``: the monitor's messages; ``happened``: what people did."""
 
     seconds: float = 0.0
     trips: list[str] = field(default_factory=list)
@@ -55,7 +55,7 @@ class Outcome:
 
 
 def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
-    """A robot that obeys as well as such robots do."""
+    """Draw a robot with the usual spread of motors, controllers and scales."""
     random = Random(f"robot {seed}")
     motors = [
         MotorConstants(
@@ -91,7 +91,7 @@ def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
 
 
 class RoughDrive(Bench):
-    """A bench whose line is late both ways, with a commander and with people around."""
+    """A bench with delays on the line in both directions, a commander, and people around."""
 
     def __init__(self, seed: int, delta_period_s: float = 0.04) -> None:
         self._random = random = Random(f"drive {seed}")
@@ -118,7 +118,7 @@ class RoughDrive(Bench):
         self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
-        """What is written is on its way for a while."""
+        """Send what is written to the board after the line's delay, and evaluate notices."""
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)
@@ -139,7 +139,7 @@ class RoughDrive(Bench):
             self.settle()
 
     def go(self, seconds: float) -> Outcome:
-        """Drive about for this time."""
+        """Drive for this time; return the outcome."""
         self.open()
         self.run(2.0)
         self._hands_at = self.now + self._random.expovariate(1 / SECONDS_BETWEEN_HANDS)
@@ -160,7 +160,7 @@ class RoughDrive(Bench):
         elif "moving without a command" in text or "does not move" in text:
             self.outcome.said[text.split(":")[0]] += 1
 
-    # Who commands
+    # The commander
 
     def _command(self) -> None:
         random = self._random
@@ -199,7 +199,7 @@ class RoughDrive(Bench):
             x, y, yaw = self._last
             self._target = -x, -y, -yaw
 
-    # Who touches it
+    # The people
 
     def _lay_hands_on(self) -> None:
         random, board = self._random, self.board
@@ -211,7 +211,7 @@ class RoughDrive(Bench):
         self._hands_at = self.now + 1.0 + random.expovariate(1 / SECONDS_BETWEEN_HANDS)
         what = "carry" if self._to_be_carried else random.choice(HANDS)
         self._to_be_carried = what == "carry" and not self._to_be_carried
-        if self._to_be_carried:  # when it stands
+        if self._to_be_carried:  # carried once it is at rest
             self._manner, self._manner_until = random.choice(("silence", "zeros")), math.inf
             self._hands_at = self.now + 1.5
             return

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A part of the integrity report: every bound, on streams long enough for it to mean something."""
+"""A short version of the integrity report: every bound, on streams that are long enough."""
 
 import os
 from functools import partial
@@ -21,7 +21,7 @@ SECONDS, SEEDS = 11.0, 2
 
 @pytest.fixture(scope="module")
 def scores() -> Scores:
-    """Scores of every scenario, fault and chunking: some 16,000 frames for each bound."""
+    """Return scores of every scenario, fault and chunking: about 16,000 frames for each bound."""
     jobs = [(scenario, seed, "driver") for seed in range(SEEDS) for scenario in SCENARIOS]
     total: Scores = {}
     with get_context("spawn").Pool(os.cpu_count()) as pool:
@@ -34,14 +34,14 @@ def scores() -> Scores:
     ("fault", "chunker"), [(fault, chunker) for fault in FAULTS for chunker in chunkings(fault)]
 )
 def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, scores: Scores) -> None:
-    """They limit wrong frames and frames delivered, over all scenarios."""
+    """The bounds limit wrong frames and lost frames, over all scenarios."""
     score = over_scenarios(scores, fault, chunker)
     assert BOUNDS[fault].holds(chunker, score), score
     assert score.out > 12_500
 
 
 def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
-    """Even the plain parser makes no mistake, from the first byte on."""
+    """On a stream without faults even the plain parser is right, from the first byte on."""
     truth = generate(SCENARIOS["driving"], 1, 10.0)
     received = receive(truth, lambda length, _: list(range(length)), Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())
@@ -49,7 +49,7 @@ def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
 
 
 def test_the_judge_finds_what_the_plain_parser_makes_up() -> None:
-    """Otherwise it would find nothing with ours."""
+    """Otherwise the judge could not find errors of our parser either."""
     truth = generate(SCENARIOS["gyro stuck at (-6, -5, -4)"], 1, 20.0)
     received = receive(truth, FAULTS["1 byte in 1,000 lost"], Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())

@@ -1,7 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The decoder's short cuts change nothing: neither its quick loop for calm frames, nor the way of
-an IMU frame that comes alone, nor what the trellis leaves out."""
+"""Shortcuts of the decoder: none of them changes the result.
+
+They are the quick loop for calm frames, the path of an IMU frame that comes alone, and the parts of
+the trellis that are left out.
+"""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -47,7 +50,7 @@ TRUTHS = {name: generate(scenario, 11, SECONDS) for name, scenario in SCENARIOS.
 
 
 def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
-    """What comes out of each call, what is counted, and what has begun."""
+    """Return the frames of each call, the counts, and the frame that has begun."""
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(decoder, "take_run", lambda _held, at, context, *_: (at, context))
@@ -67,7 +70,7 @@ def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
 
 
 def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
-    """A damaged stream as it arrives."""
+    """Return a damaged stream in the chunks in which it arrives."""
     random = Random(f"{scenario} {fault} {chunker} {seed}")
     received = receive(TRUTHS[scenario], FAULTS[fault], random)
     chunks, start = [], 0
@@ -81,7 +84,7 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_streams_come_out_alike(scenario: str, fault: str, chunker: str) -> None:
-    """Damaged or not, call by call, with the same counts."""
+    """This holds for damaged streams and others, for each call and all counts."""
     chunks = chunks_of(scenario, fault, chunker, 1)
     assert outcome(chunks, quick=True) == outcome(chunks, quick=False)
 
@@ -109,7 +112,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, chunker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The end of each read and the mode are alike, too, with any requests in between."""
+    """The end of each read and the mode are equal, too, with any requests in between."""
     chunks = chunks_of(scenario, fault, chunker, 2)
 
     def told() -> list[object]:
@@ -133,7 +136,7 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the tests above would compare nothing: most reads go this way."""
+    """Otherwise the tests above would compare nothing: most reads take this shortcut."""
     fed = []
     feed = FrameDecoder.feed
 
@@ -150,7 +153,7 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the tests above would compare nothing: hardly an IMU frame is weighed."""
+    """Otherwise the tests above would compare nothing: very few IMU frames are weighed."""
     weighed = []
     weigh = decoder.Expectation.weigh
 
@@ -166,7 +169,7 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A leap, its aftershocks and the leap back, with frames behind them: nothing is weighed."""
+    """A jump, its aftershocks and the jump back, with frames after them, are not weighed."""
     rest = ImuFrame((120, -80, -16384), (1, 2, 3))
     shock = [ImuFrame((9000, -80, -16384), (1, 2, 3)), ImuFrame((120, 7000, -16384), (1, 9000, 3))]
     sent = [rest, *shock, rest, rest, rest]
@@ -182,7 +185,7 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """After any number of frames; and few have to be weighed again to tell it."""
+    """This holds after any number of frames, and at most 6 frames are weighed again for it."""
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]
@@ -202,7 +205,7 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
 
 
 def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise they would compare one full search with another."""
+    """Otherwise the tests above would compare two full searches."""
     edges = {True: 0, False: 0}
     pieces = trellis._Search.pieces
     chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
@@ -220,7 +223,7 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """The bound falls along no edge by more than the edge costs."""
+    """Along every edge, the bound falls by no more than the edge costs."""
     least = least_costs(data)
     search = trellis._Search(
         data, NOTHING_KNOWN, Expectation(16384.0), InterFrameGaps(BYTE_S), "big"

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The generator of truth: what a board sends, frame by frame and byte by byte, with arrival times.
+"""Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
 
-Typed from the manual's layouts with ``struct``; it shares nothing with the driver. Sensor noise is
-that of an MPU6050 with its filter on: some 46 counts on the accelerometer, 6.5 on the gyro.
+It is typed from the manual's layouts with ``struct`` and shares nothing with the driver. Sensor
+noise is that of an MPU6050 with its filter on: about 46 counts of the accelerometer, 6.5 of the
+gyro.
 """
 
 import math
@@ -30,7 +31,7 @@ class Truth:
 
 @dataclass(slots=True)
 class Setpoint:
-    """Velocities that chase random targets, as a drive does; all zero for a robot at rest."""
+    """Velocities that approach random targets, as in a drive; all zero for a robot at rest."""
 
     random: Random
     driving: bool
@@ -39,7 +40,7 @@ class Setpoint:
     pose: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def step(self) -> tuple[float, float]:
-        """Advance one tick; the acceleration is along the body's x and y, in m/s²."""
+        """Advance one tick; return the acceleration along the body's x and y, in m/s²."""
         if not self.driving:
             return 0.0, 0.0
         if self.random.random() < 0.02:
@@ -56,7 +57,7 @@ class Setpoint:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """How the robot moves and what its sensor reads at rest."""
+    """The robot's motion, and what its sensor reads at rest."""
 
     driving: bool = False
     imu_only: bool = False
@@ -65,7 +66,7 @@ class Scenario:
     accel_noise: float = 46.0
     gyro_noise: float = 6.5
     pauses: bool = False
-    """Now and then the board is paused for some seconds: a text each second, and silence."""
+    """Whether the board is sometimes paused for seconds: one text per second, otherwise silence."""
 
 
 SCENARIOS: dict[str, Scenario] = {
@@ -81,7 +82,7 @@ WITH_TEXTS = "paused now and then"
 
 
 def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
-    """What this board sends from some moment of its life on."""
+    """Return what this board sends, from some moment of its life on."""
     random = Random(f"{scenario} {seed}")
     gauss = random.gauss
     bias = [random.uniform(-6, 6) for _ in range(3)]
@@ -136,7 +137,7 @@ def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
 
 
 def _append(truth: Truth, key: Key, packed: bytes, now: float) -> float:
-    """A frame that begins now; when its last byte has arrived."""
+    """Append a frame that begins at ``now``; return the time at which its last byte has arrived."""
     at = len(truth.data)
     truth.data += packed
     truth.frames.append((key, at, at + len(packed)))

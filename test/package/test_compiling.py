@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""`OMNIBOT_DRIVER_COMPILE=1`: whatever goes wrong, a whole package of plain Python is installed.
+"""``OMNIBOT_DRIVER_COMPILE=1``: whatever fails, a complete package of plain Python is installed.
 
-A stand-in for mypyc makes one small module of C, for mypyc itself takes a minute; `make compiled`
-runs that one.
+A substitute for mypyc makes one small C module, since mypyc itself takes a minute; ``make
+compiled`` runs mypyc.
 """
 
 import os
@@ -50,7 +50,7 @@ FAILURES = {
 
 
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
-    """Build the package into ``lib`` of this folder with such a mypyc, and return what was said."""
+    """Build the package into ``lib`` of this folder with such a mypyc; return the output."""
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()
     (folder / "stand_in/mypyc/build.py").write_text(
@@ -82,7 +82,7 @@ def compiled_modules(folder: Path) -> list[str]:
 def test_what_cannot_be_compiled_is_installed_as_it_is(
     tmp_path: Path, fails: str, source: str
 ) -> None:
-    """Nothing half-compiled is left, and one line says why."""
+    """No compiled part is left, and one line gives the reason."""
     output = built(tmp_path, fails, source)
     assert f"{PACKAGE}: not compiled (" in output
     assert not compiled_modules(tmp_path / "lib")
@@ -94,7 +94,7 @@ def test_what_cannot_be_compiled_is_installed_as_it_is(
     not shutil.which((sysconfig.get_config_var("CC") or "cc").split()[0]), reason="no C compiler"
 )
 def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path: Path) -> None:
-    """A later installation that compiles nothing must not leave what an earlier one compiled."""
+    """An installation without compiling must remove the compiled modules of an earlier one."""
     assert f"{PACKAGE}: core: compiled" in built(tmp_path, "pass", GOOD)
     assert compiled_modules(tmp_path / "lib") == [MODULE.replace(".", "/") + ENDING]
     assert built(tmp_path, "raise SystemExit(1)", GOOD)
@@ -102,6 +102,6 @@ def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path:
 
 
 def test_nothing_is_compiled_unless_it_is_asked_for(tmp_path: Path) -> None:
-    """Neither mypyc nor a compiler is looked for."""
+    """Neither mypyc nor a compiler is searched for."""
     assert "compiled" not in built(tmp_path, "raise SystemExit(1)", "no C", wanted="0")
     assert not compiled_modules(tmp_path / "lib")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot's description, expanded by xacro and read by the URDF parser that ROS tools use."""
+"""The robot's description, expanded by xacro and parsed with the URDF parser of ROS tools."""
 
 import math
 from pathlib import Path
@@ -26,7 +26,7 @@ speeds = st.floats(-2.0, 2.0)
 
 
 def description(**arguments: str) -> Any:
-    """The parsed URDF, with xacro arguments."""
+    """Return the parsed URDF for these xacro arguments."""
     document = xacro.process_file(str(ROOT / "urdf/omnibot.urdf.xacro"), mappings=arguments)
     return URDF.from_xml_string(document.toxml())
 
@@ -43,7 +43,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 def rotate(rpy: Vector, vector: Vector) -> Vector:
-    """The vector turned by roll, then pitch, then yaw about fixed axes, as URDF has it."""
+    """Turn a vector by roll, then pitch, then yaw about fixed axes, as in URDF."""
     roll, pitch, yaw = rpy
     x, y, z = vector
     y, z = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)
@@ -53,9 +53,9 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 
 
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
-    """Of a wheel that turns at this rate: where it stands, and its floor's velocity under it.
+    """Return a wheel's place, and the velocity of its centre over the floor, in m/s.
 
-    What touches the floor stands still, so the wheel's centre moves over it by the opposite.
+    What touches the floor is at rest, so the centre moves by the opposite of the rim's velocity.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -64,14 +64,14 @@ def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector,
 
 
 def test_the_joints_are_those_of_joint_states() -> None:
-    """What turns in the description are the three wheels, under the names of the interface."""
+    """The joints that turn are the three wheels, under the names of the interface."""
     turning = [joint.name for joint in ROBOT.joints if joint.type != "fixed"]
     assert turning == list(WHEELS)
     assert {ROBOT.joint_map[name].type for name in WHEELS} == {"continuous"}
 
 
 def test_the_frames_are_those_of_the_driver() -> None:
-    """base_link is the root: odom moves it, and a frame has one parent."""
+    """base_link is the root, since odom is its parent and a frame has only one."""
     assert ROBOT.get_root() == PARAMETERS.by_name["base_frame"].default
     assert {PARAMETERS.by_name["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
 
@@ -89,9 +89,9 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """At the rates of a twist each wheel rolls by the body's motion where it stands.
+    """At the wheel rates of a twist each wheel rolls as the body moves at its place.
 
-    The rollers take up what is across; so only the part along the rolling direction must agree.
+    The rollers take up motion across, so only the part along the rolling direction must agree.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]
@@ -107,7 +107,7 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
 
 
 def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
-    """So the commissioning guide has it: the axles point away from the centre."""
+    """The commissioning guide says so; the axles point away from the centre."""
     for name in WHEELS:
         joint = ROBOT.joint_map[name]
         x, y, _ = joint.origin.xyz
@@ -124,7 +124,7 @@ def test_the_wheels_stand_on_the_ground() -> None:
 
 
 def test_the_imu_hangs_upside_down() -> None:
-    """Its place is that of the vendor's drivers; its z points down, its x forward."""
+    """Its place is that in the vendor's drivers; its z points down, its x forward."""
     joint = ROBOT.joint_map["imu_joint"]
     assert (joint.parent, joint.child) == ("base_link", "imu_link")
     assert joint.origin.xyz == [-0.005, 0.035, -0.06]
@@ -134,7 +134,7 @@ def test_the_imu_hangs_upside_down() -> None:
 
 
 def test_another_robot_is_described_by_arguments() -> None:
-    """A bigger robot with its IMU elsewhere needs no other file."""
+    """A bigger robot with its IMU elsewhere needs no new file."""
     robot = description(
         wheel_radius="0.05",
         base_radius="0.2",
@@ -148,7 +148,7 @@ def test_another_robot_is_described_by_arguments() -> None:
 
 
 def test_the_description_needs_no_other_files() -> None:
-    """Primitives only: it looks the same wherever it is shown."""
+    """It contains only primitives, so it looks the same in every viewer."""
     text = (ROOT / "urdf/omnibot.urdf.xacro").read_text()
     assert "package://" not in text
     assert "<mesh" not in text

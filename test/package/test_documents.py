@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The documents: what is generated is current, links and commands hold, the site builds."""
+"""The documents: generated parts are current, links and commands exist, the site can be built."""
 
 import re
 import runpy
@@ -28,26 +28,26 @@ def name_of(page: Path) -> str:
 
 
 def anchors(page: Path) -> set[str]:
-    """The names that GitHub and the site give to the page's headings."""
+    """Return the names that GitHub and the site give to the page's headings."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
     return {re.sub(r"[^\w -]", "", text).strip().lower().replace(" ", "-") for text in headings}
 
 
 def found(pattern: str) -> Iterator[str]:
-    """What the pattern's group is, wherever a document has it."""
+    """Yield the pattern's group at all its places in the documents."""
     for page in PAGES:
         yield from re.findall(pattern, page.read_text())
 
 
 @pytest.mark.parametrize("name", GENERATED)
 def test_what_is_generated_is_what_the_code_says(name: str) -> None:
-    """Parameters, their files, mode table and diagram; `make docs` writes them."""
+    """These are parameters, their files, mode table and diagram; ``make docs`` writes them."""
     assert (ROOT / name).read_text(encoding="utf-8") == GENERATED[name](), "run: make docs"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_link_leads_somewhere(page: Path) -> None:
-    """The file exists, and so does the heading where one is named."""
+    """The linked file exists, and its heading if one is named."""
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if re.match(r"https?://|mailto:", target):
             continue
@@ -59,21 +59,21 @@ def test_every_link_leads_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_no_row_has_lost_its_table(page: Path) -> None:
-    """A blank line in a table leaves the rows below it as plain text."""
+    """A blank line in a table turns the rows below it into plain text."""
     text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
     for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
         assert re.search(r"\A.*\n\|[-:| ]+\|\n", block), block
 
 
 def test_every_page_can_be_reached_from_the_readme() -> None:
-    """The README links to each page, so that readers find it without a search."""
+    """Readers find each page without a search."""
     readme = (ROOT / "README.md").read_text()
     for page in set(ROOT.glob("docs/**/*.md")) - {ROOT / "docs/index.md"}:
         assert f"({page.relative_to(ROOT)}" in readme, page
 
 
 def test_every_command_exists() -> None:
-    """Executables, launch files and their arguments, make's targets, parameters, services."""
+    """Executables, launch files, arguments, make's targets, parameters and services are checked."""
     scripts = re.findall(r'f"(\w+) = \{NAME\}', (ROOT / "setup.py").read_text())
     assert {*found(r"ros2 run omnibot_driver\s+([a-z_]+)")} <= set(scripts)
     launches = {path.name for path in (ROOT / "launch").iterdir()}
@@ -91,7 +91,7 @@ def test_every_command_exists() -> None:
     not all(map(find_spec, SPHINX)), reason="Sphinx and its theme are not installed"
 )
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
-    """Every page, the README and the changelog are in it."""
+    """The site contains every page, the README and the changelog."""
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "-c", "docs", ".", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

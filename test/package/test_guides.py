@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The guides against the code: no sentence it no longer says, no parameter it lacks."""
+"""The guides agree with the code: every quoted message and parameter exists."""
 
 import ast
 import math
@@ -24,7 +24,7 @@ SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 
 
 def text_of(node: ast.AST) -> str:
-    """A string in the code, what is filled in shown as a gap; empty if it is none."""
+    """Return a string in the code with gaps for inserted values; empty if it is not a string."""
     if isinstance(node, ast.JoinedStr):
         parts = [part.value if isinstance(part, ast.Constant) else GAP for part in node.values]
         return "".join(map(str, parts))
@@ -32,7 +32,7 @@ def text_of(node: ast.AST) -> str:
 
 
 def templates() -> Iterator[str]:
-    """All strings of the driver except docstrings."""
+    """Yield all strings of the driver except docstrings."""
     for file in (ROOT / "omnibot_driver").rglob("*.py"):
         nodes = list(ast.walk(ast.parse(file.read_text())))
         docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
@@ -40,7 +40,7 @@ def templates() -> Iterator[str]:
 
 
 def told() -> Iterator[str]:
-    """What the driver refuses or warns with."""
+    """Yield the messages with which the driver refuses or warns."""
     for file in (ROOT / "omnibot_driver").rglob("*.py"):
         if {"simulator", "demo", "tools"} & set(file.parts):
             continue
@@ -67,7 +67,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 @pytest.mark.parametrize("template", sorted(set(told())))
 def test_what_the_driver_tells_is_explained(template: str) -> None:
-    """One sentence of the guide is contained in it, or begins like it."""
+    """A sentence of the guide is contained in the message, or has the same beginning."""
     begin = next((part for part in template.split(GAP) if len(part) > 9), template)
     assert any(
         begin in sentence or all(part.strip() in template for part in GAPS.split(sentence))
@@ -76,7 +76,7 @@ def test_what_the_driver_tells_is_explained(template: str) -> None:
 
 
 def test_every_state_is_explained() -> None:
-    """There is no other row."""
+    """The guide's table has a row for each state."""
     assert set(SENTENCES) >= STATES
     assert all(state in SAID for state in STATES)
 
@@ -91,7 +91,7 @@ def test_every_status_of_the_diagnostics_has_its_row() -> None:
 
 
 def test_the_tour_shows_what_the_driver_says() -> None:
-    """Its warnings and errors can still be printed, word for word but for what is filled in."""
+    """Its warnings and errors can still be printed, word for word except for inserted values."""
     patterns = [
         re.compile(".*".join(map(re.escape, template.split(GAP))))
         for template in SAID.splitlines()
@@ -104,7 +104,7 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
-    """The form at the end names steps of the guide and parameters of the driver."""
+    """The form at the end names steps of the guide, and parameters of the driver as corrections."""
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))
     form = re.findall(r"^\| (.+) \| (\d) \| (.+) \| \|$", text, re.MULTILINE)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What `colcon build` and `pip install` put where, found and started the way `ros2 run` does it."""
+"""What ``colcon build`` and ``pip install`` install, found and started as ``ros2 run`` does it."""
 
 import os
 import re
@@ -40,7 +40,7 @@ def run(command: Sequence[str | Path], cwd: Path) -> str:
 
 @contextmanager
 def running(command: Sequence[str | Path], cwd: Path) -> Iterator[subprocess.Popen[str]]:
-    """Run the command beside the test; it is gone afterwards, at the latest by the deadline."""
+    """Run the command beside the test; end it with the test, or at the deadline."""
     process = subprocess.Popen(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
@@ -66,14 +66,14 @@ def first_line_with(text: str, process: subprocess.Popen[str]) -> str:
 
 
 MADE_HERE = (".*", "__pycache__", "*.egg-info", "build", "install", "log")
-"""What tests and tools leave in a source archive that they run in."""
+"""What tests and tools create in a source archive in which they run."""
 
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of the repository as a commit of everything in it would have it."""
+    """Return a copy of the repository with the files that a commit of everything would have."""
     copy = tmp_path_factory.mktemp("sources") / PACKAGE
-    if not (ROOT / ".git").exists():  # a source archive has nothing else than the sources
+    if not (ROOT / ".git").exists():  # a source archive contains only the sources
         return Path(shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*MADE_HERE)))
     listing = run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], ROOT)
     for name in filter(None, listing.split("\0")):
@@ -85,7 +85,7 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def workspace(sources: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a workspace in which colcon has built the package, out of an untouched source tree."""
+    """Return a workspace in which colcon has built the package from an unchanged source tree."""
     workspace = tmp_path_factory.mktemp("workspace")
     before = set(sources.rglob("*"))
     run([sys.executable, "-m", "colcon", "build", "--base-paths", sources], workspace)
@@ -126,7 +126,7 @@ def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
 
 
 def test_colcon_installs_the_executables(prefix: Path) -> None:
-    """`ros2 run` offers every executable file in lib/omnibot_driver: these and no more."""
+    """``ros2 run`` offers every executable file in lib/omnibot_driver; there are exactly these."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
     executables = {"calibrate", "demo", "driver", "monitor", "report", "simulator"}
     assert {file.name for file in files} == executables
@@ -142,7 +142,7 @@ def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Pat
 
 
 def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, prefix: Path) -> None:
-    """Both start from their installed places, and ctrl-C ends the driver in order."""
+    """Both are started from their installed places, and ctrl-C ends the driver in order."""
     executables = prefix / "lib" / PACKAGE
     board = workspace / "board"
     simulator = in_workspace(workspace, [executables / "simulator", "--link", board])
@@ -165,7 +165,7 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
 
 
 def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
-    """It looks for pytest in setup.py, and without it passes having run nothing."""
+    """colcon searches setup.py for pytest; without it, it would pass without any test."""
     one = ["test/core/omnibot/test_modes.py", " --maxfail=1"]
     colcon = [sys.executable, "-m", "colcon"]
     run([*colcon, "test", "--base-paths", sources, "--pytest-args", *one], workspace)
@@ -176,7 +176,7 @@ def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
 
 
 def test_pip_installs_the_same_files(sources: Path, tmp_path: Path) -> None:
-    """A plain `pip install` serves people without colcon."""
+    """A plain ``pip install`` serves users without colcon."""
     copy = tmp_path / "sources"  # pip builds inside the source tree
     shutil.copytree(sources, copy)
     pip = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-build-isolation"]

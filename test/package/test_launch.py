@@ -2,7 +2,7 @@
 
 """What the launch files start, with which arguments and parameters.
 
-Where launch is not installed, only what can be read off the files is checked.
+Where launch is not installed, the files are only parsed.
 """
 
 import ast
@@ -32,7 +32,7 @@ needs_launch = pytest.mark.skipif(
     not (find_spec("launch") and find_spec("launch_ros")), reason="launch is not installed"
 )
 
-# Stands in for every executable: notes how it was called, and what is in its parameter files.
+# It replaces every executable, and records its arguments and the content of its parameter files.
 RECORDER = f"""#!{sys.executable}
 import json, os, pathlib, sys
 arguments = sys.argv[1:]
@@ -64,7 +64,10 @@ Started = dict[str, dict[str, Any]]
 
 @pytest.fixture
 def launch(tmp_path: Path) -> Callable[..., Started]:
-    """Launches a file with recorders in place of all executables; returns what was started."""
+    """Return a function that launches a file with recorders as executables.
+
+    It returns the records of the executables that were started.
+    """
     executables = {
         PACKAGE: "driver",
         "robot_state_publisher": "robot_state_publisher",
@@ -110,7 +113,7 @@ def launch(tmp_path: Path) -> Callable[..., Started]:
 
 
 def parameters(record: dict[str, Any]) -> dict[str, Any]:
-    """What the process's parameter files say together, later ones last, for whichever node."""
+    """Return the parameters of all files of a process, for any node; later files override."""
     merged: dict[str, Any] = {}
     for text in record["files"]:
         for node in yaml.safe_load(text).values():
@@ -120,7 +123,7 @@ def parameters(record: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("path", LAUNCH_FILES, ids=lambda path: path.name)
 def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
-    """Every file of this package that it refers to is in the repository, in an installed folder."""
+    """Every file of this package to which it refers is in an installed folder of the repository."""
     strings = [
         node.value
         for node in ast.walk(ast.parse(path.read_text()))
@@ -130,13 +133,13 @@ def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
     names = [text.strip() for text in strings]
     names = [name for name in names if name.endswith((".py", ".yaml", ".xacro", ".rviz"))]
     assert names
-    for name in names:  # one that begins with a dot follows the name of the board
+    for name in names:  # a name that begins with a dot follows the board's name
         for file in [f"{board}{name}" for board in boards.PROFILES] if name[0] == "." else [name]:
             assert any((ROOT / folder / file).is_file() for folder in folders), file
 
 
 def test_the_driver_has_every_parameter_that_is_offered() -> None:
-    """With one board at least: a parameter that it does not know would end it."""
+    """At least one board has each parameter, since an unknown one would end the driver."""
     tree = ast.parse((ROOT / "launch/driver.launch.py").read_text())
     (offered,) = (
         [ast.literal_eval(key) for key in node.value.keys if key]
@@ -148,7 +151,7 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
 
 
 class Stub(ModuleType):
-    """A module of launch whose every name makes a note of how it was called."""
+    """A module of launch in which every call of any name only records its arguments."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -160,7 +163,7 @@ class Stub(ModuleType):
 def test_a_board_without_a_parameter_file_is_refused(
     file: str, parameters_of: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """launch itself warns of a file that is missing, and starts the node without parameters."""
+    """launch itself only warns of a missing file, and starts the node without parameters."""
     for module in ("launch", "launch_ros"):
         for part in (
             *("", ".actions", ".conditions", ".launch_description_sources"),
@@ -181,7 +184,7 @@ def test_a_board_without_a_parameter_file_is_refused(
 
 @needs_launch
 def test_the_driver_gets_the_defaults_and_nothing_else(launch: Callable[..., Started]) -> None:
-    """The parameter file decides when there are no arguments."""
+    """Without arguments, the parameter file is used unchanged."""
     started = launch("driver.launch.py")
     assert set(started) == {"driver"}
     assert parameters(started["driver"]) == {
@@ -210,7 +213,7 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
 def test_the_parameter_file_is_that_of_the_board(
     launch: Callable[..., Started], tmp_path: Path
 ) -> None:
-    """Another file can be given, which names its own board."""
+    """Another file can be given instead, which names its own board."""
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
     own = tmp_path / "own.yaml"
@@ -221,7 +224,7 @@ def test_the_parameter_file_is_that_of_the_board(
 
 @needs_launch
 def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]) -> None:
-    """robot_state_publisher gets what xacro makes of the description, with what differs here."""
+    """robot_state_publisher gets the expanded description and the prefix."""
     started = launch(
         "description.launch.py", "frame_prefix:=robot1/", "xacro_args:=base_height:=0.13"
     )
@@ -246,7 +249,7 @@ def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
 
 @needs_launch
 def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]) -> None:
-    """The driver does not publish it, the description places the IMU, all in one namespace."""
+    """The driver does not publish it, and all nodes are in one namespace."""
     started = launch("ekf.launch.py", "namespace:=robot1", "frame_prefix:=robot1/")
     assert set(started) == {"driver", "ekf_node", "robot_state_publisher", "xacro"}
     assert parameters(started["driver"])["publish_tf"] is False
@@ -259,7 +262,7 @@ def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]
 
 @needs_launch
 def test_the_simulation_is_the_driver_with_a_board_inside(launch: Callable[..., Started]) -> None:
-    """One process; the board's options and the driver's arguments are at hand."""
+    """There is only one process; options of the board and the driver's arguments can be given."""
     started = launch("simulation.launch.py", "namespace:=robot1")
     assert set(started) == {"driver"}
     assert parameters(started["driver"])["port"] == "sim://"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the Makefile says to somebody whose machine cannot do what it asks for."""
+"""The Makefile's messages on a machine that lacks something."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def make(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run make in the repository, as from a fresh shell, and wait for it."""
+    """Run make in the repository, as from a new shell, to its end."""
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     return subprocess.run(
         ["make", "--no-print-directory", *arguments],
@@ -27,7 +27,7 @@ def make(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def no_python(tmp_path: Path) -> str:
-    """Return an interpreter for which no wheels exist."""
+    """Return an interpreter for which wheels do not exist."""
     interpreter = tmp_path / "python"
     interpreter.write_text("#!/bin/sh\nexit 1\n")
     interpreter.chmod(0o755)
@@ -38,7 +38,7 @@ def no_python(tmp_path: Path) -> str:
 def test_without_wheels_one_sentence_points_to_jazzy(
     target: str, no_python: str, tmp_path: Path
 ) -> None:
-    """Make fails before it has made anything, and says where to go."""
+    """make fails before it creates anything, and names Jazzy's installation guide."""
     done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
     sentence, verdict = done.stderr.splitlines()
     assert done.returncode != 0
@@ -49,7 +49,7 @@ def test_without_wheels_one_sentence_points_to_jazzy(
 
 
 def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
-    """It is somebody else's; creating one would clear it."""
+    """The link leads to another environment, which would be cleared by creating one."""
     (tmp_path / "theirs").mkdir()
     (tmp_path / "theirs/kept").touch()
     (tmp_path / "venv").symlink_to(tmp_path / "theirs")
@@ -59,7 +59,7 @@ def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
 
 
 def test_make_alone_lists_every_target() -> None:
-    """The default target explains the others in a line each."""
+    """The default target describes each of the others in one line."""
     listed = {line.split()[1] for line in make().stdout.splitlines()}
     targets = {"demo", "check", "test", "docs", "pictures", "integrity", "bench", "faults", "soak"}
     assert listed == {"help", *targets, "compiled", "lint", "format", "clean"}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the package declares about itself, and who in it may import whom."""
+"""What the package declares about itself, and which of its parts may import which."""
 
 import ast
 import re
@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "omnibot_driver"
 CORE = f"{PACKAGE}.core"
 
-# rosdep keys of what is not a ROS package (those have one name for both).
+# rosdep keys of what is not a ROS package; ROS packages have one name for both.
 ROSDEP_KEYS = {
     "hypothesis": "python3-hypothesis",
     "matplotlib": "python3-matplotlib",
@@ -33,20 +33,21 @@ ROSDEP_KEYS = {
     "yaml": "python3-yaml",
 }
 
-# What launch files can start and a driver does not need; the README names them.
+# Packages that launch files can start and a driver does not need; the README names them.
 OPTIONAL = {"robot_localization", "rviz2"}
 
-# What the driver itself can do without, by the extra that has pip bring it.
+# Libraries that the driver itself does not need, by the extra with which pip installs them.
 EXTRAS = {
     "replay": ["rosbags"],
     "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
 }
 
-# Of these, what rosdep does not bring: it has rosbags from pip alone, which Ubuntu 24.04 refuses,
-# and of textual whatever is in the distribution. The README says how to install them.
+# Libraries of these that rosdep does not install in a suitable version: it gets rosbags only from
+# pip, which Ubuntu 24.04 refuses, and textual in the distribution's version. The README says how to
+# install them.
 FROM_PIP = {"rosbags", "textual"}
 
-# Enough for values and arithmetic; nothing that waits, reads a clock or touches the world.
+# Modules for values and arithmetic; none waits, reads a clock or has side effects.
 PURE_MODULES = {
     "__future__",
     "abc",
@@ -86,7 +87,7 @@ def python_files(*paths: str) -> list[Path]:
 
 
 def imports(file: Path) -> Iterator[str]:
-    """Yield the full dotted name of everything the file imports, wherever in it that happens."""
+    """Yield the full dotted name of everything that the file imports, anywhere in it."""
     package = file.relative_to(ROOT).parent.parts
     for node in ast.walk(ast.parse(file.read_text(), file)):
         if isinstance(node, ast.Import):
@@ -98,7 +99,7 @@ def imports(file: Path) -> Iterator[str]:
 
 
 def third_party(files: Iterable[Path]) -> set[str]:
-    """Return the rosdep keys of what the files import from outside Python and this repository."""
+    """Return the rosdep keys of imports from outside Python and this repository."""
     files = list(files)
     own = {PACKAGE}  # tests import their helpers by bare name
     own |= {file.stem for file in files} | {"toys"}
@@ -120,13 +121,13 @@ def started_by(files: Iterable[Path]) -> set[str]:
 
 
 def within(name: str, module: str) -> bool:
-    """Tell whether the dotted name is the module or something in it."""
+    """Return whether the dotted name is the module or something in it."""
     return name == module or name.startswith(f"{module}.")
 
 
 @pytest.fixture
 def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Return what setup.py hands to setuptools."""
+    """Return what setup.py passes to setuptools."""
     captured: dict[str, Any] = {}
     monkeypatch.setattr(setuptools, "setup", lambda **arguments: captured.update(arguments))
     monkeypatch.chdir(ROOT)
@@ -135,19 +136,19 @@ def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def test_manifest_and_setup_agree(setup_arguments: dict[str, Any]) -> None:
-    """What package.xml tells ROS about the package, setup.py tells Python."""
+    """package.xml and setup.py contain the same facts, for ROS and for Python."""
     for key in ("name", "version", "license"):
         assert setup_arguments[key] == MANIFEST.findtext(key)
     assert setup_arguments["maintainer"] == MANIFEST.findtext("maintainer")
 
 
 def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any]) -> None:
-    """Extras contain only what the package can do without."""
+    """Extras contain only what the package can work without."""
     assert setup_arguments["extras_require"] == {**EXTRAS, "test": ["pytest"]}
 
 
 def test_only_tools_need_what_an_extra_brings() -> None:
-    """A driver runs without; a replay needs rosbags, which it says."""
+    """A driver works without them; only a replay needs rosbags, and says so."""
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {
         (file.relative_to(ROOT / PACKAGE).parts[0], library)
@@ -160,13 +161,13 @@ def test_only_tools_need_what_an_extra_brings() -> None:
 
 
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
-    """The command is one that Ubuntu 24.04 accepts."""
+    """The README has a command that Ubuntu 24.04 accepts."""
     words = f"pip install --user --break-system-packages {' '.join(sorted(FROM_PIP))}"
     assert words in (ROOT / "README.md").read_text()
 
 
 def test_every_entry_point_names_a_function(setup_arguments: dict[str, Any]) -> None:
-    """Each executable's module exists and defines the function it starts."""
+    """Each executable's module exists and defines the function that it starts."""
     for script in setup_arguments["entry_points"]["console_scripts"]:
         module, function = script.partition("=")[2].strip().split(":")
         tree = ast.parse((ROOT / module.replace(".", "/")).with_suffix(".py").read_text())
@@ -181,7 +182,7 @@ def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
 
 
 def test_optional_packages_are_started_and_documented() -> None:
-    """What rosdep does not install, the README tells to."""
+    """rosdep does not install them, so the README says how to."""
     readme = (ROOT / "README.md").read_text()
     assert started_by(python_files("launch")) >= OPTIONAL
     for name in OPTIONAL:
@@ -189,14 +190,14 @@ def test_optional_packages_are_started_and_documented() -> None:
 
 
 def test_manifest_declares_what_the_tests_import() -> None:
-    """`rosdep install --with-test` is all that `colcon test` needs."""
+    """``rosdep install --with-test`` installs all that ``colcon test`` needs."""
     needed = third_party(python_files("test")) - declared("exec_depend")
     assert needed == declared("test_depend")
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "launch").iterdir()), ids=lambda path: path.name)
 def test_launch_file_describes_a_launch(path: Path) -> None:
-    """Each launch file is found by its ending, compiles, and defines what `ros2 launch` calls."""
+    """Its name has the right ending, it compiles, and it defines what ``ros2 launch`` calls."""
     assert path.name.endswith(".launch.py")
     tree = ast.parse(path.read_text(), path)
     compile(tree, path, "exec")
@@ -205,7 +206,7 @@ def test_launch_file_describes_a_launch(path: Path) -> None:
 
 
 def test_the_core_imports_itself_and_pure_modules_only() -> None:
-    """No ROS, serial port, thread, clock or file comes into the core."""
+    """ROS, serial ports, threads, clocks and files are not used in the core."""
     foreign = {
         f"{file.relative_to(ROOT)}: {name}"
         for file in python_files(f"{PACKAGE}/core")
@@ -216,7 +217,7 @@ def test_the_core_imports_itself_and_pure_modules_only() -> None:
 
 
 def test_the_simulator_shares_nothing_with_the_core() -> None:
-    """A manual misread in the driver is not misread alike in the board it is tried against."""
+    """So a misread manual is not misread in the same way in driver and simulated board."""
     shared = {
         f"{file.relative_to(ROOT)}: {name}"
         for file in python_files(f"{PACKAGE}/simulator")
@@ -227,7 +228,7 @@ def test_the_simulator_shares_nothing_with_the_core() -> None:
 
 
 def test_mypy_checks_exactly_what_imports_no_ros() -> None:
-    """Every module is strictly typed that does not hang on ROS, which brings no types along."""
+    """Modules that need ROS are left out, since ROS has no type annotations."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
     without_ros = {
         file
@@ -244,7 +245,7 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
 
 
 def test_every_source_file_says_whose_it_is() -> None:
-    """The first line has it, with the licence that package.xml declares."""
+    """The first line has the owner, and the licence that package.xml declares."""
     line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
     files = python_files(PACKAGE, "docs", "launch", "test", "setup.py")
     without = [str(file) for file in files if file.read_text().partition("\n")[0] != line]

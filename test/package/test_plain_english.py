@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The project's English: a phrase that readers had to read twice does not come back.
+"""Plain English in the repository: phrases that were hard to read are rejected.
 
-Every text file of the repository is searched: log lines, messages, documents, comments, docstrings.
-A phrase may span a line break. Identifiers are not searched, since ``_`` belongs to a word.
+Every text file is searched: log lines, messages, documents, comments, docstrings. A phrase may span
+a line break. Identifiers are not searched, since ``_`` belongs to a word.
 """
 
 import ast
@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SUFFIXES = {".cfg", ".md", ".py", ".rst", ".rules", ".service", ".toml", ".xacro", ".xml", ".yaml"}
 SKIPPED = {"build", "install", "log"}
-"""Folders that are generated."""
+"""Folders of generated files, which are not searched."""
 
 PATTERNS = {
     "mend": r"mend(s|ed|ing)?",
@@ -44,7 +44,7 @@ PATTERNS = {
     "lattice": r"lattices?",
     "farewell": r"farewells?",
 }
-"""By its name: what must not be written, as whole words."""
+"""By its name: the pattern of a phrase that must not be used, as full words."""
 
 ALLOWED = {
     "test/package/test_plain_english.py": "names the phrases",
@@ -52,12 +52,12 @@ ALLOWED = {
 """Files that are not searched, each with its reason."""
 
 CONJUNCTIONS = {"And", "But", "Nor", "Or"}
-"""A docstring that begins with one needs its function's name to be understood."""
+"""A docstring that begins with one of these cannot be understood without the function's name."""
 
 
 @cache
 def texts() -> dict[str, str]:
-    """Every text file of the repository by its name."""
+    """Return every text file of the repository by its name."""
     return {
         str(name): (ROOT / name).read_text(encoding="utf-8")
         for name in sorted(file.relative_to(ROOT) for file in ROOT.rglob("*"))
@@ -67,7 +67,7 @@ def texts() -> dict[str, str]:
 
 
 def found(phrase: str) -> Iterator[str]:
-    """Places of the phrase: file, line and words."""
+    """Yield the places of the phrase: file, line and words."""
     pattern = re.compile(
         rf"\b(?:{PATTERNS[phrase]})(?!\w)".replace(" ", r"(?: |\s*\n[\s#|]*)"),
         re.IGNORECASE | re.MULTILINE,
@@ -83,12 +83,12 @@ def found(phrase: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("phrase", PATTERNS)
 def test_the_phrase_is_not_used(phrase: str) -> None:
-    """CONTRIBUTING.md says what to write in its place."""
+    """CONTRIBUTING.md says what to write instead."""
     assert list(found(phrase)) == []
 
 
 def test_no_docstring_begins_with_a_conjunction() -> None:
-    """A reader who looks at one docstring alone understands it."""
+    """A docstring should be understood by itself."""
     fragments = [
         f"{name}: {doc.splitlines()[0]}"
         for name, text in texts().items()
@@ -102,5 +102,5 @@ def test_no_docstring_begins_with_a_conjunction() -> None:
 
 
 def test_every_exception_is_needed() -> None:
-    """An exception for a file that has gone is removed."""
+    """Exceptions for files that no longer exist must be removed."""
     assert set(ALLOWED) <= set(texts())

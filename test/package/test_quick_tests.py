@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What `make check` runs stays quick: no ROS, and few examples."""
+"""The tests of ``make check`` stay quick: they do not use ROS, and have few examples."""
 
 import ast
 import re
@@ -9,11 +9,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 MOST_EXAMPLES = 200
-"""Of a property that is not marked slow."""
+"""Largest number of examples of a property that is not marked slow."""
 
 
 def quick_folders() -> list[str]:
-    """The folders that the Makefile names."""
+    """Return the folders that the Makefile names."""
     found = re.search(r"^QUICK := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert found
     return found[1].split()
@@ -36,7 +36,7 @@ def test_none_of_them_imports_ros() -> None:
 
 
 def test_a_property_of_many_examples_is_marked_slow() -> None:
-    """Otherwise a minute would not be enough."""
+    """Otherwise ``make check`` would take more than a minute."""
     for name, module in modules():
         for node in ast.walk(module):
             if not isinstance(node, ast.FunctionDef):

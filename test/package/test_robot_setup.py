@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The udev rules and the systemd unit: well formed, and as the documents say."""
+"""The udev rules and the systemd unit: well formed, and as documented."""
 
 import re
 import shutil
@@ -19,7 +19,7 @@ ASSIGNMENTS = {"SYMLINK", "GROUP", "MODE", "ATTR{latency_timer}"}
 
 
 def rules(lines: list[str]) -> list[dict[str, tuple[str, str]]]:
-    """Each line as its keys, with operator and value; anything that is not a rule fails."""
+    """Parse each line into its keys, with operator and value; fail at anything but a rule."""
     parsed = []
     for line in lines:
         tokens = [TOKEN.fullmatch(token) for token in line.split(", ")]
@@ -42,7 +42,7 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """/dev/omnibot for the group dialout only."""
+    """The device is /dev/omnibot, for the group dialout only."""
     assert len(OFFERED) == 4
     for rule in OFFERED:
         assert rule["SUBSYSTEM"] == ("==", "tty")
@@ -54,12 +54,12 @@ def test_each_adapter_gets_the_same_name_and_rights() -> None:
 
 
 def test_only_one_adapter_is_taken_for_the_board() -> None:
-    """Two would let a lidar become /dev/omnibot."""
+    """With two rules a lidar could become /dev/omnibot."""
     assert len([rule for rule in ACTIVE if "SYMLINK" in rule]) == 1
 
 
 def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
-    """One millisecond in place of sixteen, once its driver is bound."""
+    """The timer is 1 ms instead of 16 ms, from when its driver is bound."""
     (timer,) = [rule for rule in ACTIVE if "ATTR{latency_timer}" in rule]
     assert timer["DRIVER"] == ("==", "ftdi_sio")
     assert "bind" in timer["ACTION"][1].split("|")
@@ -67,7 +67,7 @@ def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
 
 
 def unit_settings() -> dict[str, list[str]]:
-    """The unit's keys with their values, continued lines joined."""
+    """Return the unit's keys with their values, continued lines joined."""
     settings: dict[str, list[str]] = {}
     for line in UNIT.read_text().replace("\\\n", " ").splitlines():
         key, assigned, value = line.partition("=")
@@ -85,7 +85,7 @@ def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> No
 
 
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
-    """A crash of the driver must not kill what stops the robot then."""
+    """A crash of the driver must not kill its guard, which then stops the robot."""
     settings = unit_settings()
     assert settings["KillSignal"] == ["SIGINT"]
     assert settings["KillMode"] == ["control-group"]
@@ -95,7 +95,7 @@ def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None
 
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd is not installed")
 def test_systemd_accepts_the_unit() -> None:
-    """It reports every key and value that it does not know on stderr."""
+    """It reports unknown keys and values on stderr."""
     done = subprocess.run(
         ["systemd-analyze", "verify", "--man=no", str(UNIT)],
         capture_output=True,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings for other packages: they name what the driver has, and ask no more than it gives."""
+"""Settings for other packages use only what the driver has, within its limits."""
 
 import ast
 import json
@@ -27,23 +27,23 @@ LINEAR, ANGULAR = (
 )
 TIMEOUT = PARAMETERS.by_name["cmd_vel_timeout"].default
 
-# Topics of others that the displays show.
+# Topics of other nodes that the displays show.
 OTHERS = {"robot_description", "diagnostics", "goal_pose"}
 
 
 def load(name: str) -> Any:
-    """The parsed YAML file."""
+    """Return the parsed YAML file."""
     return yaml.safe_load((CONFIG / name).read_text())
 
 
 def parameters(name: str, node: str) -> dict[str, Any]:
-    """A node's parameters in the file."""
+    """Return a node's parameters in the file."""
     found: dict[str, Any] = load(name)[node]["ros__parameters"]
     return found
 
 
 def driver_names() -> set[str]:
-    """The driver's topics and services, relative to its namespace, as it creates them."""
+    """Return the driver's topics and services, relative to its namespace, from its code."""
     calls = [
         node
         for source in (ROOT / NODE).glob("*.py")
@@ -57,7 +57,7 @@ def driver_names() -> set[str]:
 
 
 def everything_under(key: str, tree: Any) -> Iterator[Any]:
-    """All values of the key, at any depth of the tree."""
+    """Yield all values of the key, at any depth of the tree."""
     if isinstance(tree, dict):
         if key in tree:
             yield tree[key]
@@ -72,20 +72,20 @@ DRIVER = driver_names()
 
 
 def test_the_drivers_names_are_found() -> None:
-    """The other tests compare with these."""
+    """The other tests compare names with these."""
     assert {"odom", "imu/data_raw", "cmd_vel", f"{NODE}/estop_active", f"{NODE}/estop"} <= DRIVER
 
 
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.name)
 def test_ros_reads_each_parameter_file(path: Path) -> None:
-    """rcl's parser takes less than YAML: no anchors, no mixed lists."""
+    """rcl's parser accepts less than YAML: anchors and mixed lists are invalid."""
     context = Context()
     rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
     rclpy.shutdown(context=context)
 
 
 def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
-    """Speeds from odom, turning from both, no pose, no acceleration, and it alone publishes TF."""
+    """Velocities are fused from odom, the yaw rate from both; only the filter publishes TF."""
     ekf = parameters("ekf.yaml", "/**")
     states = [
         *("x", "y", "z", "roll", "pitch", "yaw"),
@@ -103,7 +103,7 @@ def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
 
 
 def test_nav2_keeps_to_the_drivers_limits() -> None:
-    """Each speed limit in Nav2 is the driver's default, so plans are driven as planned."""
+    """Each speed limit in Nav2 is the driver's default, so plans can be followed."""
     file = load("nav2_omnibot.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     assert {mppi["vx_max"], -mppi["vx_min"], mppi["vy_max"]} == {LINEAR}
@@ -119,7 +119,7 @@ def test_nav2_keeps_to_the_drivers_limits() -> None:
 
 
 def test_nav2_knows_that_the_robot_moves_sideways() -> None:
-    """Localisation, control and thresholds allow it."""
+    """Localization, control and thresholds allow sideways motion."""
     file = load("nav2_omnibot.yaml")
     controller = file["controller_server"]["ros__parameters"]
     assert controller["FollowPath"]["motion_model"] == "Omni"
@@ -129,7 +129,7 @@ def test_nav2_knows_that_the_robot_moves_sideways() -> None:
 
 
 def test_nav2_uses_the_drivers_topics_and_frames() -> None:
-    """Odometry and commands are where the driver has them."""
+    """Topics of odometry and commands, and all frames, are the driver's."""
     file = load("nav2_omnibot.yaml")
     assert set(everything_under("odom_topic", file)) == {"odom"} <= DRIVER
     assert set(everything_under("cmd_vel_out_topic", file)) == {"cmd_vel"} <= DRIVER
@@ -147,7 +147,7 @@ def test_every_critic_that_is_tuned_is_used() -> None:
 
 
 def test_the_mux_is_locked_by_the_drivers_estop() -> None:
-    """Its topic is the latched Bool of the driver, and stands above every source."""
+    """Its topic is the driver's latched Bool, with a higher priority than every source."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     (lock,) = mux["locks"].values()
     assert lock["topic"] == f"{NODE}/estop_active"
@@ -157,7 +157,7 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 
 
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
-    """Its sources are not its output, and are forgotten as soon as the driver forgets them."""
+    """Its sources differ from its output, and have the driver's timeout."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()
     assert {source["timeout"] for source in sources} == {TIMEOUT}
@@ -167,7 +167,7 @@ def test_the_mux_passes_on_what_the_driver_takes() -> None:
 
 
 def test_rviz_shows_topics_and_frames_that_exist() -> None:
-    """Relative names, so that a robot's namespace is a robot's display."""
+    """Names are relative, so that a display can be put into a robot's namespace."""
     rviz = yaml.safe_load((ROOT / "rviz/omnibot.rviz").read_text())["Visualization Manager"]
     topics = {
         topic["Value"]
@@ -179,7 +179,7 @@ def test_rviz_shows_topics_and_frames_that_exist() -> None:
 
 
 def test_foxglove_shows_topics_and_services_that_exist() -> None:
-    """Every name that begins with a slash in the layout is the driver's, or one of a few others."""
+    """Every name in the layout that begins with a slash is the driver's, or one of a few others."""
     text = (CONFIG / "foxglove.json").read_text()
     names = set(re.findall(r'"/([a-z_/]+)', text))
     assert {"odom", "imu/data_raw", f"{NODE}/state", f"{NODE}/estop"} < names
@@ -187,7 +187,7 @@ def test_foxglove_shows_topics_and_services_that_exist() -> None:
 
 
 def test_foxglove_lays_out_every_panel_once() -> None:
-    """A panel without a place is not drawn, a place without settings is empty."""
+    """A panel without a place is not drawn, and a place without settings is empty."""
     layout = json.loads((CONFIG / "foxglove.json").read_text())
     places = list(everything_under("first", layout)) + list(everything_under("second", layout))
     panels = [place for place in places if isinstance(place, str)]
@@ -195,7 +195,7 @@ def test_foxglove_lays_out_every_panel_once() -> None:
 
 
 def test_foxglove_drives_slowly_and_often_enough() -> None:
-    """Its buttons stay within the limits and repeat faster than the driver forgets."""
+    """Its buttons stay within the limits and repeat faster than the command timeout."""
     teleop = json.loads((CONFIG / "foxglove.json").read_text())["configById"]["Teleop!drive"]
     assert teleop["publishRate"] > 2 / TIMEOUT
     limits = {"linear-x": LINEAR, "angular-z": ANGULAR}

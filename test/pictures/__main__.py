@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every picture of the README and the documents that a tool makes: ``make pictures``.
+"""Make all pictures of the README and the documents that a tool can make: ``make pictures``.
 
-Each module here has a ``main(folder)`` that writes pictures into the folder; each runs in a process
-of its own, two at once, as most of them wait for robots that drive in real time.
+Each module here has a ``main(folder)`` that writes pictures into the folder. Each runs in its own
+process, two at once, as most of them wait for robots that drive in real time.
 """
 
 import os
@@ -17,7 +17,7 @@ PICTURES = HERE.parents[1] / "docs" / "pictures"
 
 
 def main() -> int:
-    """Return the number of modules that failed."""
+    """Run all modules; return the number of those that failed."""
     with ThreadPoolExecutor(2) as pool:
         return sum(pool.map(_fails, sorted(HERE.glob("[!_]*.py"))))
 

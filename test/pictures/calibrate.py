@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pictures of ``calibrate imu``, ``scale`` and ``geometry``, on robots with planted errors.
+"""Pictures of ``calibrate imu``, ``scale`` and ``geometry``, on robots with known errors.
 
-What was planted is in docs/tools/calibrate.md, beside what is found here.
+The errors are in docs/tools/calibrate.md, together with those found here.
 """
 
 import math

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The picture of the robot's description: its cylinders and boxes, by a small ray tracer."""
+"""The picture of the robot's description: its cylinders and boxes, drawn by a small ray tracer."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 DESCRIPTION = Path(__file__).parents[2] / "urdf" / "omnibot.urdf.xacro"
 WIDTH, HEIGHT, BAND, FINER = 800, 560, 20, 2
-"""Pixels, how many rows are done at once, and rays along each side of a pixel."""
+"""Size in pixels, number of rows computed at once, and rays along each side of a pixel."""
 EYE_M, LOOK_M, HALF_VIEW_RAD = np.array([0.62, 0.30, 0.42]), np.array([0.0, 0.0, 0.088]), 0.2138
 FLOOR_M, FADE_M = 0.2, 0.35
 LAMPS, LAMP_SIZE = 6, 0.06
@@ -32,7 +32,7 @@ LIGHT, FILL = unit(np.array([0.45, 0.25, 1.0])), unit(np.array([0.3, -0.8, 0.5])
 
 
 def pose(origin: Any) -> Array:
-    """A URDF origin as a 4x4 matrix."""
+    """Return a URDF origin as a 4x4 matrix."""
     matrix = np.eye(4)
     if origin is not None:
         (sr, sp, sy), (cr, cp, cy) = np.sin(origin.rpy), np.cos(origin.rpy)
@@ -47,7 +47,7 @@ def pose(origin: Any) -> Array:
 
 @dataclass
 class Hits:
-    """Where rays enter and leave a solid, with normals."""
+    """Places where rays enter and leave a solid, with normals."""
 
     rays: NDArray[np.intp]
     near: Array
@@ -58,7 +58,7 @@ class Hits:
 
 @dataclass
 class Solid:
-    """A box of these half sides, or a cylinder about its own z in it."""
+    """A box with these half sides, or a cylinder about its own z axis within that box."""
 
     matrix: Array
     half: Array
@@ -90,7 +90,7 @@ class Solid:
         return Hits(rays[met], near[met], normals[0], far[met], normals[1])
 
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
-        """Normals of the face across this axis, against the ray where it enters."""
+        """Return normals of the face across this axis, against the ray where it enters."""
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))
         local[rows, axis] = sign * np.sign(way[rows, axis])
@@ -102,7 +102,7 @@ class Solid:
 
 
 def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArray[np.intp]:
-    """The rays that pass a sphere, or begin in it."""
+    """Return the indices of rays that pass through a sphere, or begin in it."""
     to = centre - origins
     along = np.einsum("ij,ij->i", to, directions)
     passing = np.einsum("ij,ij->i", to, to) - along**2 < reach**2
@@ -123,7 +123,7 @@ class Link:
 
 
 def meet(links: list[Link], origins: Array, directions: Array) -> Iterator[tuple[Solid, Hits]]:
-    """What each solid does to the rays."""
+    """Yield each solid with its intersections with the rays."""
     for link in links:
         rays = close(link.centre, link.reach, origins, directions)
         for solid in link.solids:
@@ -133,7 +133,7 @@ def meet(links: list[Link], origins: Array, directions: Array) -> Iterator[tuple
 
 
 def links() -> Iterator[Link]:
-    """All that is seen of the robot, on the ground."""
+    """Yield all visible parts of the robot, placed on the ground."""
     robot = URDF.from_xml_string(xacro.process_file(str(DESCRIPTION)).toxml())
     colours = {material.name: material.color.rgba for material in robot.materials}
     places = {"base_link": np.linalg.inv(pose(robot.joint_map["base_footprint_joint"].origin))}
@@ -153,7 +153,7 @@ def links() -> Iterator[Link]:
 
 
 def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
-    """The amount of light at each point."""
+    """Return the amount of light at each point, from 0 to 1."""
     light = np.zeros(len(points))
     for _ in range(LAMPS):
         towards = unit(LIGHT + random.normal(0.0, LAMP_SIZE, points.shape))
@@ -165,7 +165,7 @@ def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
 
 
 def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array:
-    """Render the colours along these rays from the eye."""
+    """Return the colours along these rays from the eye."""
     eyes = np.broadcast_to(EYE_M, rays.shape)
     depth = np.where(rays[:, 2] < 0.0, -EYE_M[2] / np.minimum(rays[:, 2], -1e-9), np.inf)
     colour = np.ones(rays.shape)
@@ -197,7 +197,10 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 
 
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
-    """Clear solids before what is seen, from the lowest to the highest; thin edges are denser."""
+    """Draw clear solids over what is behind them, from the lowest to the highest.
+
+    Thin edges are denser.
+    """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):
             before = at < depth[hits.rays]

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor's pictures, from its real screen: ``python test/pictures/monitor.py docs/pictures``.
+"""Pictures of the monitor's real screen: ``python test/pictures/monitor.py docs/pictures``.
 
-A driver on a simulated board, a robot that drives a square round it, and the dashboard at 80x24.
+A driver runs on a simulated board, a robot drives a square, and the dashboard has a size of 80x24.
 """
 
 import asyncio
@@ -77,7 +77,7 @@ async def _photograph(feed: "Feed", driven: Callable[[], bool], folder: Path) ->
 
 
 def _picture(app: "App[None]") -> str:
-    """The screen, without the fonts that would be loaded from elsewhere."""
+    """Return the screen as SVG, without the fonts that would be loaded from the network."""
     svg = app.export_screenshot(title="ros2 run omnibot_driver monitor")
     return re.sub(r"@font-face \{.*?\}", "", svg, flags=re.DOTALL).replace("Fira Code, ", "")
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The report's pictures: a drive round the demo's square, with an e-stop, recorded to a bag."""
+"""Pictures of the report: a drive around the demo's square, with an e-stop, recorded to a bag."""
 
 import math
 import os
@@ -28,12 +28,12 @@ from omnibot_driver.tools.report.__main__ import main as report
 
 SHOWN = ("path", "timeline", "timing", "velocities")
 REST = 75
-"""Messages of odom, three seconds."""
+"""Number of odom messages at rest: three seconds."""
 STOPPED_ON_LEG = 6
 
 
 def main(folder: Path) -> None:
-    """Write ``report_path.png`` and so on; the verdict goes to the terminal."""
+    """Write ``report_path.png`` and the others; the verdict is printed."""
     rclpy.init()
     with ExitStack() as stack:
         stack.callback(rclpy.shutdown)
@@ -52,7 +52,7 @@ def main(folder: Path) -> None:
 
 
 def _drive(probe: Probe, recorder: Recorder, namespace: str) -> None:
-    """Rest, seven legs with an e-stop in the middle of the last, rest."""
+    """Rest, drive seven legs with an e-stop in the middle of the last, and rest."""
     topic, kind, qos = f"/{namespace}/cmd_vel", "geometry_msgs/msg/Twist", QoSProfile(depth=10)
     recorder.types[topic], recorder.offered[topic] = kind, as_recorded(qos)
     recorder.hear(topic, kind, qos)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulator as a program of its own, and what is said to it and printed by it."""
+"""The simulator as a separate program: start it, type into its console, read what it prints."""
 
 import os
 import subprocess
@@ -23,14 +23,14 @@ RUN_MODULE = (
 def simulator(
     *arguments: str, stdin: int | IO[str] = subprocess.PIPE
 ) -> AbstractContextManager[subprocess.Popen[str]]:
-    """As a user runs it; killed if the test leaves it running."""
+    """Run the simulator as a user does; kill it if the test leaves it running."""
     return _running(["-m", "omnibot_driver.simulator", *arguments], stdin)
 
 
 def toy(
     name: str, *arguments: str, stdin: int | IO[str] = subprocess.PIPE
 ) -> AbstractContextManager[subprocess.Popen[str]]:
-    """The same of a board that is a module of the tests."""
+    """Run the simulator with a board that is a module of the tests."""
     return _running(["-c", RUN_MODULE, name, *arguments], stdin)
 
 
@@ -52,7 +52,7 @@ def _running(arguments: Sequence[str], stdin: int | IO[str]) -> Iterator[subproc
 
 
 def line(process: subprocess.Popen[str]) -> str:
-    """The next line that the simulator prints."""
+    """Return the next line that the simulator prints."""
     assert process.stdout is not None
     return process.stdout.readline().rstrip("\n")
 

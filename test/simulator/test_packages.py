@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which package of the simulator may import which."""
+"""Rules for imports between the packages of the simulator."""
 
 import ast
 from pathlib import Path
@@ -15,7 +15,7 @@ PACKAGE = simulator.__name__
 
 
 def imported(folder: Path) -> set[str]:
-    """The modules that those in this folder import."""
+    """Return the modules that the modules in this folder import."""
     return {
         node.module
         for path in folder.rglob("*.py")
@@ -26,7 +26,7 @@ def imported(folder: Path) -> set[str]:
 
 @pytest.mark.parametrize("name", ["common", *boards()])
 def test_a_package_imports_itself_and_what_all_share(name: str) -> None:
-    """So each board can be taken away, and none is built of another."""
+    """Each board can be removed without breaking another, and no board is built on another."""
     allowed = (f"{PACKAGE}.common", f"{PACKAGE}.{name}")
     ours = {module for module in imported(FOLDER / name) if module.startswith(PACKAGE)}
     assert not {module for module in ours if not module.startswith(allowed)}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulator as a program of its own."""
+"""The simulator as a separate program, with toy boards."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from omnibot_driver.simulator.__main__ import boards, main, run
 
 
 def test_the_console_helps_and_says_what_it_does_not_know() -> None:
-    """Both go to stderr, so that stdout keeps to its answers."""
+    """Both texts go to stderr, because stdout is for answers only."""
     with toy("toy_udp") as process:
         line(process)
         out, err = process.communicate("help\nfly\nquit\n", timeout=PATIENCE_S)
@@ -29,7 +29,7 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
-    """Exit code 0, no traceback, and the links are gone; a closed stdin had not ended it before."""
+    """Exit code 0, no traceback, links removed; before that, a closed stdin does not end it."""
     link = tmp_path / "toy"
     with toy("toy_lines", "--link", str(link), stdin=subprocess.DEVNULL) as process:
         path = line(process)
@@ -44,7 +44,7 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
 def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """It names the board and those that there are."""
+    """The sentence names the unknown board and lists those that exist."""
     assert main(["--board", "zeppelin", "--wings", "2"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
@@ -53,14 +53,14 @@ def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
 
 
 def test_the_boards_are_the_packages_beside_what_they_share() -> None:
-    """They are not listed a second time."""
+    """A new package is found without being added to a list."""
     folder = Path(simulators.__file__).parent
     packages = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert {*boards(), "common"} == packages
 
 
 def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
-    """The link that is given is one for each; the hint has all parameters of the driver."""
+    """One ``--link`` gives a link for each line; the hint has all port parameters of the driver."""
     with toy("toy_lines", "--link", str(tmp_path / "toy"), "--angle", "30") as process:
         printed = [line(process), line(process)]
         links = [tmp_path / "toy-drive", tmp_path / "toy-front"]
@@ -72,7 +72,7 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
 
 
 def test_a_board_on_the_network_prints_its_address() -> None:
-    """It has no --link, and faults of a network."""
+    """It has options for network faults, and rejects ``--link`` and ``--flip``."""
     with toy("toy_udp", "--lose", "0.1", "--duplicate", "0.1", "--delay", "0.2") as process:
         address = line(process)
         assert re.fullmatch(r"udp://127\.0\.0\.1:\d+", address)
@@ -88,7 +88,7 @@ def test_a_board_on_the_network_prints_its_address() -> None:
 def test_a_link_that_cannot_be_made_is_one_sentence_and_code_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A mistake in the arguments gives no traceback."""
+    """A mistake in the arguments gives no traceback, and the signal handlers are restored."""
     taken = tmp_path / "taken"
     taken.write_text("data")
     handler = signal.getsignal(signal.SIGTERM)

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated toy of two serial channels: two wheels behind one, a steered one behind the other.
+"""A simulated toy board with two serial channels: one for its drive, one for a steered wheel.
 
-It receives ``go V W`` (m/s, rad/s) and ``angle DEGREES``, and sends ``odo X Y YAW`` every 400 ms
-and
-``fwl DEGREES`` every 20 ms, each in a line of its own.
+It receives ``go V W`` (m/s, rad/s) and ``angle DEGREES``, and sends ``odo X Y YAW`` (m, m, rad)
+every 400 ms and ``fwl DEGREES`` every 20 ms, each as a line.
 """
 
 import argparse
@@ -18,7 +17,7 @@ CHANNELS = (Channel("drive"), Channel("front", "front_port"))
 
 
 class ToyLines:
-    """``seed`` is what was chosen, and has no effect."""
+    """The toy board; ``seed`` is stored for the tests and has no effect."""
 
     channels, tick_s = CHANNELS, 0.02
 

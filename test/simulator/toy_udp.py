@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated toy that answers requests over UDP and obeys one blocking move at a time.
+"""A simulated toy board that answers requests over UDP and executes one blocking move at a time.
 
-``odo`` is answered by ``ok X`` (m); ``move X`` at 0.5 m/s, by ``ok X`` when it is done; ``stop``
-ends it: both are answered. Meanwhile another move fails.
+The reply to ``odo`` is ``ok X`` (m). ``move X`` drives X m at 0.5 m/s, and its reply ``ok X`` comes
+at the end. ``stop`` ends the move: the move fails, and the stop is acknowledged. During a move,
+another one fails.
 """
 
 import argparse
@@ -15,7 +16,7 @@ CHANNELS = (Channel(datagrams=True),)
 
 
 class ToyServer:
-    """A server that records ``requests``, in order."""
+    """The toy board; ``requests`` are all datagrams received, in order."""
 
     channels, tick_s = CHANNELS, 0.01
 
@@ -58,7 +59,7 @@ class ToyServer:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """It has none of its own."""
+    """Add nothing: this board has only the common options."""
 
 
 def from_arguments(arguments: argparse.Namespace) -> ToyServer:

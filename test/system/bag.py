@@ -26,7 +26,7 @@ TYPES: Final = get_typestore(Stores.ROS2_JAZZY)
 DEPTH: Final = 1000
 
 Message = tuple[int, bytes]
-"""When it arrived, in ns, and how it looked on the network."""
+"""Time of arrival in ns, and the serialised message."""
 
 
 def message_class(name: str) -> type:
@@ -35,7 +35,7 @@ def message_class(name: str) -> type:
 
 
 def as_recorded(qos: QoSProfile) -> Qos:
-    """A quality of service as a bag has it."""
+    """Convert a quality of service of rclpy to that of a bag."""
     return Qos(
         QosHistory[qos.history.name],
         qos.depth,
@@ -50,7 +50,7 @@ def as_recorded(qos: QoSProfile) -> Qos:
 
 
 def as_played(qos: Qos) -> QoSProfile:
-    """What a bag has of it, for a publisher or a subscription of ours."""
+    """Convert a quality of service of a bag to that of a publisher or a subscription."""
     return QoSProfile(
         depth=DEPTH,
         reliability=ReliabilityPolicy[qos.reliability.name],
@@ -63,9 +63,9 @@ def _time(duration: Duration) -> QosTime:
 
 
 class Recorder:
-    """Hears every topic of a driver without knowing any of them.
+    """Records every topic of a driver, without knowing any of them.
 
-    ``messages``, ``types`` and ``offered``: by topic.
+    ``messages``, ``types`` and ``offered`` (quality of service) are by topic.
     """
 
     def __init__(self, probe: Probe) -> None:
@@ -75,7 +75,7 @@ class Recorder:
         self._probe = probe
 
     def record(self, *expected: str) -> None:
-        """Everything that there is, once the expected topics are."""
+        """Subscribe to all topics of the driver, once the expected ones are there."""
         namespace = self._probe.node.get_namespace()
 
         def publishes() -> bool:
@@ -99,13 +99,13 @@ class Recorder:
             self.hear(topic, kind, as_played(self.offered[topic]))
 
     def hear(self, topic: str, kind: str, qos: QoSProfile) -> list[Message]:
-        """The list that this topic's messages are appended to as they come."""
+        """Subscribe to a topic; return the list to which its messages are appended."""
         heard = self.messages.setdefault(topic, [])
         self._probe.listen_raw(message_class(kind), topic, qos, partial(_append, heard))
         return heard
 
     def write(self, path: Path, plugin: StoragePlugin) -> None:
-        """A bag of what has been heard."""
+        """Write the messages received so far to a bag."""
         with Writer(path, version=9, storage_plugin=plugin) as writer:
             for topic, messages in self.messages.items():
                 connection = writer.add_connection(
@@ -133,7 +133,7 @@ def read(path: Path) -> tuple[dict[str, list[Message]], dict[str, Qos]]:
 
 
 def equal(ours: Any, theirs: Any) -> bool:
-    """A message of rclpy's and one of rosbags', field by field."""
+    """Return whether a message of rclpy and one of rosbags are equal, field by field."""
     if hasattr(ours, "get_fields_and_field_types"):
         names = ours.get_fields_and_field_types()
         return all(equal(getattr(ours, name), getattr(theirs, name)) for name in names)

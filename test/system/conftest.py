@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Real driver processes, a real pseudo-terminal, real DDS: what the system tests stand on."""
+"""Fixtures of the system tests: real driver processes, a real pseudo-terminal and real DDS."""
 
 import os
 import tty
@@ -53,7 +53,10 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 
 @pytest.fixture
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
-    """On a busy computer a driver may stall: what it asks for then is published again."""
+    """Start a probe that publishes its newest message again after a stall of the driver.
+
+    On a busy computer a driver may stall, and then asks for the command again.
+    """
 
     def start(driver: Driver) -> Probe:
         probe = stack.enter_context(Probe(driver.namespace))
@@ -82,8 +85,7 @@ def probe(driver: Driver, probe_of: Callable[[Driver], Probe]) -> Probe:
 
 @pytest.fixture
 def silent_terminal() -> Iterator[tuple[int, str]]:
-    """A pseudo-terminal without a program behind it: the descriptor of its far end, and its
-    name."""
+    """A pseudo-terminal without a program behind it: descriptor of its far end, and its name."""
     far, near = os.openpty()
     tty.setraw(near)
     yield far, os.ttyname(near)
@@ -98,7 +100,7 @@ def silent_port(silent_terminal: tuple[int, str]) -> str:
 
 @pytest.fixture
 def write_to_silent_port(silent_terminal: tuple[int, str]) -> Callable[[bytes], None]:
-    """Writes everything, however slowly it is read."""
+    """Return a function that writes all bytes, however slowly they are read."""
 
     def write(data: bytes) -> None:
         while data:

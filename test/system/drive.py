@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A drive over a bad line, end to end: what was published against what the board really sent.
+"""A drive over a bad line, end to end: the published messages against the frames of the board.
 
 ``python test/system/drive.py SECONDS --lose 0.001`` runs the driver as a process of its own on a
 simulated board, drives curves over ``cmd_vel``, and prints how many messages are wrong and how far
-``odom`` is off. Every message must be found among the board's frames: an Imu by its six words, an
-Odometry by the length and turn of its displacement; and its pose must be the board's own.
+``odom`` is off. Every message must match a frame of the board: an Imu by its six values, an
+Odometry by the length and turn of its displacement; and its pose must be the pose of the board.
 """
 
 import argparse
@@ -25,17 +25,20 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""Frames that a stamp may be off by, before and after a loss has been counted."""
+"""Deltas that a timestamp may be off by, before and after a loss is detected."""
 LONGEST_STALL = 1000
-"""IMU frames that time may jump by where the machine, and the board with it, stood still."""
+"""IMU frames that time may jump by when the computer, and the board with it, stalled."""
 
 Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Of a drive. Sent: since the first that was heard. Errors in m and rad, of ``odom`` against
-    the board's own pose."""
+    """Result of a drive.
+
+    imu_sent, odom_sent: frames since the first one that was received. worst_m, worst_rad, last_m,
+    last_rad: errors of ``odom`` against the pose of the board.
+    """
 
     seconds: float
     way_m: float
@@ -64,7 +67,10 @@ class Outcome:
 
 
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
-    """Drive for this time, stand still for two seconds, and compare. Needs an initialised rclpy."""
+    """Drive for ``seconds``, stand still for two seconds, and compare.
+
+    Needs an initialised rclpy.
+    """
     from driver_process import Driver
     from geometry_msgs.msg import Twist
     from nav_msgs.msg import Odometry
@@ -80,7 +86,7 @@ def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float 
     )
 
     board = SimulatedBoard(BoardSettings(seed=1))
-    board.sent = deque()  # all of them
+    board.sent = deque()  # keeps all frames
     line = FaultyLine(LineFaults(lose=lose, burst=burst, flip=flip), seed=1)
     with ExitStack() as stack:
         port = stack.enter_context(PtyBoard(board, line=line))
@@ -160,9 +166,10 @@ def compare(
 def trace(
     sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float]
 ) -> list[int | None]:
-    """Which of the sent IMU frames each message is; None where it is none that was still to come.
+    """Return the index of the sent IMU frame of each message, or None if it matches none.
 
-    The nearest one by time; noise makes each of them unlike all others.
+    Of the frames after the previous match, it is the equal one that is nearest in time; noise makes
+    each frame different from all others.
     """
     found: list[int | None] = []
     at, at_s = -1, stamps_s[0]
@@ -177,19 +184,19 @@ def trace(
 
 
 def since(found: Sequence[int | None]) -> int:
-    """The first frame that was heard: before it the listener was not ready."""
+    """Return the index of the first frame that was received; before, the listener was not ready."""
     return next(number for number in found if number is not None)
 
 
 def outwards(middle: int, reach: int) -> Iterator[int]:
-    """The numbers about this one, the nearest first."""
+    """Yield ``middle`` and the numbers around it, the nearest first."""
     yield middle
     for distance in range(1, reach + 1):
         yield from (middle + distance, middle - distance)
 
 
 def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[float]) -> int:
-    """The IMU frame of this time, by the nearest that was found."""
+    """Return the index of the IMU frame at ``stamp_s``, from the nearest match."""
     place = min(bisect_left(stamps_s, stamp_s), len(stamps_s) - 1)
     while (number := found[place]) is None:
         place -= 1
@@ -199,8 +206,10 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """The words of every delta, the board's pose after it, to the rounding of four deltas, and the
-    number of the IMU frame right before it.
+    """Return the deltas, the pose of the board after each, and the IMU frame before each.
+
+    A delta is three integers. A pose is exact to the rounding of four deltas. An IMU frame is given
+    by its index.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []
@@ -230,7 +239,7 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Length in 0.1 mm and turn in 0.1 mrad of the displacement that the twist was made of."""
+    """Return length in 0.1 mm and turn in 0.1 mrad of the displacement behind the twist."""
     twist = message.twist.twist
     turn = twist.angular.z * PERIOD_S
     shrink = math.sin(turn / 2) / (turn / 2) if turn else 1.0
@@ -244,7 +253,7 @@ def _stamp(message: Any) -> float:
 
 
 def main() -> int:
-    """Print the outcome; 1 where a message was wrong."""
+    """Print the outcome; return 1 if a message was wrong."""
     parser = argparse.ArgumentParser(description="A drive over a bad line, end to end.")
     parser.add_argument("seconds", type=float)
     for fault in ("lose", "burst", "flip"):

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driver processes forked from one that has imported the driver already.
+"""Driver processes that are forked from a process that has already imported the driver.
 
 A driver spends most of its start on imports, and the tests start hundreds. The nursery imports
 once; each driver is a child of it with output, environment, arguments and an exit code of its own,
-and runs the same ``main``. Tests of the start itself start a new interpreter instead.
+and runs the same ``main``. Tests of the start itself run a new interpreter instead.
 """
 
 import atexit
@@ -24,11 +24,11 @@ from pathlib import Path
 from typing import NoReturn
 
 LARGEST_REQUEST = 1 << 17
-"""Bytes: arguments and environment."""
+"""Most bytes of a request: arguments and environment."""
 
 
 class Forked:
-    """A driver of the nursery, with what the tests use of ``subprocess.Popen``."""
+    """A driver process of the nursery, with the part of ``subprocess.Popen`` that the tests use."""
 
     def __init__(self, pid: int, output: int, status: int) -> None:
         self.pid = pid
@@ -38,7 +38,7 @@ class Forked:
         self._lock = threading.Lock()
 
     def wait(self, timeout: float | None = None) -> int:
-        """The exit code; raises subprocess.TimeoutExpired."""
+        """Return the exit code; raise subprocess.TimeoutExpired if the driver still runs."""
         with self._lock:
             if self.returncode is None:
                 if not select.select([self._status], [], [], timeout)[0]:
@@ -48,13 +48,13 @@ class Forked:
             return self.returncode
 
     def poll(self) -> int | None:
-        """The exit code, or None while the driver runs."""
+        """Return the exit code, or None while the driver runs."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             return self.wait(0.0)
         return None
 
     def send_signal(self, number: int) -> None:
-        """Nothing happens if the driver has ended."""
+        """Send a signal, unless the driver has ended."""
         if self.poll() is None:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, number)
@@ -64,14 +64,14 @@ class Forked:
 
 
 class Nursery:
-    """Starts its process with the first driver; the process ends with this one."""
+    """The process that forks drivers, from the first driver until the tests end."""
 
     def __init__(self) -> None:
         self._control: socket.socket | None = None
         self._lock = threading.Lock()
 
     def start(self, arguments: Sequence[str], environment: Mapping[str, str]) -> Forked:
-        """A driver with these arguments."""
+        """Fork a driver with these arguments and this environment."""
         request = json.dumps([list(arguments), dict(environment)]).encode()
         output, driver_output = os.pipe()
         status, driver_status = os.pipe()
@@ -98,7 +98,7 @@ class Nursery:
 
 
 def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
-    """Close its control, and wait until the nursery has left."""
+    """Close the control socket, and wait until the nursery has ended."""
     control.close()
     process.wait()
 
@@ -115,7 +115,7 @@ def serve(descriptor: int) -> None:
     control = socket.socket(fileno=descriptor)
     wakes, wake = os.pipe()
     os.set_blocking(wake, False)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl-C ends the tests, and they end this
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl-C ends the tests, which end the nursery
     signal.signal(signal.SIGCHLD, lambda *_: None)
     signal.set_wakeup_fd(wake)
     statuses: dict[int, int] = {}
@@ -127,7 +127,7 @@ def serve(descriptor: int) -> None:
         if control not in ready:
             continue
         request, descriptors, _, _ = socket.recv_fds(control, LARGEST_REQUEST, 2)
-        if not request:  # the tests were killed: a driver without them would open others' ports
+        if not request:  # the tests were killed: a driver left over would open other ports
             for pid in statuses:
                 os.kill(pid, signal.SIGTERM)
             return
@@ -156,10 +156,10 @@ def reap(statuses: dict[int, int]) -> None:
 
 
 def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoReturn:
-    """Become the driver.
+    """Run the driver in this forked process.
 
-    It leaves without the exit handlers of the libraries: that of LTTng would stop a thread that a
-    fork does not have.
+    It ends without the exit handlers of the libraries, because that of LTTng would stop a thread
+    that does not exist after a fork.
     """
     from omnibot_driver import driver
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver as a process of its own, with its output and its end."""
+"""The driver as a process of its own, with its output and its exit code."""
 
 import contextlib
 import itertools
@@ -17,21 +17,22 @@ from typing import Any, Self
 from driver_nursery import Nursery
 
 PATIENCE_S = 120.0
-"""How long an event is awaited before a test gives up; no test asserts how long it took."""
+"""How long an event is awaited before a test gives up, in s. Tests do not assert durations."""
 
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
-    signal.signal(signal.SIGHUP, lambda *_: None)  # as good under nohup, and no child inherits it
+    # Under nohup, children would inherit that SIGHUP is ignored; a handler is not inherited.
+    signal.signal(signal.SIGHUP, lambda *_: None)
 
 _namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
-"""Of their own also beside another run of the tests that has come by the same ROS domain."""
+"""Namespaces that also differ from those of another test run in the same ROS domain."""
 _nursery = Nursery()
 
 
 class Driver:
     """The driver as a process of its own, in a namespace of its own.
 
-    ``before``: Python that a new interpreter runs first (without it, the process comes from the
-    nursery); ``namespace``: that of another one; ``more``: further arguments of ROS.
+    before: Python code that a new interpreter runs first; without it, the process comes from the
+    nursery. namespace: that of another driver. more: further ROS arguments.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class Driver:
             self.process = _nursery.start(arguments, environment)
         self.lines: list[str] = []
         self.answers: dict[str, Callable[[], None]] = {}
-        """What to do at each line in which one of these texts is found."""
+        """Functions to call at each line of output that contains the text, by text."""
         self._said = threading.Condition()
         self._listener = threading.Thread(target=self._listen)
         self._listener.start()
@@ -87,7 +88,7 @@ class Driver:
         return "".join(self.lines)
 
     def wait_for_line(self, pattern: str, since: int = 0) -> str:
-        """The first line of the output, from this one on, in which the pattern is found."""
+        """Return the first line of the output, from ``since`` on, that matches the pattern."""
 
         def find() -> str | None:
             return next((line for line in self.lines[since:] if re.search(pattern, line)), None)
@@ -100,14 +101,14 @@ class Driver:
         return line
 
     def end(self, *signals: signal.Signals) -> int:
-        """Send the signals, one after the other; the exit code, once ``lines`` has all it said."""
+        """Send the signals in order; return the exit code when ``lines`` has all output."""
         for number in signals:
             self.process.send_signal(number)
         self._listener.join(PATIENCE_S)
         return self.process.wait(PATIENCE_S)
 
     def guards(self) -> list[int]:
-        """The process numbers of its children that guard its port."""
+        """Return the process ids of its children that guard its port."""
         found = []
         for directory in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Several drivers, each in a process of its own, from one import.
+"""Several drivers, each in a process of its own, that share one import.
 
 ``python fleet_of_drivers.py NUMBER PREFIX`` runs the drivers ``/PREFIX0``, ``/PREFIX1`` and so on
-until its input is closed, and prints their process numbers. Their port does not exist, so they cost
-little; for discovery that is enough. Each has its own DDS participant, as on several robots.
+until its input is closed, and prints their process ids. Their port does not exist, which saves
+computing time and is enough for discovery. Each has its own DDS participant, as on several robots.
 """
 
 import os
@@ -27,7 +27,7 @@ def drive(name: str) -> None:
 
 
 def main() -> None:
-    """Fork the drivers, print their process numbers, and kill them when the input ends."""
+    """Fork the drivers, print their process ids, and kill them when the input ends."""
     children = []
     for index in range(int(sys.argv[1])):
         if not (child := os.fork()):

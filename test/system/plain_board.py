@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A profile of a board that can do little: no IMU, two wheels, ``cmd_vel`` alone, no pause.
+"""Profile of a board with few features: without IMU and pause, two wheels, ``cmd_vel`` only.
 
-On its wire it is an OmniBot whose IMU is ignored, so the simulated one plays it. It has a topic and
-a service of its own.
+It uses the protocol of an OmniBot whose IMU is ignored, so the simulated OmniBot can play it. It
+has a topic and a service of its own.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Another ROS process's view of one driver."""
+"""A ROS node through which the tests observe and command one driver."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -22,7 +22,7 @@ from omnibot_driver.stall_detector import SETTLE_S
 
 
 class Probe:
-    """A ROS node that subscribes, publishes and calls."""
+    """A ROS node that subscribes, publishes and calls services."""
 
     def __init__(self, namespace: str) -> None:
         self.node = Node("probe", namespace=namespace)
@@ -49,7 +49,7 @@ class Probe:
         self.node.destroy_node()
 
     def listen(self, kind: type, topic: str, *, latched: bool = False) -> list[Any]:
-        """The list that messages of this topic are appended to as they come."""
+        """Subscribe to a topic; return the list to which its messages are appended."""
         messages = self._received.setdefault(topic, [])
         qos = QoSProfile(depth=1000)
         if latched:
@@ -67,7 +67,7 @@ class Probe:
     def listen_raw(
         self, kind: type, topic: str, qos: QoSProfile, append: Callable[[bytes, Any], None]
     ) -> None:
-        """Messages of this topic as they are on the network, with what is known of each."""
+        """Subscribe to the serialised messages of a topic, with the message info of each."""
 
         def take(data: bytes, info: Any) -> None:
             with self._changed:
@@ -78,16 +78,19 @@ class Probe:
         self._executor.wake()
 
     def wait_for(self, predicate: Callable[[], object]) -> None:
-        """Until the predicate holds; it is asked again whenever a message comes in."""
+        """Wait until the predicate holds; it is evaluated whenever a message arrives."""
         assert self.comes_about(predicate), "it did not come about"
 
     def comes_about(self, predicate: Callable[[], object]) -> bool:
-        """Whether it did, in reasonable time."""
+        """Return whether the predicate comes to hold within ``PATIENCE_S``."""
         with self._changed:
             return bool(self._changed.wait_for(predicate, PATIENCE_S))
 
     def wait_for_later_stamp(self, messages: list[Any]) -> None:
-        """Until the last of these is of a second from now: older ones may be on their way."""
+        """Wait until the last message has a timestamp at least 1 s from now.
+
+        Older messages may still be on their way.
+        """
         then_ns = self.node.get_clock().now().nanoseconds + 10**9
         self.wait_for(
             lambda: messages and Time.from_msg(messages[-1].header.stamp).nanoseconds > then_ns
@@ -100,7 +103,7 @@ class Probe:
         self.wait_for(lambda: states and states[-1].data == state)
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile | int = 1) -> Any:
-        """A publisher that somebody already listens to."""
+        """Create a publisher, and wait until it has a subscriber."""
         publisher = self.node.create_publisher(kind, topic, qos)
         self.wait_for_graph(publisher.get_subscription_count)
         publish = publisher.publish
@@ -113,7 +116,7 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the newest message of the probe's publishers, once a stall is over for sure."""
+        """Publish the probe's newest message again, when a stall is surely over."""
 
         def publish() -> None:
             with suppress(InvalidHandle):  # the test has ended or removed its publisher
@@ -123,7 +126,7 @@ class Probe:
 
     @contextmanager
     def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:
-        """Publish this velocity on ``cmd_vel`` ten times a second inside the context."""
+        """Publish this velocity, in m/s and rad/s, at 10 Hz on ``cmd_vel`` in the context."""
         publisher = self.publisher(Twist, "cmd_vel")
         twist = Twist()
         twist.linear.x, twist.angular.z = vx, yaw_rate
@@ -134,7 +137,7 @@ class Probe:
             self.remove(timer)
 
     def wait_for_graph(self, predicate: Callable[[], object]) -> None:
-        """Until the predicate, which is asked now and then, holds."""
+        """Wait until the predicate holds; it is evaluated every 20 ms."""
         held = threading.Event()
 
         def look() -> None:
@@ -147,16 +150,16 @@ class Probe:
         self.remove(timer)
 
     def wait_for_node(self, name: str, namespace: str) -> None:
-        """Its topics may be heard before the node itself is discovered."""
+        """Wait until the node is discovered, which may be later than its topics."""
         self.wait_for_graph(lambda: (name, namespace) in self.node.get_node_names_and_namespaces())
 
     def remove(self, entity: Any) -> None:
-        """A publisher, client or timer; by the executor, which must not wait for one that goes."""
+        """Destroy a publisher, client or timer in the executor, which must not wait for it."""
         destroy = getattr(self.node, f"destroy_{type(entity).__name__.lower()}")
         self.wait_for_future(self._executor.create_task(destroy, entity))
 
     def client(self, kind: type, service: str) -> Any:
-        """A client for each service, reused, as the middleware never forgets a client."""
+        """Return the client of a service; reused, as the middleware never forgets a client."""
         if service not in self._clients:
             self._clients[service] = self.node.create_client(kind, f"omnibot_driver/{service}")
             self._executor.wake()
@@ -177,7 +180,7 @@ class Probe:
 
 
 class Answer:
-    """A service call under way."""
+    """A service call in progress."""
 
     def __init__(self, client: Any, request: Any) -> None:
         self._done = threading.Event()

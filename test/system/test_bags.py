@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a driver publishes fits into a bag and comes out of it; a recorded wire is heard again."""
+"""Bags: the topics of a driver survive recording, and a driver can replay its recorded bytes."""
 
 import signal
 from contextlib import ExitStack
@@ -28,7 +28,7 @@ STOP = ZEROS + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 
 @dataclass
 class Drive:
-    """A recorded drive on a simulated board, and where its topics are."""
+    """A recorded drive on a simulated board, with the namespace of its topics."""
 
     recorder: Recorder
     namespace: str
@@ -65,7 +65,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
 def test_every_topic_comes_out_of_a_bag_as_it_went_in(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """Bytes, times, types and qualities of service are kept, in both kinds of storage."""
+    """Bytes, times and qualities of service are kept, in both kinds of storage."""
     recorder = drive.recorder
     recorder.write(tmp_path / "bag", plugin)
     messages, offered = read(tmp_path / "bag")
@@ -75,7 +75,7 @@ def test_every_topic_comes_out_of_a_bag_as_it_went_in(
 
 
 def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
-    """Field by field as rclpy does, by the definitions that come with Jazzy."""
+    """The message definitions of Jazzy give the same fields as rclpy."""
     for topic, kind in drive.recorder.types.items():
         for _, data in drive.recorder.messages[topic]:
             ours = deserialize_message(data, message_class(kind))
@@ -83,7 +83,7 @@ def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
 
 
 def test_a_bag_played_back_is_heard_as_it_was(drive: Drive) -> None:
-    """Published again with the types and qualities that the bag names."""
+    """Types and qualities of service in the bag suffice to publish it again."""
     messages, offered = read(drive.bag)
     topics = [topic for topic in messages if topic.startswith(f"/{drive.namespace}/")]
     with Probe("playback") as probe:
@@ -108,7 +108,7 @@ def wire(drive: Drive, topic: str) -> list[bytes]:
 
 
 def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
-    """A read or a write per message: frames of the board, the command, the pause, Stop at last."""
+    """A message is one read or write: frames of the board, a command, the pause, a final Stop."""
     received, sent = (wire(drive, topic) for topic in RAW)
     assert b"\xff\xfa" in b"".join(received)
     assert b"Paused: 0 \n" in b"".join(received)
@@ -118,7 +118,7 @@ def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
 
 
 def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
-    """Two drivers publish byte for byte alike, with the recording's stamps, and then stand by."""
+    """Two drivers publish identical bytes with the recorded timestamps, then stay running."""
     with ExitStack() as stack:
         replays = [replay(stack, drive) for _ in range(2)]
         for driver, probe, _ in replays:
@@ -138,7 +138,7 @@ def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
 
 
 def replay(stack: ExitStack, drive: Drive) -> tuple[Driver, Probe, dict[str, list[Message]]]:
-    """A driver on the recorded wire, and what it publishes."""
+    """Start a driver that replays the recorded bytes; return what it publishes, too."""
     driver = stack.enter_context(Driver(port=f"replay://{drive.bag}?speed=4&delay=7"))
     probe = stack.enter_context(Probe(driver.namespace))
     heard = {}
@@ -157,7 +157,7 @@ def by_stamp(messages: list[Message], kind: str) -> dict[tuple[int, int], bytes]
 
 
 def measured(data: bytes, kind: str) -> Any:
-    """The parts that neither the time nor the place of the beginning changes."""
+    """Return the fields that do not depend on the time or the pose at the beginning."""
     message = deserialize_message(data, message_class(kind))
     if kind == MEASURED["odom"]:
         return message.twist

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The demo: its steering and drawing as functions, and the whole of it as a user runs it."""
+"""The demo: its steering and drawing as functions, and the complete program as a user runs it."""
 
 import math
 import os
@@ -40,7 +40,7 @@ poses = st.builds(Pose, coordinates, coordinates, st.floats(-10.0, 10.0))
 
 @given(poses, st.integers(0, 1000))
 def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> None:
-    """Wherever the robot is, it is sent on at no more than the speed, and never stopped."""
+    """From any pose the speed is at most that of the demo, and never zero."""
     _, twist = square.steer(pose, leg)
     assert 0.0 < math.hypot(twist.vx_mps, twist.vy_mps) <= square.SPEED_MPS + 1e-9
     assert abs(twist.yaw_rate_radps) <= square.YAW_RATE_RADPS
@@ -48,7 +48,7 @@ def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> 
 
 @given(poses, st.integers(0, 1000))
 def test_a_robot_that_cannot_drive_sideways_is_never_told_to(pose: Pose, leg: int) -> None:
-    """It drives ahead or turns, and is never stopped."""
+    """It drives ahead or turns, and is never at rest."""
     _, twist = square.steer_ahead(pose, leg)
     assert twist.vy_mps == 0.0
     assert 0.0 <= twist.vx_mps <= square.SPEED_MPS
@@ -74,7 +74,7 @@ def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, ya
 def test_the_square_closes(
     steer: Any, yaw_at_the_end: int, x_m: float, y_m: float, yaw_rad: float
 ) -> None:
-    """A robot that answers after 0.1 s passes all corners and ends a lap where it belongs."""
+    """A robot with a lag of 0.1 s passes all corners and ends a lap with the right heading."""
     pose, leg, step_s, lag_s = Pose(x_m, y_m, yaw_rad), 0, 0.08, 0.1
     moving = BodyTwist(0.0, 0.0, 0.0)
     nearest = [math.inf] * 4
@@ -116,7 +116,7 @@ def test_a_status_row_stands_under_its_heading(
 
 @contextmanager
 def running_demo(**environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """A demo and the mark by which it and its children are found; all killed in the end."""
+    """Run a demo; yield it and the mark of its processes, which are all killed in the end."""
     mark = uuid.uuid4().hex
     with subprocess.Popen(
         [sys.executable, "-m", "omnibot_driver.demo"],
@@ -138,7 +138,7 @@ def _python_path() -> str:
 
 
 def marked(mark: str, name: str = "") -> list[int]:
-    """Process ids of those that inherited the mark and have the name in their command line."""
+    """Return the ids of processes with the mark and with ``name`` in their command line."""
     found = []
     for directory in Path("/proc").glob("[0-9]*"):
         try:
@@ -152,7 +152,7 @@ def marked(mark: str, name: str = "") -> list[int]:
 
 
 def read_until_it_drives(process: subprocess.Popen[str]) -> None:
-    """Read its output up to the first row with a speed that was measured."""
+    """Read the output up to the first row with a measured speed."""
     assert process.stdout is not None
     for line in process.stdout:
         if re.match(r"nominal .* [ -]0\.[1-9]\d +-?\d\.\d\d +-?\d\.\d\d$", line):
@@ -161,7 +161,7 @@ def read_until_it_drives(process: subprocess.Popen[str]) -> None:
 
 
 def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
-    """The exit code is 0, rates are the board's, and odometry is within 10 mm of the truth."""
+    """The exit code is 0, IMU and odometry come at 4 to 1, and odometry is within 10 mm."""
     with running_demo(DEMO_SECONDS="20") as (process, mark):
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, output
@@ -185,7 +185,7 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
 def test_laps_are_told_in_english(
     laps: float, told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One lap has no plural s."""
+    """The plural s is absent for exactly one lap."""
     display.report(
         display.Drive(
             seconds=20.0,
@@ -205,7 +205,7 @@ def test_laps_are_told_in_english(
 def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Nothing is said of an IMU, and the command for the real robot names the board."""
+    """The text omits the IMU, and the command for the real robot names the board."""
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     cart = Capability(title="cart", imu=False, sideways=False, ports=("port",), real=real)
     display.introduce(cart, (" --board cart", "-p board:=cart -p port:=/dev/pts/1"), "/d", "X=1", 9)
@@ -232,7 +232,7 @@ def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_board_has_a_demo(name: str) -> None:
-    """What it needs to know of the board can be asked."""
+    """The profile of each board has the facts that the demo needs."""
     capability = capability_of(name)
     assert any(capability.ports)
     assert capability.title
@@ -241,7 +241,7 @@ def test_every_board_has_a_demo(name: str) -> None:
 def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The message comes before anything starts."""
+    """The message comes before anything is started."""
     assert main(["--board", "zeppelin"]) == 2
     told = capsys.readouterr().err
     assert told.startswith("demo: parameter 'board' must be one of omnibot")
@@ -249,7 +249,7 @@ def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
 
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The dashboard of the demo's own driver, until its time is over; then the result."""
+    """It shows the driver of the demo until the time is over; then the result follows."""
     monkeypatch.setenv("DEMO_SECONDS", "6")  # the monitor may find the driver late
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
         terminal.wait_for("ros2 topic hz /demo_")
@@ -261,7 +261,7 @@ def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
-    """The robot is stopped, the result printed, the exit code is 0, and nothing is left."""
+    """The result is printed, the exit code is 0, and every process has ended."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.send_signal(number)
@@ -273,7 +273,7 @@ def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
 
 
 def test_who_ends_it_before_it_drives_is_told_so() -> None:
-    """One line says so in place of a result."""
+    """One line replaces the result, which does not exist."""
     with running_demo() as (process, mark):
         assert process.stdout is not None
         for line in process.stdout:
@@ -287,7 +287,7 @@ def test_who_ends_it_before_it_drives_is_told_so() -> None:
 
 
 def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
-    """The exit code is 1, the message names the driver, and the simulator is gone too."""
+    """The exit code is 1, the message names the driver, and the simulator ends too."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         (driver,) = marked(mark, "omnibot_driver.driver")
@@ -300,7 +300,7 @@ def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
 
 
 def test_a_killed_demo_leaves_nobody_behind() -> None:
-    """Even SIGKILL of the demo ends simulator and driver."""
+    """SIGKILL leaves the demo no time to act, but simulator and driver still end."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         family = [os.pidfd_open(pid) for pid in marked(mark)]
@@ -314,7 +314,7 @@ def test_a_killed_demo_leaves_nobody_behind() -> None:
 
 @pytest.mark.parametrize("value", ["soon", "0", "-3", "nan"])
 def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
-    """The exit code is 2 and the only line names variable and value."""
+    """The exit code is 2, and the only line names the variable and the value."""
     with running_demo(DEMO_SECONDS=value) as (process, _):
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 2
@@ -324,7 +324,7 @@ def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
 def test_an_argument_that_it_does_not_know_drives_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """It is refused with exit code 2, and named."""
+    """The exit code is 2, and the message names the argument."""
     with pytest.raises(SystemExit) as ended:
         main(["port:=/dev/ttyUSB0"])
     assert ended.value.code == 2
@@ -332,7 +332,7 @@ def test_an_argument_that_it_does_not_know_drives_nothing(
 
 
 def test_without_ros_it_says_so_in_one_sentence() -> None:
-    """A Python without site-packages has no rclpy: one line, no traceback, exit code 1."""
+    """A Python without site-packages lacks rclpy: one line, without traceback, exit code 1."""
     ended = subprocess.run(
         [sys.executable, "-ES", "-m", "omnibot_driver.demo"],
         cwd=ROOT,

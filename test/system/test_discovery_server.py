@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(SERVER is None, reason="fast-discovery-server is
 
 @contextmanager
 def program(command: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    """Run a program that ends with its input, at the latest by a kill."""
+    """Run a program that ends when its input is closed; kill it if that takes longer than 1 s."""
     process = subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -47,7 +47,7 @@ def program(command: list[str], environment: dict[str, str]) -> Iterator[subproc
 
 
 def free_udp_port() -> int:
-    """A port of the loopback that no program uses now."""
+    """Return a UDP port of the loopback interface that is free now."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

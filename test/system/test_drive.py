@@ -6,7 +6,10 @@ from drive import drive
 
 
 def test_over_a_bad_line_every_message_is_what_the_board_sent_and_odom_is_its_pose() -> None:
-    """Twenty seconds; one byte in a thousand is lost, and bursts (``drive.py`` goes on longer)."""
+    """Drive for 20 s over a line that loses one byte in a thousand, and bursts.
+
+    ``drive.py`` as a program can run longer.
+    """
     outcome = drive(20.0, lose=0.001, burst=0.0005)
     assert outcome.bytes_lost > 100, outcome
     assert outcome.imu_received > 0.85 * outcome.imu_sent, outcome

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Everything a user touches follows the board: what it lacks is not there at all."""
+"""The interface of the driver follows its board: what the board lacks is absent."""
 
 import json
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def start_plain(start_driver: Start, port: str | None, **parameters: object) -> 
 
 
 def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
-    """Within the robot's namespace, without what every ROS node has."""
+    """Return the names relative to the namespace, without those that every ROS node has."""
     of_ros = ("parameter", "type_description", "/rosout", "/tf")
     relative = {name.removeprefix(f"{home}/") for name, _types in found}
     return {name for name in relative if not any(word in name for word in of_ros)}
@@ -47,7 +47,7 @@ def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
 def test_what_a_board_lacks_is_not_advertised(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Without an IMU, wheel commands or pause there is no topic, service or parameter of them."""
+    """Topics, services and parameters of IMU, wheel commands and pause are absent."""
     driver = start_plain(start_driver, start_board().path)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -77,7 +77,7 @@ def test_what_a_board_lacks_is_not_advertised(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """It drives, its wheels have their names, its own service answers."""
+    """It drives, its wheels have their names, and its own service replies."""
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))
     joints, odometry = probe.listen(JointState, "joint_states"), probe.listen(Odometry, "odom")
@@ -105,7 +105,7 @@ def test_the_monitor_shows_what_the_board_has(
     probe_of: Start,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """No IMU is shown, and none is missed."""
+    """It neither shows an IMU nor reports it as missing."""
     driver = start_plain(start_driver, start_board().path)
     probe_of(driver).wait_for_state("nominal")
     assert main(["--json", "--namespace", driver.namespace]) == 0
@@ -136,14 +136,14 @@ def test_the_monitor_shows_what_the_board_has(
 def test_what_means_nothing_to_the_board_is_refused(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """The message says which board has it, or what is expected."""
+    """The message names the board that has the parameter, or the expected values."""
     driver = start_plain(start_driver, "/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2
 
 
 def test_a_board_that_is_not_there_ends_the_start(start_driver: Start) -> None:
-    """In one sentence."""
+    """The message lists the boards, and the exit code is 2."""
     driver: Driver = start_driver("/dev/null", board="martha")
     driver.wait_for_line("cannot start: parameter 'board' must be one of omnibot")
     assert driver.end() == 2

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver obeys and refuses, as another process says it over real DDS."""
+"""Commands that the driver obeys or refuses, sent by another process over real DDS."""
 
 import math
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def newest(board: SimulatedBoard) -> ReceivedCommand:
 
 
 def test_cmd_vel_reaches_the_board_as_the_manuals_frame(probe: Probe, board: PtyBoard) -> None:
-    """0.3 m/s, -0.2 m/s and 0.5 rad/s are 21, -14 and 250 LSB; then it is stopped."""
+    """0.3 m/s, -0.2 m/s and 0.5 rad/s are 21, -14 and 250 LSB; Stop follows the timeout."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x, twist.linear.y, twist.angular.z = 0.3, -0.2, 0.5
@@ -55,7 +55,7 @@ omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
 def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     board: PtyBoard, start_driver: Start, probe_of: Start, topic: str
 ) -> None:
-    """It has no stamp, but the middleware has; the next one is obeyed."""
+    """The middleware has the time of a message without a stamp; the next command is obeyed."""
     driver: Driver = start_driver(board.path, before=HELD_UP)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -76,7 +76,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 
 
 def test_a_zero_twist_is_the_stop_frame(probe: Probe, board: PtyBoard) -> None:
-    """It is never sent as zeros in mode 1."""
+    """A velocity frame (mode 1) with zeros is never sent."""
     commands = probe.publisher(Twist, "cmd_vel")
     commands.publish(Twist())
     assert board.wait_for(lambda b: newest(b).kind == "wheels", PATIENCE_S)
@@ -103,7 +103,7 @@ def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
 def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     probe: Probe, driver: Driver, board: PtyBoard, data: list[float], reason: str
 ) -> None:
-    """The node lives on: a right one still arrives."""
+    """The node keeps running: a correct command is obeyed afterwards."""
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=data))
     driver.wait_for_line(f"wheel_cmd rejected.*{reason}")
@@ -116,7 +116,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
     probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
 ) -> None:
-    """This includes axes that the driver ignores, as their publisher is faulty."""
+    """This includes axes that the driver ignores, because their publisher is faulty."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.y = 0.3
@@ -128,7 +128,7 @@ def test_a_twist_that_is_not_finite_anywhere_is_refused(
 
 
 def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBoard) -> None:
-    """1e300 to the front left is 0.5 m/s to the front left."""
+    """1e300 m/s to the front left become 0.5 m/s to the front left."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = twist.linear.y = 1e300
@@ -137,7 +137,7 @@ def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBo
 
 
 def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoard) -> None:
-    """A button node may trip it; only the service lets go."""
+    """A button node may latch the e-stop; only the service releases it."""
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop")
     button.publish(Bool(data=True))
@@ -156,7 +156,7 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
 def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """The topic then has the type geometry_msgs/TwistStamped."""
+    """The type of the topic is then geometry_msgs/TwistStamped."""
     stamps = {"enable_stamped_cmd_vel": True, "cmd_vel_timeout": 10.0}
     probe: Probe = probe_of(start_driver(board.path, **stamps))
     probe.wait_for_state("nominal")
@@ -171,7 +171,7 @@ def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
 def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is_taken(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """Older than cmd_vel_timeout; a zero stamp is none."""
+    """A command is stale beyond ``cmd_vel_timeout``; a zero stamp means unstamped."""
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -190,7 +190,7 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 
 
 def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
-    """The middleware would leave them unheard in silence."""
+    """The middleware would discard these commands silently."""
     reports = probe.listen(DiagnosticArray, "/diagnostics")
     probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
     driver.wait_for_line("probe publishes another type.*enable_stamped_cmd_vel:=true")
@@ -202,7 +202,7 @@ def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver
 def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
     probe: Probe, driver: Driver
 ) -> None:
-    """Commands are taken reliably; what may be lost on the way is not."""
+    """Commands are subscribed reliably, so best-effort publishers do not match."""
     quality = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     probe.node.create_publisher(Twist, "cmd_vel", quality)
     driver.wait_for_line("incompatible QoS.*RELIABILITY")
@@ -211,7 +211,7 @@ def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
 def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A quarter of a metre ahead, in odom; the board has a frame of its own."""
+    """The goal is 0.25 m ahead in odom, whose origin differs from the frame of the board."""
     board = start_board(
         control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""However the driver is ended, Stop is the last word, and the exit code tells why."""
+"""However the driver ends, it sends Stop last, and the exit code gives the reason."""
 
 import contextlib
 import os
@@ -30,7 +30,7 @@ def driving(probe: Probe, board: PtyBoard) -> None:
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = 0.3
-    for _ in range(20):  # a machine that hangs stops the robot
+    for _ in range(20):  # a stall of the computer stops the robot
         commands.publish(twist)
         if board.wait_for(lambda b: b.commands[-1].kind == "velocity", 1.0):
             return
@@ -42,8 +42,8 @@ import omnibot_driver.driver as driver, omnibot_driver.link as link
 link.STANDS_WITHIN_S = link.SILENCE_S = link.JOIN_TIMEOUT_S = 10.0
 driver.LONGEST_END_S = 50.0
 """
-"""On a busy machine the board shows later that the robot stands. The driver waits for nothing else,
-so elsewhere this changes nothing."""
+"""Longer time limits: on a busy computer the board reports later that the robot is at rest. The
+driver waits for nothing else, so elsewhere they have no effect."""
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ so elsewhere this changes nothing."""
 def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     start_board: Start, start_driver: Start, probe_of: Start, signals: list[signal.Signals]
 ) -> None:
-    """Ctrl-C on ``ros2 launch`` arrives twice; the stop frame is still sent."""
+    """Ctrl-C on ``ros2 launch`` arrives twice, which must not prevent the stop frame."""
     board = start_board()
     driver: Driver = start_driver(board.path, before=PATIENT)
     probe: Probe = probe_of(driver)
@@ -90,7 +90,7 @@ node.OmniBotDriver._on_estop_topic = lambda self, message: rclpy.shutdown()
 def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
     start_board: Start, start_driver: Start, probe_of: Start, before: str, exit_code: int
 ) -> None:
-    """The exit code tells which of them it was."""
+    """The exit code distinguishes a defect (1) from a shutdown (0)."""
     board = start_board()
     driver: Driver = start_driver(board.path, before=before, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
@@ -105,7 +105,7 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
 def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
     start_driver: Start, probe_of: Start, silent_terminal: tuple[int, str]
 ) -> None:
-    """The kernel's buffer is full, so the final Stop does not fit in; the guard goes on trying."""
+    """The kernel's buffer is full, so the final Stop does not fit; the guard keeps trying."""
     far, path = silent_terminal
     driver: Driver = start_driver(path, auto_start=False)
     probe_of(driver).wait_for_state("connecting")
@@ -120,7 +120,7 @@ def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
 
 
 def fill_terminal(path: str) -> None:
-    """Fill the terminal from the side of a program that opened it."""
+    """Fill the terminal's buffer towards the board, as a program that has it open."""
     descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     fill(descriptor)
     os.close(descriptor)
@@ -132,7 +132,7 @@ def fill_terminal(path: str) -> None:
 def test_the_board_can_be_left_paused_or_reset(
     start_board: Start, start_driver: Start, probe_of: Start, on_exit: str, mode: BoardMode
 ) -> None:
-    """``on_exit``: after the stop frame, P or R."""
+    """With ``on_exit`` the driver sends P or R after the stop frame."""
     board = start_board()
     driver: Driver = start_driver(board.path, on_exit=on_exit)
     probe_of(driver).wait_for_state("nominal")
@@ -142,7 +142,7 @@ def test_the_board_can_be_left_paused_or_reset(
 
 
 def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Start) -> None:
-    """A terminal held by ctrl-S, a hung pipe: watchdog, e-stop and SIGTERM still work."""
+    """With a terminal held by ctrl-S or a hung pipe, watchdog, e-stop and SIGTERM still work."""
     board = start_board(running=True)
     reading, writing = os.pipe()
     os.set_blocking(writing, False)

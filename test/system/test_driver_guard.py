@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A host that is lost: the driver is killed, crashes or hangs while the robot moves."""
+"""Loss of the host: the driver is killed, crashes or hangs while the robot moves."""
 
 import math
 import os
@@ -34,9 +34,9 @@ def twist(vx_mps: float) -> Twist:
 
 
 def driving(probe: Probe, board: PtyBoard) -> Any:
-    """The robot moves; returns the publisher of its commands."""
+    """Drive until the robot moves; return the publisher of its commands."""
     commands = probe.publisher(Twist, "cmd_vel")
-    for _ in range(20):  # a machine that hangs stops the robot
+    for _ in range(20):  # a stall of the computer stops the robot
         commands.publish(twist(0.3))
         if board.wait_for(lambda b: b.truth.vx_mps > 0.1, 1.0):
             return commands
@@ -49,7 +49,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def hang(driver: Driver, board: PtyBoard) -> int:
-    """Stop its process; returns how much the board has heard once it has heard all of it."""
+    """Suspend the driver; return how many bytes the board has once all have arrived."""
     driver.process.send_signal(signal.SIGSTOP)
     stat = Path(f"/proc/{driver.process.pid}/stat")
     wait_until(lambda: stat.read_text().rpartition(")")[2].split()[0] == "T")
@@ -59,7 +59,7 @@ def hang(driver: Driver, board: PtyBoard) -> int:
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
-    """Wait for processes and log lines, which raise no event."""
+    """Poll the predicate, for processes and log lines, which do not raise events."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"
@@ -70,7 +70,7 @@ def wait_until(predicate: Callable[[], object]) -> None:
 def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
     board: PtyBoard, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """The driver cannot act any more; the guard stops the robot."""
+    """A dead driver cannot act; the guard stops the robot, without an emergency stop."""
     driving(probe, board)
     assert driver.end(number) == -number
     assert board.wait_for(still, PATIENCE_S)
@@ -82,7 +82,7 @@ def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
 def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """Emergency stop and Stop in turn, as before."""
+    """The guard continues to send emergency stop and Stop in turn."""
     driving(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
     mark = len(board.board.received)
@@ -98,7 +98,7 @@ def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
 def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
     board: PtyBoard, driver: Driver, probe: Probe, start_driver: Start, probe_of: Start
 ) -> None:
-    """It is refused for a second at the most, and goes on trying."""
+    """The guard holds the port for at most a second, and the next driver retries."""
     driving(probe, board)
     driver.end(signal.SIGKILL)
     successor: Driver = start_driver(board.path)
@@ -110,12 +110,12 @@ def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
 def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """A command that waited in the middleware while it hung is none."""
+    """A command that waited in the middleware during the hang is not a fresh one."""
     commands = driving(probe, board)
     mark = hang(driver, board)
     assert board.wait_for(lambda b: LAST_WORDS in bytes(b.received[mark:]), PATIENCE_S)
     assert board.wait_for(still, PATIENCE_S)
-    deaf = board.board.tick + 200  # longer than a board may be silent
+    deaf = board.board.tick + 200  # beyond the silence that a board is allowed
     assert board.wait_for(lambda b: b.tick > deaf, PATIENCE_S)
     with board.lock:
         mark, said = len(board.board.commands), len(driver.lines)
@@ -142,13 +142,13 @@ time.clock_gettime_ns = lambda clock: real(clock) + (
     60_000_000_000 if clock == time.CLOCK_BOOTTIME and os.path.exists({path!r}) else 0
 )
 """
-"""The clock that goes on while a host is suspended has gone on, once that file is there."""
+"""Advances the clock that continues while a host is suspended by 60 s, once the file exists."""
 
 
 def test_a_robot_is_stopped_when_its_host_was_suspended(
     board: PtyBoard, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """No time has passed for the driver; the command is discarded until a fresh one comes."""
+    """The driver's own clock did not advance; its command is discarded until a fresh one."""
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(
         board.path, cmd_vel_timeout=10.0, before=SUSPENDED.format(path=str(resumed))
@@ -166,7 +166,7 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """Its stamp may be that of a planner that knows nothing of this."""
+    """Its stamp may come from a planner that does not know about the hang."""
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -174,8 +174,8 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     nothing = TwistStamped(twist=twist(math.nan))
     wait_until(
         lambda: commands.publish(nothing) or "NaN or infinity" in driver.output
-    )  # it hears us
-    driver.answers.clear()  # it is not published again
+    )  # the driver receives it
+    driver.answers.clear()  # the probe does not publish it again
     mark = hang(driver, board)
     stamped = TwistStamped(twist=twist(0.2))
     stamped.header.stamp = probe.node.get_clock().now().to_msg()
@@ -190,7 +190,7 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
 def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_again(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The probe does what the refusal asks for."""
+    """The probe sends the command again, as the refusal asks for."""
     commands = probe.publisher(Twist, "cmd_vel")
     mark = hang(driver, board)
     commands.publish(twist(0.2))
@@ -203,7 +203,7 @@ def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_a
 def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The user hears of it once."""
+    """The log reports the death of the first guard."""
     driving(probe, board)
     (first,) = driver.guards()
     os.kill(first, signal.SIGKILL)
@@ -216,7 +216,7 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
 def test_every_connection_has_one_guard_and_no_process_stays_behind(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """This holds over reconnections and after the end."""
+    """This holds over five reconnections and after the end of the driver."""
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)
     probe: Probe = probe_of(driver)
@@ -237,7 +237,7 @@ def test_every_connection_has_one_guard_and_no_process_stays_behind(
 
 
 def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: Probe) -> None:
-    """After ctrl-C no e-stop remains."""
+    """After ctrl-C the board is not in emergency stop, because none was sent."""
     driving(probe, board)
     assert driver.end(signal.SIGINT) == 0
     with board.lock:
@@ -246,7 +246,7 @@ def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: P
 
 
 def test_the_guard_can_be_done_without(board: PtyBoard, start_driver: Start) -> None:
-    """A debugger needs ``guard: false``."""
+    """``guard: false`` is needed for a debugger, which suspends the driver."""
     driver: Driver = start_driver(board.path, guard=False)
     driver.wait_for_line("state: nominal")
     assert driver.guards() == []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Joint states, diagnostics, transforms and the gyro's calibration, over real DDS."""
+"""Joint states, diagnostics, transforms and the calibration of the gyro, over real DDS."""
 
 import importlib.util
 import math
@@ -29,7 +29,7 @@ HAS_TF2 = importlib.util.find_spec("tf2_ros") is not None
 
 
 class Robot:
-    """One board and one driver for all tests of this module, which leave it standing."""
+    """One board and one driver for all tests of this module, which leave the robot at rest."""
 
     def __init__(self, stack: ExitStack, folder: Path) -> None:
         self.file = folder / "calibration.yaml"
@@ -49,7 +49,7 @@ class Robot:
         self.reports = self.probe.listen(DiagnosticArray, "/diagnostics")
 
     def status(self, name: str) -> Any:
-        """The newest, from this robot."""
+        """Return the newest diagnostic status of this name from this robot, or None."""
         found = [
             status
             for report in self.reports
@@ -68,7 +68,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
 def test_the_gyro_is_calibrated_saved_and_loaded_again(
     robot: Robot, start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """The bias that was planted is reported, taken off, in the file and in the parameter."""
+    """The planted bias is reported, subtracted, saved in the file and set as the parameter."""
     planted = [math.radians(value) for value in PLANTED_DPS]
     answer = robot.probe.call(Trigger, "calibrate_gyro")
     assert answer.success, answer.message
@@ -88,7 +88,7 @@ def test_the_gyro_is_calibrated_saved_and_loaded_again(
 
 
 def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot) -> None:
-    """Here somebody has broken the file meanwhile; it is left as it is."""
+    """The file is damaged after the start of the driver, and stays as it is."""
     robot.file.write_text("gyro_bias: [1, 2")
     answer = robot.probe.call(Trigger, "calibrate_gyro")
     assert not answer.success
@@ -110,7 +110,7 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
 
 
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
-    """Order, signs and units of wheel_cmd and joint_states agree, and angles add up."""
+    """Order, signs and units of wheel_cmd and joint_states agree, and angles accumulate."""
     joints = robot.probe.listen(JointState, "joint_states")
     commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
     wanted = [4.0, -2.0, 1.0]
@@ -138,10 +138,10 @@ def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
 
 
 def test_diagnostics_come_with_figures(robot: Robot) -> None:
-    """Seven of them; the rates are those of the manual, and nothing is lost."""
+    """There are seven statuses; the rates match the manual, and frames are not lost."""
 
     def keeps_pace() -> bool:
-        """A machine that hangs sees fewer for a while, and then more."""
+        """Return whether the rate is right; after a stall it is low for a while, then high."""
         if (status := robot.status("Stream")) is None:
             return False
         values = {value.key: value.value for value in status.values}
@@ -159,7 +159,7 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
 
 
 def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
-    """It uses its own period parameter; names, levels and hardware id are the same."""
+    """It has its own period parameter; names, levels and hardware id are the same."""
     pytest.importorskip("diagnostic_updater", exc_type=ImportError)
     period = ["diagnostic_updater.period"]
     values = robot.probe.call(GetParameters, "get_parameters", names=period).values
@@ -169,7 +169,7 @@ def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
 
 
 def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> None:
-    """It is not an error."""
+    """A missing tf2_ros is a warning, not an error."""
     odometry = robot.probe.listen(Odometry, "odom")
     robot.probe.wait_for(lambda: odometry)
     assert odometry[-1].header.frame_id == "robot1/odom"
@@ -182,7 +182,10 @@ def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> No
 def test_who_does_not_want_transforms_hears_nothing_of_tf(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """An EKF is one example. Simulated time on a real port is reported separately."""
+    """An EKF, which publishes its own transforms, is one example.
+
+    Simulated time on a real port is reported separately.
+    """
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but /dev/null keeps real time")
     assert "tf2" not in driver.output
@@ -191,7 +194,7 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 def test_measurements_wait_for_simulated_time_and_it_is_said(
     start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """This includes a simulated board, whose time is not that of /clock."""
+    """This includes a simulated board, whose time differs from that of /clock."""
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -208,7 +211,7 @@ def test_measurements_wait_for_simulated_time_and_it_is_said(
 
 
 def test_the_transform_follows_odom(robot: Robot) -> None:
-    """The same stamps, frames and poses, on /tf."""
+    """Stamps, frames and poses on /tf equal those of odom."""
     tf2_msgs = pytest.importorskip("tf2_msgs.msg", exc_type=ImportError)
     pytest.importorskip("tf2_ros", exc_type=ImportError)
     transforms = robot.probe.listen(tf2_msgs.TFMessage, "/tf")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parameters and arguments of the running node: refused at the start, changed later."""
+"""Parameters and arguments of the node: rejected at the start, changed while it runs."""
 
 import os
 import signal
@@ -42,7 +42,7 @@ Start = Callable[..., Any]
 def test_wrong_parameters_end_the_start_with_a_sentence(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """The exit code is 2, without a traceback."""
+    """The exit code is 2, and a traceback is not printed."""
     driver: Driver = start_driver("/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2
@@ -60,7 +60,7 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     ],
 )
 def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
-    """Ignored, they would leave the user with another port than the one that was meant."""
+    """If they were ignored, the driver could open another port than the one that was meant."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -90,7 +90,7 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 
 @pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
-    """Before anything is loaded, with exit code 0."""
+    """It works before any library is loaded, with exit code 0."""
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
@@ -100,7 +100,7 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
 
 
 def test_help_that_is_not_read_to_its_end_is_no_error() -> None:
-    """As by a pager that is left."""
+    """A pager that is closed early is one example."""
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-c", WITHOUT_ROS, "--help"]
@@ -110,7 +110,7 @@ def test_help_that_is_not_read_to_its_end_is_no_error() -> None:
 
 
 OPENS_NOTHING = "import serial; serial.serial_for_url = None"
-"""Where the file is passed over, the port is the default one: a robot may be there."""
+"""Code that prevents opening a port: if the file is ignored, the default port may be a robot."""
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ OPENS_NOTHING = "import serial; serial.serial_for_url = None"
 def test_a_parameter_file_for_another_node_is_told(
     start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
 ) -> None:
-    """ROS ignores it, and the wrong port would be opened."""
+    """ROS ignores the file silently, and the driver would open the default port."""
     path = tmp_path / "driver.yaml"
     path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
     driver: Driver = start_driver(None, before=OPENS_NOTHING, more=["--params-file", str(path)])
@@ -131,7 +131,7 @@ def test_a_parameter_file_for_another_node_is_told(
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:
-    """``max_linear_speed: 1`` in a YAML file is accepted."""
+    """``max_linear_speed: 1`` in a YAML file is an integer."""
     board = start_board()
     driver: Driver = start_driver(board.path, max_linear_speed=1)
     driver.wait_for_line("state: nominal")
@@ -149,7 +149,7 @@ def real(value: float) -> ParameterValue:
 def test_tuning_changes_while_running_and_identity_does_not(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A new scale is in the next command; another port is refused; so are values out of range."""
+    """The next command has the new scale; another port and values out of range are rejected."""
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -173,7 +173,7 @@ def test_tuning_changes_while_running_and_identity_does_not(
 def test_the_command_that_is_repeated_is_said_in_a_new_scale(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """There is no new command."""
+    """A new scale takes effect without a new command."""
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")
@@ -188,7 +188,7 @@ def test_the_command_that_is_repeated_is_said_in_a_new_scale(
 def test_every_parameter_is_described(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Each has a description, unit and range for ``ros2 param describe`` and rqt."""
+    """``ros2 param describe`` and rqt show the description, unit and range."""
     probe: Probe = probe_of(start_driver(start_board().path))
     names = [parameter.name for parameter in PARAMETERS.rows]
     descriptors = probe.call(DescribeParameters, "describe_parameters", names=names).descriptors
@@ -204,7 +204,10 @@ def test_every_parameter_is_described(
 def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """From either side of the pair; both at once may pass it, and what was refused is not set."""
+    """Either parameter of the pair can cause the refusal; the old value then stays.
+
+    Both together may be raised beyond the old limit.
+    """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))
     refused = set_parameter(probe, "max_angular_speed", real(9.0))

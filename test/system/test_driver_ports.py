@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ports that are missing, busy, wrong, come late or say nothing that makes sense."""
+"""Ports that are missing, busy, wrong, late, or deliver garbage."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ Start = Callable[..., Any]
 def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """Plugged in later, the board is found and started without anybody's help."""
+    """A board that is plugged in later is found and started without further action."""
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)
     driver.wait_for_line("does not exist.*by-id")
@@ -37,7 +37,7 @@ def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
 def test_an_unplugged_board_is_found_again(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The same node goes on with another terminal behind the same name, without a leak."""
+    """The node continues with another terminal of the same name, without leaking descriptors."""
     link = tmp_path / "omnibot"
     descriptors = []
     with PtyBoard(SimulatedBoard(), str(link)):
@@ -60,7 +60,7 @@ def test_an_unplugged_board_is_found_again(
 def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
     start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The answer says that there is no port. The log says who latched it."""
+    """The reply says that the port is not open; the log says what latched the e-stop."""
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):
         driver: Driver = start_driver(str(link), reconnect_interval=0.05)
@@ -75,7 +75,7 @@ def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
 def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
     start_board: Start, start_driver: Start
 ) -> None:
-    """Two masters of one robot would be worse than none."""
+    """Two drivers would send the robot contradictory commands."""
     board = start_board()
     first: Driver = start_driver(board.path)
     first.wait_for_line("is open")
@@ -100,7 +100,7 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     start_driver: Start, port: str, reason: str
 ) -> None:
-    """It goes on trying and ends like any other when asked to."""
+    """It keeps trying, and ends normally at SIGINT."""
     driver: Driver = start_driver(port)
     driver.wait_for_line(reason)
     assert driver.process.poll() is None
@@ -111,7 +111,7 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
     start_driver: Start, probe_of: Start, silent_port: str, write_to_silent_port: Start
 ) -> None:
-    """A wrong baud rate looks like this."""
+    """A wrong baud rate looks like this; valid frames after it are published."""
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     imu = probe.listen(Imu, "imu/data_raw")
@@ -124,7 +124,7 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
 
 
 def test_a_port_that_flaps_is_told_once(start_driver: Start) -> None:
-    """A server that hangs up at once, again and again."""
+    """The port is a server that closes each connection at once."""
     server = socket.create_server(("127.0.0.1", 0))
     port = f"socket://127.0.0.1:{server.getsockname()[1]}"
     driver: Driver = start_driver(port, reconnect_interval=0.05)

@@ -34,7 +34,7 @@ def drive(probe: Probe, board: PtyBoard) -> None:
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = 0.3
-    for _ in range(20):  # a machine that hangs stops the robot
+    for _ in range(20):  # a stall of the computer stops the robot
         commands.publish(twist)
         if board.wait_for(lambda b: b.truth.vx_mps > 0.05, 1.0):
             return
@@ -42,7 +42,10 @@ def drive(probe: Probe, board: PtyBoard) -> None:
 
 
 def drive_away(probe: Probe, board: PtyBoard) -> None:
-    """Drive, and stand at least 0.1 m away; a busy machine may stop the robot before."""
+    """Drive, and stop at least 0.1 m away.
+
+    On a busy computer the robot may stop earlier, so it tries again.
+    """
     for _ in range(20):
         drive(probe, board)
         assert board.wait_for(still, PATIENCE_S)
@@ -53,7 +56,7 @@ def drive_away(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
-    """Each is called twice; one P is sent in all, and the board does what was requested."""
+    """Each is called twice; P is sent only once, and the board is in the requested mode."""
     for data, mode in [
         (True, BoardMode.PAUSED),
         (True, BoardMode.PAUSED),
@@ -70,7 +73,7 @@ def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board
 def test_pausing_a_driving_robot_stops_it_first_and_unpausing_does_not_move_it(
     probe: Probe, board: PtyBoard
 ) -> None:
-    """Stop, P; then S, and the robot stands until a new command."""
+    """Stop precedes P; after S the robot is at rest until a new command."""
     drive(probe, board)
     assert probe.call(SetBool, "pause", data=True).success
     probe.wait_for_state("paused")
@@ -85,7 +88,7 @@ def test_pausing_a_driving_robot_stops_it_first_and_unpausing_does_not_move_it(
 def test_start_starts_a_board_that_was_left_paused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """``auto_start: false`` leaves it as it is until asked."""
+    """With ``auto_start: false`` the driver sends nothing until the service is called."""
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, auto_start=False))
     probe.wait_for_state("paused")
@@ -97,7 +100,7 @@ def test_start_starts_a_board_that_was_left_paused(
 
 
 def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: PtyBoard) -> None:
-    """Stop, R, restart, S: the board counts from zero again, odom does not."""
+    """The board's odometry restarts at zero after Stop, R and S; odom continues."""
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
     with board.lock:
@@ -116,7 +119,7 @@ def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: P
 
 
 def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBoard) -> None:
-    """The robot stops; a release moves nothing."""
+    """A release does not move the robot; only a new command does."""
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     drive(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
@@ -135,7 +138,7 @@ def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBo
 def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Released and commanded it stands; the driver names the way out, which works."""
+    """After the release this board ignores commands; the driver names the service that helps."""
     board = start_board(estop_latches=True, running=True)
     driver: Driver = start_driver(board.path)
     probe: Probe = probe_of(driver)
@@ -158,7 +161,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
 def test_commands_under_estop_are_refused_and_told_what_to_do(
     probe: Probe, driver: Driver, board: PtyBoard
 ) -> None:
-    """They move the robot neither during the stop nor after its release."""
+    """They move the robot neither during the e-stop nor after its release."""
     assert probe.call(SetBool, "estop", data=True).success
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -173,7 +176,7 @@ def test_commands_under_estop_are_refused_and_told_what_to_do(
 def test_estop_answers_while_a_reset_waits(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The board takes seconds to come back; the e-stop does not."""
+    """The board takes seconds to restart, and the e-stop must not wait for it."""
     board = start_board(boot_time_s=4.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -188,7 +191,7 @@ def test_estop_answers_while_a_reset_waits(
 def test_a_second_request_is_refused_while_one_is_under_way(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The message says which."""
+    """The message names the request in progress."""
     board = start_board(boot_time_s=3.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -202,7 +205,7 @@ def test_a_second_request_is_refused_while_one_is_under_way(
 
 
 def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
-    """The robot's place and heading are the origin from then on."""
+    """The present pose of the robot becomes the origin."""
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
     probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.1)
@@ -214,7 +217,7 @@ def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
 def test_services_answer_with_a_reason_when_the_board_is_silent(
     start_driver: Start, probe_of: Start, silent_port: str, kind: type, service: str
 ) -> None:
-    """The answer is success false, with what to check."""
+    """``success`` is false, and the message says what to check."""
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("connecting")
@@ -236,7 +239,7 @@ def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: S
 
 
 def test_the_twist_after_a_pause_is_that_of_the_robot(probe: Probe) -> None:
-    """Standing still after an un-pause is zero, whatever time has passed."""
+    """The twist of a robot at rest is zero after an un-pause, however long the pause was."""
     odometry = probe.listen(Odometry, "odom")
     probe.call(SetBool, "pause", data=True)
     probe.call(SetBool, "pause", data=False)

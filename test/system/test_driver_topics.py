@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver publishes, as another process hears it over real DDS."""
+"""What the driver publishes, as another process receives it over real DDS."""
 
 import math
 import struct
@@ -27,7 +27,7 @@ def stamp_s(message: Any) -> float:
 
 
 def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: PtyBoard) -> None:
-    """Three hundred frames arrive with the values that the board sent."""
+    """Three hundred messages have the values that the board sent."""
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 300)
     with board.lock:
@@ -55,7 +55,7 @@ def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: Pty
 
 
 def test_imu_messages_follow_rep_145(probe: Probe) -> None:
-    """They have no orientation, real covariances, the sensor's frame, and increasing stamps."""
+    """They have covariances, the frame of the sensor and increasing stamps, no orientation."""
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 50)
     message = received[0]
@@ -72,7 +72,7 @@ def test_imu_messages_follow_rep_145(probe: Probe) -> None:
 
 
 def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
-    """100 Hz and 25 Hz, as a ratio and by their stamps, so that a slow machine does not matter."""
+    """100 Hz to 25 Hz, counted by stamps, so that a slow computer does not matter."""
     imu, odometry = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
     probe.wait_for(lambda: imu and len(odometry) >= 10)
     first = len(odometry)
@@ -87,7 +87,7 @@ def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
 def test_a_board_at_10_hz_needs_its_delta_period(
     start_board: Start, start_driver: Start, probe_of: Start, told_s: float
 ) -> None:
-    """Then the twist is right; otherwise the driver says which value to set, and nothing else."""
+    """With the right value the twist is right; with another the driver names the right value."""
     board: PtyBoard = start_board(running=True, delta_period_s=0.1)
     driver: Driver = start_driver(board.path, delta_period=told_s)
     probe: Probe = probe_of(driver)
@@ -113,7 +113,7 @@ def test_a_board_at_10_hz_needs_its_delta_period(
 
 
 def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
-    """Half a metre to the left shows in pose and twist, and the covariance grows."""
+    """Half a metre to the left shows in pose and twist, with valid covariances."""
     odometry = probe.listen(Odometry, "odom")
     commands = probe.publisher(Twist, "cmd_vel")
     probe.wait_for(lambda: odometry)
@@ -142,7 +142,7 @@ def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Start) -> None:
-    """A late subscriber gets the current value."""
+    """A late subscriber receives the current value."""
     late: Probe = probe_of(driver)
     states = late.listen(String, "omnibot_driver/state", latched=True)
     late.wait_for(lambda: states)
@@ -152,7 +152,7 @@ def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Star
 def test_an_imu_only_board_is_shown_as_such(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """IMU messages arrive, odometry does not."""
+    """IMU messages are published, odometry is not."""
     board = start_board(imu_only=True)
     probe: Probe = probe_of(start_driver(board.path))
     imu, odometry = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
@@ -165,7 +165,7 @@ def test_an_imu_only_board_is_shown_as_such(
 def test_frames_of_a_board_that_has_driven_before_begin_at_the_identity(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Its heading is a quarter turn; driving forward is still x in odom."""
+    """The board's heading is a quarter turn; driving forward is still along x in odom."""
     board = start_board(initial_pose=BoardPose(1000.0, 2000.0, 1570.8), running=True)
     probe: Probe = probe_of(start_driver(board.path))
     odometry = probe.listen(Odometry, "odom")

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The seam for boards: two toys behind the whole driver, on real pseudo-terminals and sockets.
+"""The interface for boards: two toy boards with the complete driver, on real terminals and sockets.
 
-Nothing of the driver knows them but through the profile that a name leads to.
+The driver knows them only by the profile that is registered under a name.
 """
 
 import os
@@ -36,7 +36,7 @@ ROBOTS: Final = {"line_board": line_robot.LineRobot, "request_board": request_ro
 
 
 class Toy:
-    """A toy in real time, and the driver's arguments for it."""
+    """A toy board in real time, with the arguments of the driver for it."""
 
     def __init__(self, name: str, served: "ServedBoard[Any]") -> None:
         self.name, self.served = name, served
@@ -51,7 +51,7 @@ class Toy:
         assert self.served.wait_for(predicate, PATIENCE_S), self.served.board.heard[-20:]
 
     def comes_to_a_stand(self) -> None:
-        """For a second and a half, longer than between two blocking moves."""
+        """Wait until the robot is at rest for 1.5 s, longer than between two blocking moves."""
         ways: deque[float] = deque(maxlen=150)
 
         def stood(robot: Any) -> bool:
@@ -76,14 +76,14 @@ def start_toy(start_driver: Start, toy: Toy, **parameters: object) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, toy: Toy) -> Iterator[None]:
-    """Commanded ten times a second as long as the robot is watched."""
+    """Command the robot at 10 Hz inside the context, which begins when it moves."""
     with probe.commanding(0.2):
         toy.wait_for(lambda robot: not robot.stands)
         yield
 
 
 def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: Toy) -> None:
-    """From cmd_vel to its line, from its line to odom, and a stop when commands cease."""
+    """cmd_vel reaches its line, its line reaches odom, and it stops when commands cease."""
     probe: Probe = probe_of(start_toy(start_driver, toy))
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for_state("nominal")
@@ -98,7 +98,7 @@ def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: To
 def test_the_estop_stops_a_toy_until_it_is_released(
     start_driver: Start, probe_of: Start, toy: Toy
 ) -> None:
-    """Commands continue meanwhile."""
+    """Commands continue to arrive during the e-stop."""
     probe: Probe = probe_of(start_toy(start_driver, toy))
     probe.wait_for_state("nominal")
     with driven(probe, toy):
@@ -112,7 +112,7 @@ def test_the_estop_stops_a_toy_until_it_is_released(
 def test_whatever_ends_the_driver_stops_a_toy(
     start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
 ) -> None:
-    """The driver's own exit stops it, or the guard on all its lines."""
+    """Either the exit of the driver stops it, or the guard on all its lines."""
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -125,7 +125,7 @@ def test_whatever_ends_the_driver_stops_a_toy(
 
 
 def test_each_toy_runs_inside_the_driver_too(start_driver: Start, probe_of: Start) -> None:
-    """The port ``sim://`` is the board's own simulator."""
+    """The port ``sim://`` selects the board's own simulator."""
     for name in ROBOTS:
         driver = start_driver("sim://", before=TOYS, board=name)
         probe: Probe = probe_of(driver)
@@ -136,7 +136,7 @@ def test_each_toy_runs_inside_the_driver_too(start_driver: Start, probe_of: Star
 def test_wheels_have_the_boards_number_and_names(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """Two values drive it, three are refused."""
+    """This board has two wheels: a command of two values drives it, one of three is rejected."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
@@ -151,7 +151,7 @@ def test_wheels_have_the_boards_number_and_names(
 def test_the_raw_bytes_of_each_line_have_a_topic(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The topics have the names of the lines."""
+    """The topics are named after the lines."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     probe: Probe = probe_of(start_toy(start_driver, toy, publish_raw=True))
     told = probe.listen(UInt8MultiArray, "omnibot_driver/raw_rx/sense")
@@ -168,7 +168,7 @@ def test_the_raw_bytes_of_each_line_have_a_topic(
 def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The driver is killed meanwhile, and the half that is there stops."""
+    """The driver is killed, and the guard stops the half that is connected."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"
     driver = start_toy(start_driver, toy)
@@ -185,7 +185,7 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
 
 
 def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """No server listens at that address."""
+    """A server does not exist at that UDP address."""
     driver = start_driver("udp://127.0.0.1:9", before=TOYS, board="request_board")
     driver.wait_for_line("no data from the board for 1.5 s")
 
@@ -193,7 +193,7 @@ def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
 def test_a_line_that_is_lost_leaves_the_robot_standing(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The stop is repeated on the line that is there."""
+    """The stop is repeated on the line that remains."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     far, near = os.openpty()
     stack.callback(os.close, near)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots in one domain: each hears its own commands and speaks of its own frames."""
+"""Several robots in one ROS domain: each obeys its own commands and uses its own frames."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool
 
 @dataclass
 class Robot:
-    """A driver with a board of its own, and its part of the fleet's view."""
+    """A driver on a simulated board of its own, with what its probe has received."""
 
     name: str
     probe: Probe
@@ -28,7 +28,7 @@ class Robot:
     estop_active: list[Any]
 
     def heard(self) -> bool:
-        """Whether each topic has had a message."""
+        """Return whether each topic has had a message."""
         return bool(self.imu and self.odom and self.estop_active)
 
     @property
@@ -65,7 +65,7 @@ def fleet() -> Iterator[list[Robot]]:
 
 
 def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
-    """No two robots share a frame, so one tree can hold them all."""
+    """Frames are not shared, so one transform tree can hold all robots."""
     for seed, robot in enumerate(fleet):
         assert robot.imu[-1].header.frame_id == f"r{seed}/imu_frame"
         assert robot.odom[-1].header.frame_id == f"r{seed}/odom_frame"
@@ -73,7 +73,7 @@ def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
 
 
 def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
-    """One drives forwards, one backwards, the third stands where it stood."""
+    """One drives forwards, one backwards, the third stays at rest."""
     forward, still, backward = fleet
     speeds = {forward.name: 0.3, backward.name: -0.3}
     publishers = {
@@ -94,7 +94,7 @@ def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
 
 
 def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
-    """What stops one robot does not stop the others, nor release them."""
+    """Latching or releasing the e-stop of one robot does not affect the others."""
     first, second, third = fleet
     for robot in (first, second):
         assert robot.probe.call(SetBool, "estop", data=True).success
@@ -106,7 +106,7 @@ def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
 
 
 def test_two_of_the_same_name_are_told_of_each_other() -> None:
-    """The order of their starts does not matter."""
+    """Both report it, whichever started first."""
     with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
         for driver in (first, second):
             driver.wait_for_line(f"another node has the name /{first.namespace}/omnibot_driver,")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor on a terminal and in a pipe, with a real driver on a simulated board."""
+"""The monitor in a terminal and in a pipe, with a real driver on a simulated board."""
 
 import json
 import os
@@ -37,9 +37,10 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: Sequence[object] = (True,)) -> None:
-    """Press a key until the robot drives: a machine that hangs takes one for a key that waited.
+    """Press a key until the robot drives and something has been ``said``.
 
-    And until something has been ``said``: the monitor may find who listens later than the driver.
+    After a stall of the computer a key may be taken for one that waited, and the monitor may
+    discover other subscribers later than the driver.
     """
     for _ in range(20):
         terminal.type("w")
@@ -67,7 +68,7 @@ def monitor_of(stack: ExitStack) -> Callable[..., PseudoTerminal]:
 def test_a_snapshot_in_a_pipe_tells_what_is_so(
     probe: Probe, driver: Driver, board: PtyBoard, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Half a metre to the left: JSON has the board's true pose, its rates and its state."""
+    """After half a metre to the left, the JSON has the true pose, the rates and the state."""
     odometry = probe.listen(Odometry, "odom")
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -99,7 +100,7 @@ def test_a_snapshot_in_a_pipe_tells_what_is_so(
 def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The board hears it, the screen shows it; then R and y let go."""
+    """The board receives the e-stop and the screen shows it; R and y release it."""
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     terminal.type(" ")
@@ -117,7 +118,10 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """One press: motion, then a few commands to stand still, then none; leaving says it again."""
+    """One press sends a motion, a few zeros, then nothing.
+
+    Quitting sends zero again.
+    """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
     terminal.wait_for("0.15 m/s")
@@ -146,7 +150,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """It is killed, or its window is closed, during a motion; commands are stamped."""
+    """It is killed, or its window is closed, during a motion with stamped commands."""
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
 
@@ -165,7 +169,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 def test_keys_pressed_while_it_was_suspended_move_nothing(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The driver stops the robot; when the monitor goes on, the robot stands."""
+    """The driver stops the robot, which stays at rest when the monitor continues."""
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
     terminal.wait_for("0.15 m/s")
@@ -186,14 +190,14 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """SIGSTOP leaves it no time to leave the screen; once it goes on, q still ends it."""
+    """SIGSTOP leaves it no time to restore the terminal; after SIGCONT, q still ends it."""
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     line = os.open(f"/proc/{terminal.process.pid}/fd/0", os.O_RDWR | os.O_NOCTTY)
     terminal.process.send_signal(signal.SIGSTOP)
     os.waitid(os.P_PID, terminal.process.pid, os.WSTOPPED)
     terminal.process.send_signal(signal.SIGCONT)
-    terminal.wait_for("\x1b[?1049h")  # the screen anew
+    terminal.wait_for("\x1b[?1049h")  # it draws the screen again
     terminal.type("q")
     assert terminal.end() == 0
     echoes = termios.tcgetattr(line)[3] & termios.ECHO

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the monitor says of what is missing or wrong: a sentence, and an exit code."""
+"""What the monitor reports as missing or wrong: one sentence, and an exit code."""
 
 import json
 import math
@@ -24,13 +24,13 @@ from omnibot_driver.tools.monitor.feed import Feed
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 QUICKLY = ["--timeout", "4"]
-"""How long a missing part is awaited."""
+"""Arguments that limit the wait for missing topics to 4 s."""
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
 def fake(stack: ExitStack) -> Probe:
-    """Says that it is a driver that runs, again and again, and nothing else."""
+    """A fake driver, which repeats that it is nominal and publishes nothing else."""
     probe = stack.enter_context(Probe("fake"))
     estop = probe.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
     estop.publish(Bool(data=False))
@@ -40,14 +40,14 @@ def fake(stack: ExitStack) -> Probe:
 
 
 def measure(fake: Probe, odometry: Odometry) -> None:
-    """As a driver does, this and an IMU's readings."""
+    """Publish this odometry and IMU readings at 50 Hz, as a driver does."""
     for topic, message in (("odom", odometry), ("imu/data_raw", Imu())):
         publisher = fake.node.create_publisher(type(message), topic, 10)
         fake.node.create_timer(0.02, partial(publisher.publish, message))
 
 
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
-    """By topic where the service is missing, until the driver shows the latch."""
+    """It is repeated on the topic, as the service is missing, until the driver shows the latch."""
     said = fake.listen(Bool, "estop")
     feed = Feed([], "fake", "omnibot_driver")
     try:
@@ -64,7 +64,7 @@ def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
 
 
 def sentence(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """What it says on stderr when it cannot do what is wanted: one line."""
+    """Run the monitor, which must fail; return its only line on stderr."""
     assert main(arguments) == 1
     (line,) = capsys.readouterr().err.splitlines()
     return line
@@ -83,14 +83,14 @@ def test_without_a_driver_one_sentence_says_how_to_start_one(
 def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
     fake: Probe, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With the option that leads to the first of them; a slash at its end does not matter."""
+    """The message has the option for the first of them; a trailing slash is ignored."""
     said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
     assert "no driver /elsewhere/omnibot_driver here, but /fake/omnibot_driver" in said
     assert said.endswith("try --namespace /fake")
 
 
 def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """The rest is still printed."""
+    """All other data is still printed."""
     assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
     output = capsys.readouterr()
     assert output.out.startswith("/fake/omnibot_driver  nominal")
@@ -98,7 +98,7 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
 
 
 def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """What is shown is of both, and both obey."""
+    """The output would mix both drivers, and both would obey commands."""
     fake.node.create_publisher(String, "omnibot_driver/state", LATCHED)
     measure(fake, Odometry())
     assert main(["--once", "--namespace", "fake"]) == 1
@@ -106,7 +106,7 @@ def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFix
 
 
 def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """Where a number would be, and in one sentence."""
+    """The value is printed as nan, and one sentence names its fields."""
     bad = Odometry()
     bad.pose.pose.position.x = bad.twist.twist.linear.y = float("nan")
     measure(fake, bad)
@@ -117,7 +117,7 @@ def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str])
 
 
 def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """Whichever of its two quaternions comes: this is 145° to the left, not 215° to the right."""
+    """Both quaternions of a rotation give 145° to the left, not 215° to the right."""
     odometry = Odometry()
     turn = odometry.pose.pose.orientation
     turn.z, turn.w = -math.sin(math.radians(72.5)), -math.cos(math.radians(72.5))
@@ -128,12 +128,12 @@ def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixt
 
 
 def test_a_pipe_cannot_steer(capsys: pytest.CaptureFixture[str]) -> None:
-    """It has no keys."""
+    """A pipe does not deliver key presses."""
     assert "--teleop needs a terminal" in sentence(capsys, "--teleop")
 
 
 def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """As with --once, and one sentence says so."""
+    """The output is that of --once, and one sentence says so."""
     measure(fake, Odometry())
     assert main(["--namespace", "fake"]) == 0
     output = capsys.readouterr()
@@ -157,7 +157,7 @@ def test_names_that_are_none_are_refused(
 
 
 def test_without_ros_one_sentence_says_so() -> None:
-    """A Python without site-packages has no rclpy: no traceback, exit code 1."""
+    """A Python without site-packages lacks rclpy: exit code 1, without a traceback."""
     command = [sys.executable, "-ES", "-m", "omnibot_driver.tools.monitor", "--once"]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=20.0)
     assert ended.returncode == 1
@@ -167,7 +167,7 @@ def test_without_ros_one_sentence_says_so() -> None:
 
 @pytest.mark.parametrize("wrong", [["--timeout", "0"], ["--teleop", "--once"], ["--nonsense"]])
 def test_wrong_usage_has_exit_code_2(wrong: list[str], capsys: Any) -> None:
-    """The usage is shown."""
+    """The message shows the usage."""
     with pytest.raises(SystemExit) as ended:
         main(wrong)
     assert ended.value.code == 2

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A report of a running driver, and what is said where there is none."""
+"""The report of a running driver, and its message if a driver is missing."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ def test_a_running_robot_is_listened_to(
     start_driver: Callable[..., Driver],
     probe_of: Callable[[Driver], Probe],
 ) -> None:
-    """Found by itself; the verdict and the pictures are those of a bag."""
+    """The driver is found without options; verdict and pictures are those of a bag."""
     driver = start_driver("sim://?seed=1")
     probe_of(driver).wait_for_state("nominal")
     done = report(tmp_path / "out", "--live", "2")
@@ -40,7 +40,7 @@ def test_a_running_robot_is_listened_to(
 
 
 def test_without_a_driver_it_says_so(tmp_path: Path) -> None:
-    """It prints one sentence and writes no files."""
+    """The report prints one sentence and writes no files."""
     done = report(tmp_path / "out", "--live", "3", "--namespace", "absent")
     assert done.returncode == 1
     assert done.stderr.startswith("report: no driver was heard")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""config/omnibot.policy.xml against SROS2's schema 0.2.0, and against the node as it really is."""
+"""config/omnibot.policy.xml against SROS2's schema 0.2.0, and against the running node."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -40,13 +40,16 @@ Rules = dict[str, set[str]]
 
 
 def profiles() -> dict[str, Element]:
-    """The one profile of each enclave, by the enclave's path."""
+    """Return the only profile of each enclave, by the path of the enclave."""
     enclaves = ElementTree.parse(POLICY).getroot().iter("enclave")
     return {enclave.attrib["path"]: next(enclave.iter("profile")) for enclave in enclaves}
 
 
 def allowed(profile: Element) -> Rules:
-    """Expanded as SROS2 does it: ~ is the node, a relative name stands in the namespace."""
+    """Return the names that a profile allows, expanded as SROS2 does it.
+
+    ``~`` is the node, and a relative name is in the namespace.
+    """
     namespace = profile.attrib["ns"].rstrip("/")
     found: Rules = {"publish": set(), "subscribe": set(), "reply": set(), "request": set()}
     for group in profile:
@@ -61,7 +64,7 @@ def allowed(profile: Element) -> Rules:
 
 
 def test_the_policy_keeps_to_the_schema() -> None:
-    """Elements where they may stand, with the attributes that they need and no others."""
+    """Elements are at allowed places, with exactly the required attributes and qualifiers."""
     root = ElementTree.parse(POLICY).getroot()
     assert root.tag == "policy"
     assert root.attrib == {"version": "0.2.0"}
@@ -83,7 +86,7 @@ def test_the_policy_keeps_to_the_schema() -> None:
 def test_the_driver_may_do_what_it_does_and_nothing_else(
     probe_of: Callable[[Driver], Probe], driver: Driver
 ) -> None:
-    """The node's own topics and services, as the graph shows them."""
+    """The rules equal the topics and services of the node in the ROS graph."""
     probe = probe_of(driver)
     probe.listen(Imu, "imu/data_raw")  # each message is an occasion to look at the graph again
     expected = allowed(profiles()["/omnibot/driver"])
@@ -100,7 +103,7 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def seen(graph: Node, home: str) -> Rules:
-    """What the driver does, by the graph."""
+    """Return what the driver does, according to the ROS graph."""
 
     def names(found: list[tuple[str, list[str]]]) -> set[str]:
         return {name.removeprefix(home) for name, _ in found}
@@ -117,7 +120,7 @@ def seen(graph: Node, home: str) -> Rules:
 
 @pytest.mark.parametrize("enclave", sorted(set(profiles()) - {"/omnibot/driver"}))
 def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: str) -> None:
-    """A name that has gone from the driver must go from the policy."""
+    """A name that is removed from the driver must be removed from the policy."""
     driver, other = allowed(profiles()["/omnibot/driver"]), allowed(profiles()[enclave])
     everywhere = {"/rosout", "/parameter_events", "/clock"}
     assert other["publish"] <= driver["subscribe"] | everywhere
@@ -127,7 +130,7 @@ def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: s
 
 
 def test_only_named_enclaves_may_move_stop_or_release_the_robot() -> None:
-    """A table of who is who."""
+    """The expected table lists the enclaves for each command topic."""
     rules = {path: allowed(profile) for path, profile in profiles().items()}
     who = {
         name: {path for path, rule in rules.items() if name in rule["publish"]}

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stamps of a generated line against its true sampling times.
+"""Stamps of a generated line, compared with its true sampling times.
 
-The line is that of ``test/integrity``, with a crystal that is off, through the driver's
-decoder and clock as a session uses them. What is true of every stamp is asserted on the way.
+The line is that of ``test/integrity``, with a skewed crystal; decoder and clock are the driver's,
+used as in a session. What must hold for every stamp is asserted on the way.
 """
 
 import math
@@ -27,18 +27,18 @@ from omnibot_driver.core.readings import ImuReading, PausedReading
 from omnibot_driver.core.timing.device_clock import DeviceClock
 
 JITTER_S = 60e-6
-"""Mean of the host's own delay at each read, exponentially distributed."""
+"""Mean of the host's own delay at each read, exponentially distributed, in s."""
 READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
-"""What happens after half of a stream, and for how long the host reads nothing."""
+"""Events after half of a stream, and for how long the host then reads nothing, in s."""
 RESTART = "the board restarts"
 BOOT_S = 0.7123
 
 
 def ftdi_restarted(received: Received, random: Random) -> Chunks:
-    """As ``ftdi``, but its timer begins with the first byte of each packet."""
+    """Deliver like ``ftdi``, but with a timer that begins with the first byte of each packet."""
     chunks: Chunks = []
     start, timer = 0, math.inf
     for at, time in enumerate(received.times_s):
@@ -58,23 +58,23 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     "FTDI, timer restarted by data": ftdi_restarted,
 }
 BUSY = dict(READERS)
-"""Readers that are late by themselves: nothing is added."""
+"""Readers with delays of their own; none is added."""
 
 
 @dataclass(slots=True)
 class Stamped:
-    """(tick, stamp, arrival) of the samples that came out; when each tick really was."""
+    """Stamps of samples: (tick, stamp, arrival) of each, and the true time of each tick, in s."""
 
     sampled_s: list[float]
     restarted_s: float
     samples: list[tuple[int, float, float]] = field(default_factory=list)
 
     def errors(self, since_s: float = SETTLED_S) -> list[float]:
-        """Stamp minus sampling time, from this time after the first sample and after a restart."""
+        """Return stamp minus sampling time in s, from ``since_s`` after the start or a restart."""
         return [at - self.sampled_s[tick] for tick, at, _ in self._settled(since_s)]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Standard deviation of the steps between successive samples from 10 ms."""
+        """Return the standard deviation of steps between successive samples from 10 ms, in s."""
         return math.sqrt(
             fmean(
                 (b[1] - a[1] - TICK_S) ** 2
@@ -93,7 +93,7 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Half the width of the narrowest interval that holds this part: error up to one constant."""
+    """Return half the width of the narrowest interval that contains this part of the errors."""
     ordered = sorted(errors)
     ends = zip(ordered, ordered[math.ceil(part * len(ordered)) - 1 :], strict=False)
     return min(high - low for low, high in ends) / 2
@@ -151,14 +151,14 @@ def stamp(
                 last_s = stamp_s
                 sent = ticks_of.get((reading.specific_force, reading.angular_velocity), ())
                 found = next((t for t in sent if tick < t < tick + 400), None)
-                if found is not None:  # else the framing made it up
+                if found is not None:  # else it is not a real sample
                     tick = found
                     stamped.samples.append((tick, stamp_s - EPOCH_S, now - EPOCH_S))
     return stamped
 
 
 def _one_after_the_other(before: Truth, after: Truth, begins_s: float) -> Truth:
-    """With the text of a board that has just booted between them."""
+    """Join two streams, with the text of a board that has just booted between them."""
     text = b"Paused: 0 \n"
     at = len(before.data) + len(text)
     boots_s = before.times_s[-1] + 0.5
@@ -187,7 +187,7 @@ def _as_read(data: bytes, chunks: Chunks) -> Iterator[tuple[bytes, float]]:
 def _reads(
     data: bytes, chunks: Chunks, random: Random, stalls_at: float, stall_s: float
 ) -> Iterator[tuple[bytes, float]]:
-    """A host that wakes up a little late at every chunk, and once not for long."""
+    """Read with a small delay at every chunk, and once with a stall."""
     at, now = 0, 0.0
     for number, (end, time) in enumerate(chunks):
         now = max(now + READ_S, time + random.expovariate(1.0 / JITTER_S))

@@ -2,8 +2,8 @@
 
 """The timing report: writes the worst figures of each cell into docs/internals/time.md.
 
-Arguments: ``--seconds`` of each stream and ``--seeds``; ``--readers``: the busy readers alone. The
-seeds share out the skews.
+Arguments: ``--seconds`` of each stream, and ``--seeds``, among which the skews are divided;
+``--readers`` runs only the busy readers.
 """
 
 import argparse
@@ -23,13 +23,13 @@ LOSSES = (0.0, 1e-3, 1e-2)
 SCENARIOS = {"nominal": "driving", "IMU only": "IMU only, noisy gyro"}
 BLOCKS = "4096-byte blocks"
 BLOCKS_SETTLED_S = 6.0
-"""Two blocks."""
+"""Time until the clock is settled with large blocks, in s: two blocks."""
 LIMITS_S = (0.2e-3, 0.5e-3)
 
 Cell = tuple[str, float, str, str]
-"""Line, part of the bytes that are lost, mode, event."""
+"""Line, share of lost bytes, mode, event."""
 Figures = tuple[float, float]
-"""Unevenness, and the half-width that holds 99 % of the errors; seconds."""
+"""Unevenness, and the half-width that contains 99 % of the errors, in s."""
 
 
 def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
@@ -42,7 +42,7 @@ def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
 
 
 def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
-    """The worst and the median of each row, and how many streams keep both limits."""
+    """Return a table with worst and median of each row, and the streams within both limits."""
     lines = [
         f"| {head} | steps, std (ms) | 99 % within (ms) | streams that keep both limits |",
         "|---" * (head.count("|") + 4) + "|",
@@ -71,7 +71,7 @@ def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[F
 
 
 def publish(name: str, lines: list[str]) -> None:
-    """Print, and replace what the document has under this name."""
+    """Print the lines, and write them into the document under this name."""
     text = "\n".join(lines)
     print(text)
     begin, end = (mark.format(name) for mark in MARKS)
@@ -80,7 +80,7 @@ def publish(name: str, lines: list[str]) -> None:
 
 
 def lines_and_events(seconds: float, seeds: int) -> None:
-    """A host that is prompt."""
+    """Measure all lines and events with a host that reads promptly."""
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]
     cells += [
@@ -114,7 +114,7 @@ def lines_and_events(seconds: float, seeds: int) -> None:
 
 
 def busy_readers(seconds: float, seeds: int) -> None:
-    """A host that is not."""
+    """Measure with hosts that read late."""
     cells = [(line, n, mode, "none") for line in BUSY for n in LOSSES[:2] for mode in SCENARIOS]
     found = measured(cells, seconds, seeds)
     rows = {f"{line} | {n:g} | {mode}": figures for (line, n, mode, _), figures in found.items()}
@@ -127,7 +127,7 @@ def busy_readers(seconds: float, seeds: int) -> None:
 
 
 def main() -> None:
-    """Run the streams, print and write the figures."""
+    """Run the streams, and print and write the figures."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=30.0)
     arguments.add_argument("--seeds", type=int, default=30)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A part of the timing report."""
+"""A short version of the timing report."""
 
 import pytest
 from stamping import BUSY, LINES, spread, stamp
@@ -12,7 +12,7 @@ PROMPT = [line for line in LINES if "block" not in line]
 @pytest.mark.parametrize("line", PROMPT)
 @pytest.mark.parametrize("scenario", ["driving", "IMU only, noisy gyro"])
 def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
-    """With one in a thousand, steps are within 0.2 ms (std), 99 % within 0.5 ms, from 2 s on."""
+    """With one byte in 1000 lost, steps are within 0.2 ms (std), 99 % within 0.5 ms, after 2 s."""
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(line, scenario, 1e-3, skew, seed, 15.0)
         assert stamped.unevenness() < 0.2e-3
@@ -31,7 +31,7 @@ def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
 def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either(
     line: str, scenario: str, skew: float, seed: int
 ) -> None:
-    """With one in a hundred, these are the streams that showed each problem."""
+    """With one byte in 100 lost, these streams once showed wrong stamps."""
     stamped = stamp(line, scenario, 1e-2, skew, seed, 30.0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -39,7 +39,7 @@ def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either
 
 @pytest.mark.parametrize("event", ["the board restarts", "stall of 0.3 s", "stall of 2 s"])
 def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) -> None:
-    """The constant is the same before and after."""
+    """The stamps' constant offset is the same before and after."""
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, skew, seed, 20.0, event)
         assert stamped.unevenness() < 0.2e-3
@@ -47,9 +47,9 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) 
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """Without skew it keeps its place: 2 ms less 13 bytes lie between the bounds of its end.
+    """Without skew the timer keeps its phase, which is known to within 2 ms less 13 bytes.
 
-    From the second second on, on streams of which two in five are never cut.
+    The check begins after the first 2 s, on streams of which two in five are never cut.
     """
     for seed in range(10):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, 0.0, seed, 4.0)
@@ -59,7 +59,7 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 @pytest.mark.parametrize("reader", [name for name in BUSY if "parts" not in name])
 @pytest.mark.parametrize("scenario", ["driving", "IMU only, noisy gyro"])
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str) -> None:
-    """As on the line undisturbed, but for a few that are a tick off where reads bring parts."""
+    """Stamps are as on an undisturbed line; a few are a tick off if reads are in parts."""
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(reader, scenario, 0.0, skew, seed, 15.0)
         assert spread(stamped.errors()) < 0.5e-3

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot in simulated time: session and board on a bench, in place of a running driver."""
+"""A robot in simulated time for calibrations: session and board on a bench, without a node."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,12 +14,12 @@ from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Topic
 
 COMMANDED_EVERY = 2
-"""Ticks."""
+"""Period of the commands, in ticks of the board."""
 STANDS_AFTER_S = 1.0
 
 
 class BenchRobot:
-    """What a calibration needs of a ``Robot``; ``bench.board`` is the true one."""
+    """Replacement for the ``Robot`` of a calibration; ``bench.board`` knows the true motion."""
 
     def __init__(self, **settings: Any) -> None:
         self.bench = Bench(BoardSettings(running=True, **settings))

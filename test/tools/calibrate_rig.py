@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot with planted errors, a real driver, and a user who answers."""
+"""A test rig: a simulated board with planted errors, a real driver, and a user who answers."""
 
 import math
 import re
@@ -23,7 +23,7 @@ from omnibot_driver.tools.calibrate.robot import Robot, connect
 Answer = Callable[[str], str]
 
 BUSY_S = 3.0
-"""Tolerance for a busy machine: neither a lost robot nor a suspended program."""
+"""Timeout of commands and data, in s; longer than the delays of a busy test machine."""
 
 
 def yes(_question: str) -> str:
@@ -33,7 +33,7 @@ def yes(_question: str) -> str:
 
 @dataclass
 class Rig:
-    """``calibrate`` runs a subcommand in this process; its files are in ``folder``."""
+    """A simulated board and its driver; calibrations of them write their files to ``folder``."""
 
     port: PtyBoard
     driver: Driver
@@ -45,7 +45,7 @@ class Rig:
         return self.folder / "robot.yaml"
 
     def calibrate(self, *words: str, answer: Answer = yes) -> int:
-        """The exit code of a calibration."""
+        """Run a calibration in this process; return its exit code."""
 
         def read(question: str) -> str:
             self.questions.append(question)
@@ -55,7 +55,7 @@ class Rig:
         return main([*words, *files, "--namespace", self.driver.namespace], read)
 
     def written(self) -> dict[str, Any]:
-        """The content of the written file."""
+        """Return the content of the written file."""
         content: dict[str, Any] = yaml.safe_load(self.output.read_text())
         return content
 
@@ -64,7 +64,7 @@ class Rig:
 def rig(
     folder: Path, parameters: dict[str, object] | None = None, **settings: Any
 ) -> Iterator[Rig]:
-    """A simulated board with these settings and a driver with these parameters, both running."""
+    """Run a simulated board with ``settings`` and a driver with ``parameters``; yield the rig."""
     board = SimulatedBoard(BoardSettings(running=True, **settings))
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -78,19 +78,19 @@ def rig(
 
 @contextmanager
 def robot_of(driver: Driver) -> Iterator[Robot]:
-    """A robot as a calibration sees it."""
+    """Yield the robot as a calibration sees it through this driver."""
     with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
         yield robot
 
 
 def parameters_of(driver: Driver) -> dict[str, Any]:
-    """What the driver says that its parameters are."""
+    """Return the parameters that the driver reports."""
     with robot_of(driver) as robot:
         return dict(robot.parameters)
 
 
 def row(table: str, name: str) -> tuple[float, float]:
-    """Value and uncertainty of the row in a printed table."""
+    """Return value and uncertainty (NaN if it is empty) from a row of a printed table."""
     found = re.search(rf"^[│ ]*{re.escape(name)} *│ *(\S+) *│ *(\S*) *│", table, re.MULTILINE)
     assert found, f"no row {name!r} in:\n{table}"
     return float(found[1]), float(found[2] or math.nan)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot for all tests of a module, and the tool's own view of it."""
+"""Fixtures: one robot for all tests of a module, and a calibration's connection to it."""
 
 from collections.abc import Iterator
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Drives made of numbers, to plant troubles in: as a log, or as a bag like any recorder's."""
+"""Synthetic recordings in which faults can be planted: as a log, or as a ROS bag."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,15 +18,15 @@ TYPES = get_typestore(Stores.ROS2_JAZZY)
 START_NS = 1_790_000_000_000_000_000
 WHEELS = tuple(f"wheel_{wheel}_joint" for wheel in "abc")
 REST_S = 4.0
-"""At the beginning and at the end."""
+"""Time at rest at the beginning and at the end of a drive, in s."""
 DELAY_S = 0.1
-"""Between a command and what is measured of it."""
+"""Delay from a command to the measured motion, in s."""
 
 Array = NDArray[np.float64]
 
 
 def message(kind: str, *values: Any) -> Any:
-    """A message by its fields in order; those of messages within it as tuples."""
+    """Return a ROS message made of its fields in order; nested messages are tuples."""
     fields = TYPES.fielddefs[kind][1]
     filled = []
     for (_, (node, detail)), value in zip(fields, values, strict=True):
@@ -37,20 +37,20 @@ def message(kind: str, *values: Any) -> Any:
 
 @dataclass
 class Topic:
-    """Rows of numbers with their times in seconds; ``late_s`` after the stamp they arrive."""
+    """The messages of one topic; each arrives ``late_s`` (in s) after its timestamp."""
 
     stamp_s: Array
     values: Array
     late_s: Array
 
     def series(self) -> Series:
-        """A series in order of arrival."""
+        """Return the messages as a series in order of arrival."""
         arrived_s = self.stamp_s + self.late_s
         order = np.argsort(arrived_s)
         return Series(arrived_s[order], self.stamp_s[order], self.values[order])
 
     def drop(self, begin_s: float, end_s: float) -> None:
-        """What was sampled between these times is lost."""
+        """Remove the messages sampled between these times, in s, as if they were lost."""
         kept = (self.stamp_s < begin_s) | (self.stamp_s >= end_s)
         self.stamp_s, self.late_s = self.stamp_s[kept], self.late_s[kept]
         self.values = self.values[kept]
@@ -62,7 +62,10 @@ def _ticks(seconds: float, rate_hz: float) -> Array:
 
 @dataclass
 class Drive:
-    """A healthy robot on a curve, between two rests; ``namespace`` as in a topic."""
+    """A recording of a healthy robot that rests, drives along a curve, and rests again.
+
+    ``namespace`` is the prefix of its topics, such as ``/robot1``.
+    """
 
     seconds: float = 20.0
     namespace: str = ""
@@ -94,7 +97,7 @@ class Drive:
             self.statuses.append((at_s, "omnibot_driver: Stream", 0, "complete", lost))
 
     def told(self, times_s: Array) -> Array:
-        """vx, vy and the yaw rate that are commanded at these times."""
+        """Return the commanded vx, vy (m/s) and yaw rate (rad/s) at these times."""
         on = (times_s >= REST_S) & (times_s < self.seconds - REST_S)
         wave = np.sin(2 * np.pi * (times_s - REST_S) / 6.0)
         return np.column_stack([0.25 + 0.0 * wave, 0.1 * wave, 0.4 + 0.0 * wave]) * on[:, None]
@@ -103,7 +106,7 @@ class Drive:
         return Topic(stamp_s, values, 0.001 + random.exponential(3e-4, len(stamp_s)))
 
     def messages(self) -> list[tuple[str, str, int, Any]]:
-        """Messages by topic, type, arrival in ns and content, in the order of arrival."""
+        """Return topic, type, arrival in ns and content of each message, in order of arrival."""
         name, found = self.namespace, []
 
         def add(topic: str, kind: str, arrived_s: float, *values: Any) -> None:
@@ -155,7 +158,7 @@ class Drive:
         return zip(topic.stamp_s, topic.values.tolist(), topic.late_s, strict=True)
 
     def log(self) -> Log:
-        """A log as a reader of bags makes it."""
+        """Return the log that reading a bag of this drive would give."""
         end_s = self.seconds
         nothing = Series(np.empty(0), np.empty(0), np.empty((0, 3)))
         series = [topic.series() for topic in (self.imu, self.odom, self.joints, self.cmd_vel)]
@@ -178,7 +181,7 @@ class Drive:
 
 
 def spans(changes: list[tuple[float, str]], end_s: float) -> tuple[Span, ...]:
-    """Spans between changes."""
+    """Return the spans between these changes; the last one ends at ``end_s``."""
     times_s = [at_s for at_s, _ in changes] + [end_s]
     return tuple(
         Span(at_s, until_s, what)
@@ -187,7 +190,7 @@ def spans(changes: list[tuple[float, str]], end_s: float) -> tuple[Span, ...]:
 
 
 def header(at_s: float, frame: str) -> tuple[tuple[int, int], str]:
-    """A stamp and a frame."""
+    """Return a message header: the timestamp in s and ns, and the frame."""
     return divmod(START_NS + round(1e9 * at_s), 10**9), frame
 
 
@@ -197,7 +200,7 @@ def write(
     plugin: StoragePlugin = StoragePlugin.MCAP,
     compression: CompressionMode = CompressionMode.NONE,
 ) -> Path:
-    """A bag of these drives; the path is returned."""
+    """Write a bag of these drives; return its path."""
     messages = sorted((item for drive in drives for item in drive.messages()), key=lambda i: i[2])
     writer = Writer(path, version=9, storage_plugin=plugin)
     if compression is not CompressionMode.NONE:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot to look at, without ROS."""
+"""A fake robot for tests of the monitor, without ROS."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ FINE = (
 
 
 def view(**changes: Any) -> View:
-    """A driver in order, with what a test changes of it."""
+    """Return the view of a healthy driver, with these fields changed."""
     values = {
         "driver": "/robot1/omnibot_driver",
         "state": "nominal",
@@ -40,7 +40,7 @@ def view(**changes: Any) -> View:
 
 
 class FakeRobot:
-    """Shows what it is given, and remembers what it was asked for."""
+    """A robot that shows a given view and records the requests made to it."""
 
     def __init__(self, *, teleop: bool = False) -> None:
         self.dead_man = DeadMan() if teleop else None

@@ -1,15 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A user beside a simulated robot, who sees its wheels and holds it as asked."""
+"""A simulated user who sees the robot's wheels turn and holds the robot as asked."""
 
 from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
-"""Control ticks before an answer: the end of a jog and the halt after it."""
+"""Number of control ticks that an answer is based on: the end of a jog and the halt after it."""
 
 
 class User:
-    """Answers by what the wheels truly do; ``wrong`` answers come first."""
+    """A user who answers by the true motion of the wheels, after giving the ``wrong`` answers."""
 
     def __init__(self, port: PtyBoard, *wrong: str) -> None:
         self._port, self._wrong = port, list(wrong)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Somebody with a tape measure, for ``calibrate geometry``."""
+"""A simulated user with a tape measure, for ``calibrate geometry``."""
 
 import math
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from omnibot_driver.simulator.omnibot import SimulatedBoard
 
 
 class Surveyor:
-    """A surveyor who measures the truth in whole millimetres and half degrees."""
+    """A user who measures the true pose in whole millimetres and half degrees."""
 
     def __init__(self, board: Callable[[], SimulatedBoard]) -> None:
         self._board = board

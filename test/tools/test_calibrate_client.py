@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A calibration finds the one driver that it is about, or says why not."""
+"""A calibration finds the driver in its namespace, or explains why it cannot use one."""
 
 import os
 import re
@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The exit code is 1; a slash at its end does not matter."""
+    """The tool ends with exit code 1; a trailing slash in the namespace is ignored."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
     said = capsys.readouterr().err
@@ -34,7 +34,7 @@ def test_a_wrong_namespace_names_the_drivers_there_are(
 
 
 def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) -> None:
-    """They may have the same name: both would obey."""
+    """Two drivers may have the same name and would both obey, so not one command is sent."""
     before = len(rigged.port.board.commands)
     twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
     assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
@@ -47,7 +47,7 @@ def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) ->
 def test_a_driver_of_another_version_is_told(
     rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It does not know a parameter of ours."""
+    """The driver does not know one of this tool's parameters."""
     newer = Parameter("of_tomorrow", 1, "", "")
     table = replace(PARAMETERS, sections={**PARAMETERS.sections, "New": (newer,)})
     monkeypatch.setattr(omnibot, "PARAMETERS", table)
@@ -56,7 +56,7 @@ def test_a_driver_of_another_version_is_told(
 
 
 def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
-    """A parameter out of range."""
+    """The driver refuses a value out of range, and the tool's error names the parameter."""
     with pytest.raises(ToolError, match="the driver refuses linear_scale: "):
         robot.set_parameters({"linear_scale": -1.0})
 
@@ -71,7 +71,7 @@ def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
 def test_what_ros_cannot_take_is_a_sentence(
     words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """There is no traceback."""
+    """Invalid ROS arguments give a message and exit code 1, not a traceback."""
     assert main(["imu", "--plot", str(tmp_path), *words]) == 1
     assert sentence in capsys.readouterr().err
 
@@ -79,7 +79,7 @@ def test_what_ros_cannot_take_is_a_sentence(
 def test_no_driver_at_all_says_how_to_start_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The domain is empty."""
+    """In an empty ROS domain the message names the command that starts a driver."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
     monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
     assert main(["imu", "--plot", str(tmp_path)]) == 1

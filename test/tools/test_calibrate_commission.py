@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate commission`` with a real driver, and a user who says what the wheels truly do."""
+"""``calibrate commission`` with a real driver, and a simulated user who sees the wheels."""
 
 import math
 from pathlib import Path
@@ -31,14 +31,17 @@ def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def told(capsys: pytest.CaptureFixture[str]) -> str:
-    """The whole output in one line."""
+    """Return the printed output as one line."""
     return " ".join(capsys.readouterr().out.split())
 
 
 def test_the_whole_walk_finds_what_was_planted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Signs, frame, mounting; an impossible answer is asked again; the driver loads the file."""
+    """The axis signs, the frame of the deltas and the IMU's mounting are found.
+
+    An impossible answer is explained and the question repeated; the driver loads the written file.
+    """
     with rig(
         tmp_path,
         axis_signs=(1, -1, -1),
@@ -77,14 +80,14 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_switch_and_deltas_are_told_by_the_data(
     planted: dict[str, Any], found: dict[str, str], tmp_path: Path
 ) -> None:
-    """No question is asked."""
+    """The robot's odometry shows them, so the user is not asked."""
     with rig(tmp_path, **planted) as robot:
         assert robot.calibrate("commission", "--only", "board") == 0
         assert robot.written().items() >= found.items()
 
 
 class Deaf:
-    """A robot with every interface."""
+    """A robot that accepts every command and measures nothing."""
 
     parameters: ClassVar[dict[str, Any]] = {one.name: one.default for one in PARAMETERS.rows}
 
@@ -93,7 +96,7 @@ class Deaf:
 
 
 def walk(*answers: str) -> Found:
-    """The wheels and axes, with these answers."""
+    """Run the part on wheels and axes with these answers; return what it finds."""
     left = list(answers)
     found = Found(before=Deaf.parameters)
     commission.Walk(Deaf(), Console(read=lambda _question: left.pop(0))).wheels(found)
@@ -104,7 +107,7 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """r shows it again; nonsense is asked again; the signs are those seen."""
+    """The answer r repeats the motion, an invalid one the question; the signs are those seen."""
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)
     assert "Please answer with three of + - 0" in told(capsys)
@@ -112,26 +115,26 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
 
 
 def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
-    """The axes correct what axes can."""
+    """The axis signs correct cmd_vel and odom; a note names the topics that stay reversed."""
     found = walk("-00", "0-0", "00-", "+-0", "++-", "+++")
     assert found.axis_signs == (-1, -1, -1)
     assert any("wheel_cmd and joint_states stay" in note for note in result_of(found).notes)
 
 
 def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
-    """It is named."""
+    """The error names the wheel, as its wiring has to be corrected."""
     with pytest.raises(ToolError, match="wheel B turns the other way than the two others"):
         walk("+00", "0-0", "00+")
 
 
 def test_who_keeps_answering_what_cannot_be_is_sent_to_read_on() -> None:
-    """The tool gives up after three times."""
+    """After three contradictory answers the tool ends and refers to the documentation."""
     with pytest.raises(ToolError, match=r"wheel B was seen to turn.*docs/commissioning.md"):
         walk("000", "+++", "0-0")
 
 
 def test_a_board_on_positional_control_leaves_the_axes_out() -> None:
-    """The wheels have been looked at."""
+    """Positional control prevents a look at the axes, but the wheels are still checked."""
     found = Found(before=Deaf.parameters, control_method="position")
     answers = ["+00", "0+0", "00+"]
     commission.Walk(Deaf(), Console(read=lambda _question: answers.pop(0))).wheels(found)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What minutes of measurement leave, whatever fails after them."""
+"""A finished measurement is kept if drawing, saving or printing its result fails."""
 
 import os
 import sys
@@ -32,13 +32,13 @@ def failing(_figure: Any) -> None:
 
 
 def failing_late(figure: Any) -> None:
-    """The library reads formulas when it saves."""
+    """Set a title with a broken formula, which Matplotlib notices only when it saves."""
     figure.subplots().set_title("$\\frac{$")
 
 
 @pytest.fixture
 def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
-    """Run ``calibrate``, which has measured already: its exit code."""
+    """Return a function that runs ``calibrate`` with a given result and returns its exit code."""
 
     @contextmanager
     def connect(*_arguments: object) -> Iterator[SimpleNamespace]:
@@ -74,7 +74,7 @@ def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
     draw: Callable[[Any], None], ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The result is saved, and the sentence says so."""
+    """The result is saved nevertheless, and the error message says so."""
     assert ending(draw=draw) == 1
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     said = capsys.readouterr()
@@ -85,7 +85,7 @@ def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
 def test_a_file_that_cannot_be_written_costs_the_file_alone(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The table is shown, so that the figures can be copied."""
+    """The table is printed nevertheless, so that the user can copy the values."""
     assert ending(found={"linear_scale": 1e9}) == 1
     assert not (tmp_path / "robot.yaml").exists()
     said = capsys.readouterr()
@@ -96,7 +96,7 @@ def test_a_file_that_cannot_be_written_costs_the_file_alone(
 def test_a_broken_pipe_loses_nothing(
     ending: Ending, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reader of the output has gone before the table comes."""
+    """The result is saved even if the reader of stdout is gone before the table is printed."""
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as gone:
@@ -108,7 +108,7 @@ def test_a_broken_pipe_loses_nothing(
 def test_what_is_to_be_copied_stands_on_one_line(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A shell would take two halves of a long path for two words."""
+    """A shell would take a long path that is broken over two lines for two arguments."""
     folder = tmp_path / ("a_long_name_" * 12)
     assert ending(folder=folder) == 0
     assert f"  -p calibration_file:={folder}/robot.yaml" in capsys.readouterr().out.splitlines()

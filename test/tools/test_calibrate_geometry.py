@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry``: wheels and bases of the wrong size are found by tape measure."""
+"""``calibrate geometry`` finds the sizes of wheels and base by tape measure."""
 
 import argparse
 import io
@@ -38,7 +38,10 @@ def arguments(*words: str) -> argparse.Namespace:
 
 
 def paths() -> list[tuple[str, Column, bool]]:
-    """Paths of an odometry that goes exactly through the places of every drive."""
+    """Return name and path of each drive, and whether its heading is what is measured.
+
+    The odometry goes exactly through the places of every drive.
+    """
     found = []
     for drive in geometry.plan(1.0, 3, squares=True):
         places = [Pose(), *drive.places]
@@ -53,7 +56,7 @@ def paths() -> list[tuple[str, Column, bool]]:
 
 
 def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
-    """Readings by a tape of SIGMA, of a robot that truly has these sizes."""
+    """Return noisy tape readings of a slipping robot; its true sizes are these factors."""
     made = []
     for name, path, heading in paths():
         rims = np.abs(rims_of(path, BASE_M))
@@ -75,7 +78,7 @@ unlike = st.floats(-0.01, 0.01)
 def test_any_geometry_is_found_within_what_is_claimed(
     wheels: float, base: float, a: float, b: float, seed: int
 ) -> None:
-    """Radius, base and wheel differences are found through the noise of tape and eye."""
+    """Wheel size, base size and wheel differences are within five claimed standard deviations."""
     factors = wheels * (1 + np.array([a, b, -a - b]))
     found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M, DRIFT)
     wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
@@ -86,7 +89,7 @@ def test_any_geometry_is_found_within_what_is_claimed(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """Over sixty slipping robots, errors divided by claims have a deviation near one."""
+    """For 60 slipping robots the errors over the claims have a standard deviation near 1."""
     scores = []
     for seed in range(60):
         random = np.random.default_rng(seed)
@@ -98,20 +101,20 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 @given(st.integers(0, 3))
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
-    """The start of the way does not matter."""
+    """The path is the same wherever the odometry starts."""
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)
 
 
 def test_a_square_comes_back() -> None:
-    """A turn further, to the left or to the right."""
+    """The square ends where it began, one full turn further to the left or to the right."""
     for sign in (1, -1):
         last = square(1.0, sign)[-1]
         assert (last.x_m, last.y_m, last.yaw_rad) == pytest.approx((0, 0, sign * math.tau))
 
 
 def test_readings_with_a_wrong_sign_are_turned_away() -> None:
-    """They would lead to an impossible robot."""
+    """Without this check they would give an impossible robot."""
     wrong = readings(PERFECT, 1.0, np.random.default_rng(0))
     for one in wrong[2:4]:
         one.end[:2] *= -1
@@ -126,9 +129,10 @@ def test_readings_with_a_wrong_sign_are_turned_away() -> None:
 def test_planted_sizes_are_found_on_the_simulated_robot(
     factors: tuple[float, float, float], base: float, slip: float
 ) -> None:
-    """The whole calibration in simulated time; slip shortens every way like a smaller wheel.
+    """The complete calibration runs in simulated time.
 
-    The driver's sizes do not matter: the board computes with its own.
+    Slip shortens every distance as a smaller wheel does. The driver's own sizes have no effect, as
+    the board computes the odometry with its own.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}
@@ -149,7 +153,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 
 
 def test_sizes_that_were_found_are_those_believed_next_time() -> None:
-    """A second calibration continues from the first."""
+    """A second calibration starts from the sizes that the first one found."""
     now = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
     found = {
         "wheel_radius": 0.029 * 1.02,
@@ -165,7 +169,7 @@ def test_sizes_that_were_found_are_those_believed_next_time() -> None:
 def test_planted_sizes_are_found_through_a_driver_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The drives are in real time."""
+    """A real driver makes the drives in real time, and ``--apply`` sets its parameters."""
     quick = {"max_angular_speed": 1.5}
     planted: dict[str, Any] = {"wheel_radius_scale": (1.04,) * 3, "base_radius_scale": 0.97}
     with rig(tmp_path, quick, **planted) as robot:

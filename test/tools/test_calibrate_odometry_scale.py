@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry`` of a base with two wheels: the scale of its odometry by tape measure."""
+"""``calibrate geometry`` and ``scale`` find a two-wheeled base's odometry scales by tape."""
 
 import argparse
 import math
@@ -23,7 +23,7 @@ TRUE_LINEAR, TRUE_ANGULAR = 1.04, 0.97
 
 
 class TwoWheels:
-    """A robot whose odometry tells too little of the way and too much of the turn."""
+    """A robot whose odometry reports too short distances and too large angles."""
 
     def __init__(self, **parameters: Any) -> None:
         self.parameters = {
@@ -63,7 +63,7 @@ def arguments(subcommand: str, *words: str) -> argparse.Namespace:
 
 
 def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
-    """Answers of a user with a perfect tape who misreads the last line."""
+    """Return a user with an exact tape who misreads the last line by ``misread_mm``."""
     marks = [drive.wanted for drive in plan(1.0, 3)]
     asked = 0
 
@@ -82,7 +82,7 @@ def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
 @pytest.mark.parametrize("subcommand", [geometry, scale])
 @pytest.mark.parametrize("before", [1.0, 1.2])
 def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
-    """The driver's present scales do not matter; both option names work."""
+    """The driver's present scale has no effect, and both subcommands do the same."""
     robot = TwoWheels(odom_linear_scale=before)
     name = subcommand.__name__.rpartition(".")[2]
     found = subcommand.run(robot, answers(robot), arguments(name))
@@ -93,7 +93,7 @@ def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
 
 
 class Encoder(TwoWheels):
-    """A robot whose driver has a way for each count; its heading is that of a gyro."""
+    """A robot whose driver has a distance for each encoder count, and a gyro for the heading."""
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
@@ -107,7 +107,7 @@ class Encoder(TwoWheels):
 
 
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
-    """By two lines; a driver that has it needs no factors of its odometry."""
+    """Two lines suffice: such a driver does not have factors for its odometry."""
     robot = Encoder()
     console = Console(
         yes=False,
@@ -125,7 +125,7 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
 
 
 def test_a_line_that_was_misread_is_told() -> None:
-    """Two lines of the same length differ by more than the tape allows."""
+    """A note says that two equal lines differ by more than the tape's uncertainty."""
     robot = TwoWheels()
     found = geometry.run(robot, answers(robot, misread_mm=100.0), arguments("geometry"))
     (note,) = found.notes
@@ -133,7 +133,7 @@ def test_a_line_that_was_misread_is_told() -> None:
 
 
 def test_a_robot_that_may_not_move_is_not_driven() -> None:
-    """Its own limits are zero."""
+    """The driver's own limit of the yaw rate is zero, which the error names."""
     robot = TwoWheels(max_angular_speed=0.0)
     with pytest.raises(ToolError, match="max_angular_speed is 0"):
         geometry.run(robot, answers(robot), arguments("geometry"))

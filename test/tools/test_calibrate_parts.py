@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What all calibrations have in common: bounds, questions, tables, files."""
+"""Parts that all calibrations share: bounds, questions, tables, files."""
 
 import io
 import math
@@ -30,14 +30,14 @@ commands = st.tuples(speeds, speeds, speeds)
 
 
 def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
-    """Look at the same thing for two seconds."""
+    """Check for two seconds that constant measurements obey a constant command."""
     obedience = Obedience(topic, PARAMETERS.by_name)
     for tick in range(200):
         obedience.look(tick / 100, 0.01, command, measured)
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """Its data of the first second arrive later; and it has no scales to check."""
+    """Its first data come late, so it has 3 s; the message omits the scales that it lacks."""
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
     for tick in range(250):
@@ -47,7 +47,7 @@ def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
 
 
 def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
-    """That answers so, one after the other, and what it shows."""
+    """Return a console that gets these answers in order, and the text that it shows."""
     shown, left = io.StringIO(), list(answers)
     return Console(yes=yes, read=lambda _question: left.pop(0), file=shown), shown
 
@@ -56,7 +56,7 @@ def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
 def test_a_command_changes_no_faster_than_allowed(
     now: tuple[float, float, float], wanted: tuple[float, float, float], seconds: float
 ) -> None:
-    """The linear part changes as a vector, the yaw rate by itself; near targets are reached."""
+    """The linear velocity is limited as a vector, the yaw rate by itself; the target is reached."""
     then = BOUNDS.approach("cmd_vel", now, wanted, seconds)
     assert math.dist(then[:2], now[:2]) <= 0.3 * seconds + 1e-12
     assert abs(then[2] - now[2]) <= 0.8 * seconds + 1e-12
@@ -69,7 +69,7 @@ def test_a_command_changes_no_faster_than_allowed(
     "command", [(0.31, 0.0, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, -0.6), (math.nan, 0.0, 0.0)]
 )
 def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
-    """The linear part counts as a vector; NaN is refused too."""
+    """The linear velocity is limited as a vector; NaN is refused too."""
     with pytest.raises(ToolError, match="beyond this calibration's own bounds"):
         BOUNDS.require_allowed("cmd_vel", command)
     wheels = Bounds(speed=5.0, way=1.0, seconds=1.0)
@@ -79,7 +79,7 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """It went too far, turned too much, took too long, or has no position."""
+    """The cases are too far, turned too much, too long, and a position that is not finite."""
     BOUNDS.require_within(9.0, Pose(0.6, 0.6, -1.9))
     for seconds, pose, sentence in (
         (1.0, Pose(0.8, 0.8, 0.0), "1.13 m"),
@@ -93,7 +93,7 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 
 
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
-    """A fifth is enough, crawling need not show, wheels are judged by their rates."""
+    """A fifth of the command is enough, slow commands are not judged, and NaN is not motion."""
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
     with pytest.raises(ToolError, match=r"does not move when commanded \(wheel_cmd\)"):
@@ -104,7 +104,7 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
-    """The last one is followed by none."""
+    """After the last command the law returns None, which ends the motion."""
     law = stairs([(1.0, (1.0, 0.0, 0.0)), (2.0, HALT), (1.0, (0.0, 1.0, 0.0))])
     assert [law(t, Pose()) for t in (0.0, 0.99, 1.0, 2.9, 3.5)] == [
         (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), HALT, HALT, (0.0, 1.0, 0.0),
@@ -113,7 +113,7 @@ def test_stairs_are_climbed_one_by_one() -> None:
 
 
 def test_an_empty_log_has_empty_columns() -> None:
-    """The columns have the right shape."""
+    """The columns keep their shapes, so that calculations need not treat this case."""
     log = Log()
     assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
     assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
@@ -121,14 +121,14 @@ def test_an_empty_log_has_empty_columns() -> None:
 
 
 def test_wheels_are_as_many_as_the_robot_has() -> None:
-    """Their angles come first, then their rates."""
+    """A row has the angles of all wheels first, then their rates."""
     log = Log(wheel_rows=[(0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 5.0, 6.0, 7.0, 8.0)])
     assert log.wheels.angle_rad.tolist() == [[1.0, 2.0], [5.0, 6.0]]
     assert log.wheels.rate_radps.tolist() == [[3.0, 4.0], [7.0, 8.0]]
 
 
 def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
-    """Numbers in range, with a comma too; words by their beginning; nothing but y is yes."""
+    """A decimal comma is accepted, an ambiguous choice is not, and an empty answer means no."""
     asks, shown = console("ten", "nan", "-5", "0,25", "l", "left", "", "yes", "n")
     assert asks.number("How far", "m", 0.0, 1.0) == 0.25
     assert shown.getvalue().count("Please type a number of m from 0 to 1.") == 3
@@ -140,7 +140,7 @@ def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
 
 
 def test_a_table_in_a_pipe_is_plain_text() -> None:
-    """It has no colours, and as many digits as the uncertainty allows."""
+    """The table is without colours, and has as many digits as the uncertainty allows."""
     asks, shown = console()
     findings = [
         Finding(name="linear_scale", value=80.12345, sigma=0.0234, unit="LSB/(m/s)", before=70.0),
@@ -162,7 +162,7 @@ def result(**parameters: object) -> Result:
 
 
 def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
-    """The file keeps everything else that was in it."""
+    """All other entries of the file are kept."""
     path = tmp_path / "robot.yaml"
     path.write_text("name: number 7\ngyro_bias: [0.0, 0.0, 0.1]\nlinear_scale: 71.0\n")
     save(result(linear_scale=80.5, axis_signs=[1, -1, 1]), path, PARAMETERS)
@@ -173,7 +173,7 @@ def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
 
 
 def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
-    """The next start must not fail."""
+    """A file with such a value would make the driver's next start fail."""
     path = tmp_path / "robot.yaml"
     with pytest.raises(ToolError, match="parameter 'linear_scale' must be"):
         save(result(linear_scale=1e9), path, PARAMETERS)
@@ -181,7 +181,7 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
 
 
 def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
-    """They are for the file and the picture, and are checked before the drive."""
+    """The check before the drive accepts missing folders; saving and drawing create them."""
     path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
     assert output_file(str(path), "", PARAMETERS) == path
     assert picture_file(str(picture), "imu") == picture
@@ -192,12 +192,12 @@ def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
 
 
 def test_everything_that_may_be_written_is_a_parameter() -> None:
-    """A name that the driver does not know would end it."""
+    """The driver would refuse to start with an unknown name in its calibration file."""
     assert {"axis_signs", "gyro_bias", "linear_scale"} < set(PARAMETERS.calibrated)
 
 
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
-    """Parameters of ROS, nonsense, folders that are none, pictures that cannot be drawn."""
+    """ROS parameter files, invalid values, files in place of folders and other image types fail."""
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")
     with pytest.raises(ToolError, match="is a file of ROS parameters"):
@@ -217,14 +217,14 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
     "words", [[], ["nonsense"], ["imu", "--minutes", "0"], ["scale", "--levels", "x"]]
 )
 def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """A message explains it."""
+    """A message on stderr explains it."""
     assert main(words) == 2
     assert "calibrate" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a firmware")])
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
-    """The message is for a driver with these parameters; the OmniBot can do everything."""
+    """A board's parameters show what it can do; the OmniBot supports every calibration."""
     for subcommand in SUBCOMMANDS:
         require_able(subcommand, PARAMETERS.by_name)
     with pytest.raises(

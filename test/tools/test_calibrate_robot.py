@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot that is moved for a calibration stands still whatever happens, and says why."""
+"""Every motion of a calibration ends at rest, and an interrupted one gives its reason."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def once(action: Callable[[], object]) -> Callable[[float], None]:
-    """Do this once when the robot has moved for a moment."""
+    """Return a callback that does this once, ``AFTER_S`` after the motion began."""
     left = [action]
 
     def show(seconds: float) -> None:
@@ -46,7 +46,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: Rig) -> None:
-    """Its log has commands, measurements and the standing still at the end."""
+    """The log contains commands, measurements, and the standstill at the end."""
     before = rigged.port.board.truth
     log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
     after = rigged.port.board.truth
@@ -75,7 +75,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
 def test_what_happens_on_the_way_ends_it_at_rest(
     robot: Robot, rigged: Rig, what: str, sentence: str
 ) -> None:
-    """It is tripped, rebooted, commanded by others, or interrupted."""
+    """The cases are an e-stop, a reboot, another commander on either topic, and an interruption."""
     node = robot._node
     estop = node.create_publisher(Bool, "estop", 10)
     other = node.create_publisher(Twist, "cmd_vel", 1)
@@ -101,7 +101,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
 
 
 def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
-    """The odometry shows it; commands beyond the bounds are never sent."""
+    """The odometry shows the distance; commands beyond the bounds are never sent."""
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
     with pytest.raises(ToolError, match=r"it went too far \(0\.\d\d m from where it began, 0\.05"):
         robot.drive(steady(SLOWLY, 10.0), near)
@@ -112,7 +112,7 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
 
 
 def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> None:
-    """A scale of one count per m/s makes nothing of any command."""
+    """With a scale of one count per m/s every command is rounded to zero."""
     robot.set_parameters({"linear_scale": 1.0})
     with pytest.raises(ToolError, match="does not move when commanded"):
         robot.drive(steady(SLOWLY, 10.0), BOUNDS)
@@ -120,7 +120,7 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
 
 
 def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """It is off only while a motion is measured that it would stop."""
+    """It is switched off only during a motion that it would stop."""
     seen = []
 
     def interrupt() -> None:
@@ -135,7 +135,7 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 
 
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """It stayed off until the driver was started again."""
+    """Any exception restores it; otherwise it would stay off until the driver restarts."""
 
     def fail() -> None:
         raise RuntimeError("a defect")
@@ -149,7 +149,7 @@ def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> Non
 def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
     robot: Robot, rigged: Rig
 ) -> None:
-    """ctrl-Z, then fg: the driver has stopped the robot meanwhile, and there it stays."""
+    """After ctrl-Z and fg only zeros are sent: the driver has stopped the robot meanwhile."""
     clock = SimpleNamespace(monotonic=time.monotonic)
 
     def suspend() -> None:
@@ -168,7 +168,7 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The message adds this to the original error."""
+    """The advice to cut the power is added to the original error, if one occurred."""
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
     with pytest.raises(
@@ -183,7 +183,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 
 
 def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
-    """It does not prove a standstill either."""
+    """A NaN position ends the motion, and a NaN twist does not prove a standstill."""
     nonsense = Odometry()
     nonsense.pose.pose.position.x = nonsense.twist.twist.linear.x = float("nan")
 
@@ -197,7 +197,7 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """This holds for each wanted topic."""
+    """The limit of 0.3 s without data applies to each wanted topic."""
     monkeypatch.setattr(listener, "LOST_S", LOST_S)
     heard_s = {listener.IMU: 10.0, listener.ODOMETRY: 9.9}
     assert listener.silent(heard_s, listener.TOPICS, 10.19) == []
@@ -207,7 +207,7 @@ def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.Mo
 
 
 def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    """The same holds without an answer."""
+    """The same holds if the input ends without an answer."""
     commands = len(rigged.port.board.commands)
     assert rigged.calibrate("scale", answer=lambda _question: "n") == 1
     assert "you said no" in capsys.readouterr().err
@@ -224,7 +224,7 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
 def test_ctrl_c_at_an_open_question_ends_it(
     rigged: Rig, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The exit code is that of an interruption; nothing moves."""
+    """The exit code is 130, as for any interruption, and the robot does not move."""
 
     def interrupt(_question: str) -> str:
         os.kill(os.getpid(), signal.SIGINT)
@@ -237,7 +237,10 @@ def test_ctrl_c_at_an_open_question_ends_it(
 
 
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
-    """The last one of this module; its guard stops the robot, and no data is read any more."""
+    """The killed driver's guard stops the robot, and the tool reports missing data.
+
+    This is the last test of the module, as it ends the shared driver.
+    """
 
     def kill() -> None:
         rigged.driver.process.kill()

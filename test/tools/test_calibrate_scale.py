@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate scale``: the board's command units are found again."""
+"""``calibrate scale`` finds the units of the board's commands: counts per m/s and per rad/s."""
 
 import math
 from pathlib import Path
@@ -23,7 +23,10 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """A robot of these scales that follows stairs computed with the assumed ones."""
+    """Return the log of a robot with ``true`` scales that gets commands computed with ``ASSUMED``.
+
+    ``gyro`` is the factor of its gyro's rate.
+    """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
     for seconds, command in plan((0.25, 0.25, 0.5), ASSUMED, 2, 1.0 + SETTLE_S):
@@ -53,7 +56,7 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """Commands are in whole counts; odometry and gyro measure, whatever was assumed."""
+    """Commands are whole counts, so odometry and gyro give the scale whatever was assumed."""
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
     assert abs(by.value - linear) < max(5 * by.sigma, 1e-4 * linear)
@@ -69,7 +72,7 @@ def test_any_scale_is_found_within_what_is_claimed(
 def test_what_is_commanded_is_a_whole_count_of_the_board(
     units: float, top: float, levels: int
 ) -> None:
-    """And, unless one count is already more, no faster than asked for."""
+    """The requested maximum is kept, unless a single count is already faster."""
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
         assert counts == pytest.approx([round(count) for count in counts], abs=1e-9)
@@ -77,7 +80,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """A computer that hangs for half a second stops the robot; its motion then is not measured."""
+    """A pause in the commands may have stopped the robot, so that speed is left out."""
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
     middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]
@@ -86,7 +89,7 @@ def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
 
 
 def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
-    """Beyond its tolerance; then the geometry is wrong."""
+    """At 5 % a note suggests a wrong geometry; 2 % is within the gyro's tolerance."""
     found = speeds(drive((70.0, 70.0, 500.0), gyro=1.05), ASSUMED, UP, NO_BIAS)
     assert any("calibrate geometry`, load" in note for note in result(found, NOW).notes)
     found = speeds(drive((70.0, 70.0, 500.0), gyro=1.02), ASSUMED, UP, NO_BIAS)
@@ -94,13 +97,13 @@ def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
 
 
 def test_axes_that_disagree_are_told() -> None:
-    """One scale serves both, so a user should hear that it does not fit."""
+    """x and y share one scale, so a note says that it does not fit both."""
     found = speeds(drive((70.0, 72.0, 500.0)), ASSUMED, UP, NO_BIAS)
     assert "x and y differ by 2.8%" in result(found, NOW).notes[0]
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """No steady speed, and a robot that drives the other way."""
+    """The cases are a log without a steady speed, and a robot that drives against its commands."""
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):
@@ -110,7 +113,7 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 def test_planted_scales_are_found_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """They pass through wire and driver in twenty seconds, with stamped commands."""
+    """The complete calibration takes 20 s with a real driver and stamped commands."""
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:
         words = ("--levels", "1", "--seconds", "0.7", "--speed", "0.2", "--turning", "0.4")
@@ -120,6 +123,6 @@ def test_planted_scales_are_found_and_applied(
     for name, planted in (("linear_scale", 80.0), ("angular_scale", 430.0)):
         value, sigma = row(table, name)
         assert abs(value - planted) < max(4 * sigma, 0.002 * planted)
-        assert sigma < 0.01 * planted  # half of it on a machine that has time
+        assert sigma < 0.01 * planted  # half of it on an idle machine
         assert written[name] == pytest.approx(value, rel=1e-3)
         assert applied[name] == written[name]

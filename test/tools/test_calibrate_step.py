@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step`` with a real driver: a planted motor, found, told, drawn and written."""
+"""``calibrate step`` with a real driver: a planted motor is found, reported, drawn and saved."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ti
 def test_a_planted_motor_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Wheel B has another motor than the others: within 5 %, on a machine that may be busy."""
+    """Only wheel B has this motor; the tolerance is 5 %, as the test machine may be busy."""
     monkeypatch.setattr(step, "RUN_UP_S", 1.3)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:
         code = robot.calibrate("step", "--wheels", "B", "--hold", "0.7", "--steps", "4")
@@ -33,13 +33,13 @@ def test_a_planted_motor_is_found(
         ("B: gain", 1.0, 0.05),
         ("B: PWM per count", 35.0, 1.75),
         ("B: motor time constant", 0.1, 0.005),
-        ("B: overshoot", 0.25, 0.08),  # as the loop is calculated with them and the delay below
+        ("B: overshoot", 0.25, 0.08),  # calculated for this loop, with the delay below
     ):
         found, sigma = row(table, name)
         assert found == pytest.approx(planted, abs=tolerance), name
         assert 0 < sigma < tolerance
     delay_s, sigma = row(table, "B: motor delay")
-    assert 0.006 < delay_s < 0.035  # planted is 0.01; most commands of a busy host are a tick late
+    assert 0.006 < delay_s < 0.035  # planted: 0.01 s; a busy host sends most commands a tick late
     assert 0 < sigma < 0.004
     assert "wheels off the ground" in robot.questions[0]
     assert "No message sets them" in table
@@ -47,12 +47,12 @@ def test_a_planted_motor_is_found(
     written = robot.written()["step"]
     found, _ = written["wheels"]["B"]["motor in the manual's loop"]["PWM per count"]
     assert found == pytest.approx(35.0, abs=1.75)
-    assert written["better_gains"][1] <= found + 0.01  # both are rounded
+    assert written["better_gains"][1] <= found + 0.01  # both are rounded values
     assert (tmp_path / "calibrate_step.png").stat().st_size > 20_000
 
 
 def still(answer: str, *words: str) -> None:
-    """Run with a robot that can do nothing but say its parameters."""
+    """Run the calibration with a robot that has parameters but cannot move."""
     parameters = {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     robot = SimpleNamespace(parameters=parameters)
     arguments = command_line().parse_args(["step", *words])
@@ -72,12 +72,12 @@ def still(answer: str, *words: str) -> None:
 def test_what_cannot_be_done_is_said_before_anything_moves(
     words: list[str], complaint: str
 ) -> None:
-    """The message says what is possible."""
+    """The message names the condition that an option does not meet."""
     with pytest.raises(ToolError, match=complaint):
         still("y", *words)
 
 
 def test_a_no_moves_nothing() -> None:
-    """It is an error, told as one."""
+    """The user's refusal ends the tool with an error message."""
     with pytest.raises(ToolError, match="you said no"):
         still("n")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What ``calibrate commission`` concludes from patterns, postures and drifts."""
+"""Conclusions of ``calibrate commission`` from wheel patterns, IMU postures and drifts."""
 
 import math
 from itertools import product
@@ -36,7 +36,7 @@ PATTERNS = list(product((1, 0, -1), repeat=3))
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """The matrix of fixed-axis angles, one axis after the other."""
+    """Return the rotation matrix of fixed-axis roll, pitch and yaw, in rad."""
     about_x = [[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]]
     about_y = [
         [math.cos(pitch), 0, math.sin(pitch)],
@@ -48,7 +48,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
-    """The directions of up as a sensor sees them: level, nose up, left side up."""
+    """Return the direction of up in the sensor's axes for level, nose up and left side up."""
     bodies = (
         (0.0, 0.0, 1.0),
         (math.sin(nose_rad), 0.0, math.cos(nose_rad)),
@@ -57,23 +57,23 @@ def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.n
     return [mounted.T @ np.array(body) for body in bodies]
 
 
-# Eyes
+# Patterns that the user sees
 
 
 def test_the_table_of_the_commissioning_guide_is_what_is_wanted() -> None:
-    """The three rows of cmd_vel are copied by hand."""
+    """The expected signs are copied by hand from the three rows of cmd_vel."""
     assert [wanted(axis) for axis in range(3)] == [(-1, 1, 0), (-1, -1, 1), (-1, -1, -1)]
 
 
 @pytest.mark.parametrize("answer", ["+0-", "+ 0 -", "+,0,-", " +, 0, - "])
 def test_three_signs_are_understood(answer: str) -> None:
-    """Any separator is accepted."""
+    """Spaces and commas around the signs are ignored."""
     assert understand(answer) == (1, 0, -1)
 
 
 @pytest.mark.parametrize("answer", ["", "+", "++", "+0-+", "abc", "1 0 -1", "yes"])
 def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
-    """The question is asked again."""
+    """None makes the tool repeat the question."""
     assert understand(answer) is None
 
 
@@ -82,7 +82,7 @@ def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
 def test_a_wheel_is_itself_or_it_is_a_contradiction(
     wheel: int, pattern: tuple[int, int, int]
 ) -> None:
-    """Two of the 27 answers are possible."""
+    """Two of the 27 patterns are possible: this wheel alone, in either direction."""
     alone = tuple(int(n == wheel) for n in range(3))
     if pattern in (alone, tuple(-n for n in alone)):
         assert wheel_sign(wheel, pattern) == sum(pattern)
@@ -96,7 +96,7 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """The same for these."""
+    """Two of the 27 patterns are possible: the expected one and its reverse."""
     expected = wanted(axis)
     if pattern == expected:
         assert axis_sign(axis, pattern) == 1
@@ -108,20 +108,20 @@ def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
 
 
 def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
-    """Forward taken for backward and left for right is a robot seen from behind."""
+    """A robot with x and y reversed is one seen from behind, so it can be a real mounting."""
     assert not mirrored((1, 1, 1))
     assert not mirrored((-1, -1, 1))
     assert mirrored((-1, 1, 1))
 
 
-# Gravity
+# Mounting by gravity
 
 
 @given(angles, st.floats(-1.5, 1.5), angles, tilts, tilts)
 def test_any_mounting_is_found_from_three_postures(
     roll: float, pitch: float, yaw: float, nose_rad: float, left_rad: float
 ) -> None:
-    """The tilt angle does not matter."""
+    """The result is exact, whatever the angles of the two tilts are."""
     planted = rotation(roll, pitch, yaw)
     found = mounting(*postures(planted, nose_rad, left_rad))
     assert found.rotation == pytest.approx(planted, abs=1e-6)
@@ -130,14 +130,14 @@ def test_any_mounting_is_found_from_three_postures(
 
 @given(angles, st.floats(-1.5, 1.5), angles)
 def test_angles_are_those_of_a_description(roll: float, pitch: float, yaw: float) -> None:
-    """Roll, pitch and yaw make the rotation that they were taken from."""
+    """Roll, pitch and yaw give the rotation back from which they were computed."""
     made = rotation(roll, pitch, yaw)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
 
 @pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2])
 def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
-    """Roll and yaw coincide there."""
+    """At a pitch of 90° roll and yaw have the same axis, so one of many solutions is returned."""
     made = rotation(0.3, pitch, 0.4)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
@@ -150,7 +150,7 @@ def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
 def test_a_clumsy_hand_still_finds_right_angles(
     mounted: tuple[float, float, int], slips: list[float]
 ) -> None:
-    """Tilts askew by 5° leave no doubt which of the 24 it is."""
+    """Tilts askew by 5° still give the right one of the 24 right-angled mountings."""
     planted = rotation(mounted[0], mounted[1], mounted[2] * math.pi / 2)
     level = postures(planted, 0.5, 0.6)[0]
     body_nose = rotation(slips[0], 0, slips[1]) @ np.array([math.sin(0.5), 0, math.cos(0.5)])
@@ -161,7 +161,7 @@ def test_a_clumsy_hand_still_finds_right_angles(
 
 
 def test_a_sensor_mounted_askew_stays_so() -> None:
-    """30° of yaw are not a right angle."""
+    """A yaw of 30° is too far from a right angle to be rounded to one."""
     assert mounting(*postures(rotation(math.pi, 0, math.pi / 6), 0.5, 0.5)).snapped() is None
 
 
@@ -169,7 +169,7 @@ def test_a_sensor_mounted_askew_stays_so() -> None:
 def test_a_side_lowered_instead_of_raised_is_a_contradiction(
     nose_rad: float, left_rad: float
 ) -> None:
-    """One alone makes the axes left-handed."""
+    """One lowered side would make the measured axes left-handed."""
     level, nose_up, left_up = postures(rotation(math.pi, 0, 0), nose_rad, left_rad)
     with pytest.raises(Contradiction, match="one of the two was not as asked"):
         mounting(level, nose_up, left_up)
@@ -177,7 +177,7 @@ def test_a_side_lowered_instead_of_raised_is_a_contradiction(
 
 @pytest.mark.parametrize("tilt_rad", [0.05, 1.5])
 def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
-    """A fall is not a tilt either."""
+    """Tilts of 3° and 86° are outside the accepted range: one is too flat, one like a fall."""
     with pytest.raises(Contradiction, match="front raised"):
         mounting(*postures(np.eye(3), tilt_rad, 0.5))
 
@@ -185,13 +185,13 @@ def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
 def resting(
     force: tuple[float, float, float], rate: tuple[float, float, float], seconds: float
 ) -> Imu:
-    """The same all the time."""
+    """Return constant readings for this time."""
     stamps = np.arange(0.0, seconds, 0.01)
     return Imu(stamps, np.tile(force, (len(stamps), 1)), np.tile(rate, (len(stamps), 1)))
 
 
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
-    """About straight up, wherever that is in the sensor, without the bias."""
+    """The turn is about the measured vertical, after the gyro's bias is subtracted."""
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
     def turned(rate: float) -> float:
@@ -205,7 +205,7 @@ def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
 
 
 def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
-    """An empty record is rejected too."""
+    """A trembling hand, a wrong gravity and an empty record are each rejected."""
     shaking = resting((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
     shaking.rate_radps[::2] = 0.5
     with pytest.raises(Contradiction, match="not held still"):
@@ -216,17 +216,17 @@ def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
         up(resting((0, 0, 9.8), (0, 0, 0), 0.0))
 
 
-# Deltas
+# Meaning of the deltas
 
 
 def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
-    """The same speed from beginning to end."""
+    """Return a drift with the same speed from beginning to end."""
     return Drift(vx, vy, yaw_rate, math.hypot(vx, vy), math.hypot(vx, vy))
 
 
 @given(st.floats(0.3, 3.0), angles)
 def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> None:
-    """The command's unit and direction do not matter."""
+    """Velocity control is recognised whatever the command's unit and direction are."""
     x, y = 0.06 * scale * math.cos(direction_rad), 0.06 * scale * math.sin(direction_rad)
     assert control_method(steady(x, y), steady(2 * x, 2 * y), 0.06) == "velocity"
 
@@ -234,14 +234,14 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
 @pytest.mark.parametrize(
     ("slow", "fast"),
     [
-        (steady(0.0), steady(0.0)),  # there at once
-        (steady(0.3), steady(0.3)),  # far away, and on its way
+        (steady(0.0), steady(0.0)),  # arrived at once
+        (steady(0.3), steady(0.3)),  # far from its target, and still on its way
         (Drift(0.02, 0.0, 0.0, 0.05, 0.0), steady(0.0)),  # arriving
         (steady(0.06), Drift(0.09, 0.0, 0.0, 0.18, 0.02)),
     ],
 )
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
-    """A pose is neither held as a velocity nor doubled."""
+    """Under positional control a speed is neither held nor doubled with the command."""
     assert control_method(slow, fast, 0.06) == "position"
 
 
@@ -249,7 +249,7 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """The right one does not."""
+    """In the right frame a command leads in the same body direction after a turn."""
 
     def heading(rad: float) -> Drift:
         return steady(0.1 * math.cos(rad), 0.1 * math.sin(rad))
@@ -263,7 +263,7 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """Computed by hand: 0.5 rad/s are 24 counts of each wheel in 40 ms, or 20 mrad."""
+    """Calculated by hand: 0.5 rad/s is 20 mrad, or 24 counts of each wheel, in 40 ms."""
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
     as_counts = steady(0.0, 2 / 3 * 200 * rim / 0.04, -200 * rim / 0.04 / (3 * 0.143))
@@ -273,7 +273,7 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """A drift is not computed without data or at rest."""
+    """Data of another time do not count; missing data or a robot at rest are an error."""
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))
     twist[50:, 0] = 0.2

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The dashboard at 80x24, with a robot that is none."""
+"""The monitor's dashboard at 80x24 characters, with a fake robot."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -36,7 +36,7 @@ def on_screen(robot: FakeRobot, steps: Callable[[Pilot[Any], Monitor], Awaitable
 
 
 def screen(app: Monitor) -> list[str]:
-    """The visible screen, row by row."""
+    """Return the visible screen, row by row."""
     return [
         "".join(segment.text for segment in strip)
         for strip in app.screen._compositor.render_strips()
@@ -44,7 +44,7 @@ def screen(app: Monitor) -> list[str]:
 
 
 def press(*keys: str, teleop: bool = False) -> FakeRobot:
-    """The robot after these keys."""
+    """Press these keys; return the robot with the requests that it got."""
     robot = FakeRobot(teleop=teleop)
 
     async def steps(pilot: Pilot[Any], _app: Monitor) -> None:
@@ -56,7 +56,7 @@ def press(*keys: str, teleop: bool = False) -> FakeRobot:
 
 @pytest.mark.parametrize("statuses", [view().statuses, ALL_WRONG], ids=["fine", "all wrong"])
 def test_everything_fits_80_by_24(statuses: tuple[Status, ...]) -> None:
-    """Mode, link, rates, pose, velocities, IMU, faults and keys are all there at once."""
+    """Mode, link, rates, pose, velocities, IMU, faults and keys are all visible at once."""
     robot = FakeRobot(teleop=True)
     robot.shown = view(statuses=statuses, said="start: running")
 
@@ -82,7 +82,7 @@ def test_everything_fits_80_by_24(statuses: tuple[Status, ...]) -> None:
 
 
 def test_a_latched_estop_is_red() -> None:
-    """The whole line, with the key that releases it."""
+    """The complete line is red and names the key that releases the e-stop."""
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
@@ -101,25 +101,25 @@ def test_a_latched_estop_is_red() -> None:
     [("space", "estop"), ("g", "start"), ("p", "pause"), ("z", "reset_odometry")],
 )
 def test_a_key_asks_for_what_the_last_line_says(key: str, asked: str) -> None:
-    """Each press makes one request."""
+    """Each press sends exactly one request."""
     assert press(key).asked == [asked]
 
 
 def test_the_estop_is_released_by_two_keys() -> None:
-    """R asks, y answers; any other key is a no."""
+    """R asks for confirmation and y confirms; any other key cancels."""
     assert press("R", "y").asked == ["release"]
     answers = ("n", "enter", "escape", "R", "w")
     assert press(*(key for answer in answers for key in ("R", answer)), teleop=True).asked == []
 
 
 def test_space_stops_even_while_a_question_stands() -> None:
-    """The question closes with the answer no."""
+    """Space requests the e-stop and answers the open question with no."""
     assert press("R", "space", "y").asked == ["estop"]
 
 
 @pytest.mark.parametrize("keys", [["q"], ["ctrl+c"], ["ctrl+q"]])
 def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> None:
-    """The last line names the first of them."""
+    """ctrl-C and ctrl-Q work too, although the last line of the screen names only q."""
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
@@ -132,7 +132,7 @@ def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> N
 
 @pytest.mark.parametrize("key", ["w", "up", "j"])
 def test_keys_steer_with_teleop_alone(key: str) -> None:
-    """The program asks for keys only with it."""
+    """Without ``--teleop`` the same keys do nothing."""
     robot = press(key, teleop=True)
     assert robot.dead_man
     assert robot.dead_man.command(0.0) not in (None, HALT)
@@ -140,14 +140,14 @@ def test_keys_steer_with_teleop_alone(key: str) -> None:
 
 
 def test_plus_and_minus_change_the_speed() -> None:
-    """Each key changes it by a tenth."""
+    """Each press changes the level by one of ten; it begins at 3."""
     robot = press("plus", "plus", "minus", teleop=True)
     assert robot.dead_man
     assert robot.dead_man.level == 4
 
 
 def test_who_looks_elsewhere_does_not_steer() -> None:
-    """A terminal that loses the focus ends what a held key began."""
+    """When the terminal loses the focus, the motion of a held key ends."""
     robot = FakeRobot(teleop=True)
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
@@ -162,7 +162,7 @@ def test_who_looks_elsewhere_does_not_steer() -> None:
 
 
 def test_nothing_in_a_message_is_markup() -> None:
-    """Brackets in a sentence are shown as they are."""
+    """Brackets in a message are shown unchanged and do not format it."""
     robot = FakeRobot()
     robot.shown = view(said="[/bold] [red", driver="/[b]")
 
@@ -174,7 +174,7 @@ def test_nothing_in_a_message_is_markup() -> None:
 
 
 def test_a_key_for_what_the_board_cannot_do_is_not_there() -> None:
-    """It is not shown, and asks for nothing; all others are."""
+    """The key is hidden and sends no request; the other keys still work."""
     robot = FakeRobot()
     robot.shown = view(lacks=frozenset({"pause"}))
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the monitor knows of the robot: rates, latest values, the way it went."""
+"""The monitor's model of the robot: rates, latest values, path."""
 
 import math
 
@@ -22,7 +22,7 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 
 @given(st.floats(0.5, 120.0), st.floats(2.0, 30.0), st.floats(0.0, 1e6))
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
-    """The rate is exact within one arrival in the window, wherever the window lies."""
+    """The rate is exact to one message in the window, wherever the window lies."""
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):
         rate.arrived(began_s + number / hz)
@@ -31,7 +31,7 @@ def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: fl
 
 @given(waits_s)
 def test_no_arrival_is_lost_or_made_up(waits: list[float]) -> None:
-    """Whole seconds of the history hold every arrival of the last minute, each once."""
+    """The history counts every message of the last minute exactly once, second by second."""
     rate, arrivals, now_s = Rate(0.0), [], 0.0
     for wait_s in waits:
         now_s += wait_s
@@ -47,7 +47,7 @@ def test_no_arrival_is_lost_or_made_up(waits: list[float]) -> None:
 
 @given(waits_s, st.floats(WINDOW_S + 0.01, 1e4))
 def test_what_has_ceased_has_no_rate(waits: list[float], silence_s: float) -> None:
-    """After a window of silence nothing comes, and the history goes on with zeros."""
+    """After a window without messages the rate is 0, and the history continues with zeros."""
     rate, now_s = Rate(0.0), 0.0
     for wait_s in waits:
         now_s += wait_s
@@ -60,7 +60,7 @@ def test_what_has_ceased_has_no_rate(waits: list[float], silence_s: float) -> No
 
 
 def test_the_way_is_kept_in_steps() -> None:
-    """A robot that stands adds nothing; one that drives, a point every other centimetre."""
+    """A robot at rest adds nothing to the path; a moving one adds a point every 2 cm."""
     model = Model("/omnibot_driver", 0.0)
     for tick in range(1000):
         model.odom(Pose(min(tick, 500) * 0.001, 0.0), HALT, tick * 0.04)
@@ -70,7 +70,7 @@ def test_the_way_is_kept_in_steps() -> None:
 
 
 def test_the_way_is_bounded() -> None:
-    """Hours of driving take no more memory than the longest way."""
+    """Hours of driving need no more memory than ``LONGEST_PATH`` points."""
     model = Model("/omnibot_driver", 0.0)
     for tick in range(2 * LONGEST_PATH):
         model.odom(Pose(0.03 * tick, 0.0), HALT, 0.04 * tick)
@@ -78,7 +78,7 @@ def test_the_way_is_bounded() -> None:
 
 
 def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
-    """An impossible leap is not drawn as a line."""
+    """A jump that the robot cannot make is not drawn as a line."""
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(2.0, 0.0), HALT, 1.0)
     model.odom(Pose(0.0, 0.0), HALT, 1.04)
@@ -86,7 +86,7 @@ def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
 
 
 def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
-    """NaN is kept as it came, and named; the way goes on from the last pose that was one."""
+    """NaN and infinity are kept and named; the path continues with the next finite pose."""
     model = Model("/omnibot_driver", 0.0)
     for number, x_m in enumerate((0.0, math.nan, math.inf, 0.1)):
         model.odom(Pose(x_m, 0.0), BodyTwist(x_m, 0.0, 0.0), 0.1 * number)
@@ -96,7 +96,7 @@ def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
 
 
 def test_a_command_that_nobody_repeats_is_none() -> None:
-    """What no longer moves the robot is not shown as commanded."""
+    """A command older than 0.5 s no longer moves the robot, so it is not shown."""
     model = Model("/omnibot_driver", 0.0)
     model.commanded(BodyTwist(0.1, 0.0, 0.0), 1.0)
     assert model.view(1.4).commanded == BodyTwist(0.1, 0.0, 0.0)
@@ -104,7 +104,7 @@ def test_a_command_that_nobody_repeats_is_none() -> None:
 
 
 def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
-    """Only messages from the driver count."""
+    """Only messages from the driver itself end its silence."""
     model = Model("/omnibot_driver", 0.0)
     model.state("nominal", 1.0)
     model.commanded(HALT, 9.0)
@@ -112,7 +112,7 @@ def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
 
 
 def test_what_was_measured_once_is_not_what_is_measured() -> None:
-    """Velocities, IMU and verdicts of a silent driver are gone; its place stays."""
+    """Outdated velocities, IMU data and diagnostics are removed; the last pose stays."""
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(1.0, 0.0), BodyTwist(0.2, 0.0, 0.0), 1.0)
     model.imu((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
@@ -140,13 +140,13 @@ def test_a_topic_is_missing_where_the_state_promises_it(state: str, missing: lis
 
 
 def test_diagnostics_are_missing_where_somebody_publishes_them() -> None:
-    """A driver that replays a recording has none."""
+    """A driver that replays a recording does not publish any."""
     assert view(statuses=()).missing(diagnostics=True) == ["/diagnostics"]
     assert view(statuses=()).missing(diagnostics=False) == []
 
 
 def test_a_level_that_is_none_counts_as_an_error() -> None:
-    """Any node may publish anything on /diagnostics."""
+    """Unknown levels occur, as any node may publish anything on /diagnostics."""
     assert [level(byte) for byte in (0, 1, 2, 3, 4, 255)] == [
         *(Level.OK, Level.WARN, Level.ERROR, Level.STALE),
         *(Level.ERROR, Level.ERROR),

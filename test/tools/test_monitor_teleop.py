@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steering by keys: who lets go stands still."""
+"""Steering by keys: the robot stops when the key is released."""
 
 import pytest
 from hypothesis import given
@@ -28,7 +28,7 @@ def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | 
 
 @given(st.lists(st.tuples(keys, st.floats(0.0, ASLEEP_S - 0.01)), min_size=1, max_size=20))
 def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
-    """After FIRST_S at the latest there are zeros, as many as promised, then nothing."""
+    """``FIRST_S`` after the last key at the latest, ``ZEROS`` zero commands follow, then none."""
     dead_man, now_s = DeadMan(), 0.0
     for key, wait_s in presses:
         now_s += wait_s
@@ -40,7 +40,7 @@ def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, f
 
 @given(keys, st.floats(0.02, FIRST_S - 0.01), st.floats(0.02, REPEAT_S - 0.01))
 def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: float) -> None:
-    """It moves through the delay before a keyboard repeats, and between repetitions."""
+    """The motion lasts through the keyboard's delay before repeating, and between repetitions."""
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
     assert dead_man.command(delay_s - 0.001) not in (None, HALT)
@@ -51,7 +51,7 @@ def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: flo
 
 
 def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
-    """0.3 s after the last repetition, 0.6 s after a single press."""
+    """The motion ends 0.3 s after the last repetition, or 0.6 s after a single press."""
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.59) != HALT
@@ -62,7 +62,7 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 
 @pytest.mark.parametrize("key_first", [True, False])
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
-    """Whichever thread wakes up first; what is pressed afterwards steers again."""
+    """Pending keys are discarded whichever thread wakes up first; later keys steer again."""
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.0) not in (None, HALT)
@@ -76,7 +76,7 @@ def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) ->
 
 
 def test_stop_is_at_once() -> None:
-    """The very next command is to stand still."""
+    """The very next command is zero, although the key's time has not ended."""
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.01) != HALT
@@ -104,7 +104,7 @@ def test_who_has_not_steered_commands_nothing() -> None:
     ],
 )
 def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> None:
-    """x forward, y to the left, positive turns to the left (REP-103)."""
+    """x is forward, y to the left, and a positive turn to the left (REP-103)."""
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
     command = dead_man.command(0.0)
@@ -113,7 +113,7 @@ def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> Non
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
 def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
-    """They range from a tenth of the limits to the whole."""
+    """They range from a tenth of the limits to the full limits."""
     dead_man = DeadMan()
     dead_man.fastest = (0.4, 1.5)
     for step in steps:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the monitor shows: words, figures, pictures, JSON."""
+"""What the monitor shows: text, numbers, the plot of the path, JSON."""
 
 import json
 import math
@@ -26,7 +26,7 @@ triples = st.tuples(anything, anything, anything)
 def test_no_value_breaks_the_screen(
     pose: tuple[float, ...], twist: tuple[float, ...], force: Any, rate: Any
 ) -> None:
-    """NaN, infinity and 1e300 stand where a number would, and no line outgrows its column."""
+    """NaN, infinity and 1e300 are shown as such, and every line fits its column."""
     shown = view(pose=Pose(*pose), measured=BodyTwist(*twist), force_mps2=force, rate_radps=rate)
     lines = text.figures(shown)
     assert max(map(len, lines)) <= 42
@@ -51,7 +51,7 @@ def test_json_holds_the_values() -> None:
 
 
 def test_what_is_not_known_is_a_dash_and_null() -> None:
-    """This holds before the first message of a topic."""
+    """A value is unknown before the first message of its topic."""
     shown = view(pose=None, measured=None, commanded=None, force_mps2=None, rate_radps=None)
     assert "–" in text.figures(shown)[3]
     told = json.loads(text.as_json(shown, []))
@@ -60,7 +60,7 @@ def test_what_is_not_known_is_a_dash_and_null() -> None:
 
 
 def test_what_needs_somebody_stands_first() -> None:
-    """Errors before warnings, what is fine in one line."""
+    """Errors come before warnings, and all that is OK shares one line."""
     statuses = (
         *FINE,
         Status("Time", Level.STALE, "not known", {}),
@@ -76,14 +76,14 @@ def test_what_needs_somebody_stands_first() -> None:
 
 
 def test_what_has_happened_is_counted() -> None:
-    """Zero counts are not shown."""
+    """Counts of zero are not shown."""
     stream = Status("Stream", Level.OK, "complete", {"Framing faults": "3", "Sequence gaps": "0"})
     assert text.counts(view(statuses=(stream,))) == "since its start: framing faults 3"
     assert text.counts(view()) == "since its start: nothing lost, nothing refused"
 
 
 def test_a_message_cannot_move_the_cursor() -> None:
-    """Text of diagnostics is shown without escape sequences."""
+    """Escape sequences in a text from /diagnostics are removed."""
     rude = Status("Link", Level.ERROR, "\x1b[2J\nbad\x07", {"Port": "\x1b]0;owned\x07"})
     shown = view(statuses=(rude,), state="\x1b[31m")
     everything = text.report(shown).replace("\n", "") + text.title(shown)
@@ -91,7 +91,7 @@ def test_a_message_cannot_move_the_cursor() -> None:
 
 
 def test_a_silent_driver_is_said_to_be_silent() -> None:
-    """Instead of the mode and the link that it had."""
+    """The title reports the silence instead of the last link, which is outdated."""
     assert text.title(view(silent_s=7.2)).endswith("nothing heard for 7 s (was nominal)")
     assert text.title(view()) == "/robot1/omnibot_driver  nominal  connected, /dev/omnibot"
 
@@ -107,7 +107,7 @@ def test_an_estop_is_latched_asked_for_or_not() -> None:
 
 
 def test_the_picture_of_a_square_is_a_square() -> None:
-    """Its outline is drawn from its corners, its inside is empty, its sides are as wide as high."""
+    """Only the outline is drawn, and its sides are as wide as high."""
     corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
     picture = draw_path(corners, 24, 12)
     assert {len(row) for row in picture.rows} == {24}
@@ -122,7 +122,7 @@ def test_the_picture_of_a_square_is_a_square() -> None:
     [(0.0, "→"), (math.pi / 2, "↑"), (math.pi, "←"), (-math.pi / 4, "↘"), (20 * math.pi, "→")],
 )
 def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
-    """In the picture x is to the right and y up."""
+    """In the plot x points to the right and y up."""
     assert any(arrow in row for row in draw_path([], 10, 5, Pose(1.0, 1.0, yaw_rad)).rows)
 
 
@@ -134,7 +134,7 @@ def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
 def test_any_way_fits_any_picture(
     points: list[tuple[float, float]], columns: int, rows: int
 ) -> None:
-    """This includes a terminal without room for it."""
+    """The plot has the requested size even in a terminal without room for it."""
     picture = draw_path(points, columns, rows, Pose(*(points[-1] if points else (0.0, 0.0))))
     assert len(picture.rows) == max(1, rows)
     assert {len(row) for row in picture.rows} == {max(1, columns)}
@@ -142,7 +142,7 @@ def test_any_way_fits_any_picture(
 
 @given(st.lists(st.integers(0, 10**6), max_size=80), st.integers(0, 70))
 def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
-    """Zero is a gap, the largest value is full, and a small value is visible."""
+    """Zero is a blank, the largest value a full bar, and any other value is visible."""
     line = sparkline(values, columns)
     assert len(line) == columns
     shown = values[-columns:] if columns else []
@@ -151,7 +151,7 @@ def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
 
 
 def test_a_board_without_an_imu_has_no_rows_of_it() -> None:
-    """Neither words nor JSON show it, and it does not count as missing."""
+    """Neither text nor JSON shows the IMU, and it is not reported as missing."""
     shown = view(lacks=frozenset({"imu"}), imu=Flow(0.0, None, ()), force_mps2=None)
     words = "\n".join(text.figures(shown))
     assert "odom" in words

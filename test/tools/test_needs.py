@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a tool says, and still does, when a library is missing."""
+"""Behaviour of the tools when a Python library is missing."""
 
 import json
 import subprocess
@@ -16,7 +16,7 @@ ROOT = Path(omnibot_driver.__file__).parents[1]
 
 
 def test_a_library_that_is_there_is_imported() -> None:
-    """The import works as ``import`` does."""
+    """``need`` returns the same module as ``import``."""
     assert need("json") is json
 
 
@@ -36,7 +36,7 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
     ["tools.calibrate", "tools.calibrate step", "tools.report", "tools.monitor", "demo"],
 )
 def test_help_needs_no_library(words: str) -> None:
-    """It needs no ROS either: a Python without site-packages has neither."""
+    """Python without site-packages, so also without ROS, still prints the help."""
     module, *subcommand = words.split()
     done = subprocess.run(
         [sys.executable, "-ES", "-m", f"omnibot_driver.{module}", *subcommand, "--help"],

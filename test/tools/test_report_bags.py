@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bags of every kind read without ROS, and what is said of those that cannot be."""
+"""Bags of every storage format are read without ROS; unreadable ones end with a clear message."""
 
 import os
 import subprocess
@@ -28,7 +28,7 @@ def drive() -> Drive:
 
 @pytest.fixture(autouse=True)
 def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They take their time, and have tests of their own."""
+    """Draw no pictures here: they are slow and have tests of their own."""
     monkeypatch.setattr(page, "PICTURES", ())
 
 
@@ -60,7 +60,7 @@ KINDS = [
 def test_a_bag_of_any_kind_tells_the_same(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin, mode: CompressionMode
 ) -> None:
-    """Storage and compression make no difference."""
+    """Every storage plugin and compression mode gives the same log."""
     bag = write(tmp_path / "bag", [drive], plugin, mode)
     same(log_of(bag), drive.log())
 
@@ -69,7 +69,7 @@ def test_a_bag_of_any_kind_tells_the_same(
 def test_a_single_file_of_a_bag_is_enough(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """What a recorder that was killed leaves."""
+    """A recorder that was killed leaves such a file, without metadata.yaml."""
     (file,) = (
         file
         for file in write(tmp_path / "bag", [drive], plugin).iterdir()
@@ -79,7 +79,7 @@ def test_a_single_file_of_a_bag_is_enough(
 
 
 def test_stamped_commands_are_commands(drive: Drive, tmp_path: Path) -> None:
-    """The type is TwistStamped instead of Twist."""
+    """TwistStamped is read like Twist, and its timestamps are kept."""
     drive.stamped_commands = True
     log = log_of(write(tmp_path / "bag", [drive]))
     np.testing.assert_array_equal(log.cmd_vel.values, drive.cmd_vel.values)
@@ -87,7 +87,7 @@ def test_stamped_commands_are_commands(drive: Drive, tmp_path: Path) -> None:
 
 
 def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) -> None:
-    """Only the topics of the chosen robot are read."""
+    """With ``--namespace`` only the topics of the chosen robot are read."""
     one, other = Drive(SECONDS, "/robot1"), Drive(SECONDS, "/fleet/robot2", seed=2)
     bag = write(tmp_path / "bag", [one, other])
     with pytest.raises(ToolError, match=r"--namespace, of /fleet/robot2, /robot1"):
@@ -101,13 +101,13 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
 
 
 def test_the_only_robot_needs_no_name(tmp_path: Path) -> None:
-    """Its namespace does not matter."""
+    """It is found in any namespace."""
     log = log_of(write(tmp_path / "bag", [Drive(SECONDS, "/robot1")]))
     assert log.robot == "/robot1"
 
 
 def refused(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """The one sentence on stderr of a call that ends with 1."""
+    """Run a report that must end with exit code 1; return its one line on stderr."""
     assert main([str(path), "--output", str(path.parent / "out")]) == 1
     printed = capsys.readouterr()
     assert not printed.out
@@ -117,12 +117,12 @@ def refused(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The message says what to give."""
+    """For a path that does not exist the message says what to give."""
     assert "give the folder of a bag" in refused(tmp_path / "nothing", capsys)
 
 
 def test_what_is_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A folder without one, a text, files that are broken."""
+    """The cases are a folder without a bag, a text file, and broken MCAP and SQLite files."""
     (tmp_path / "folder").mkdir()
     assert "neither metadata.yaml nor" in refused(tmp_path / "folder", capsys)
     for name, says in (("a.txt", "is not a bag"), ("a.mcap", "reindex"), ("a.db3", "reindex")):
@@ -131,7 +131,7 @@ def test_what_is_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It has topics, but no message."""
+    """The bag has a topic, but not a single message."""
     with Writer(tmp_path / "bag", version=9) as writer:
         writer.add_connection("/imu/data_raw", "sensor_msgs/msg/Imu", typestore=TYPES)
     assert "is empty" in refused(tmp_path / "bag", capsys)
@@ -140,7 +140,7 @@ def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_a_bag_of_something_else_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A topic called odom that is none included."""
+    """A topic /odom of another type does not make it a robot's bag."""
     with Writer(tmp_path / "bag", version=9) as writer:
         kind = "std_msgs/msg/String"
         data = TYPES.serialize_cdr(TYPES.types[kind]("hello"), kind)
@@ -152,7 +152,7 @@ def test_a_bag_of_something_else_is_told(
 def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The report says what it cannot judge."""
+    """The report names the missing topic, and the exit code is 3."""
     drive.odom.drop(0.0, SECONDS)
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
     assert "No message of odom" in capsys.readouterr().out
@@ -161,7 +161,7 @@ def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
 def test_nothing_but_nan_is_reported_on(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every number of the bag is NaN."""
+    """The report counts the messages with NaN, and the exit code is 3."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
@@ -171,14 +171,14 @@ def test_nothing_but_nan_is_reported_on(
 def test_a_place_that_cannot_be_written_is_told(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A file where the folder should be."""
+    """The folder cannot be created, as a file has its name."""
     (tmp_path / "out").write_text("taken")
     assert "cannot be written" in refused(write(tmp_path / "bag", [drive]), capsys)
 
 
 @pytest.mark.parametrize("wrong", [[], ["bag", "--live", "5"], ["--live", "0"], ["--live", "nan"]])
 def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """A bag or a time, not both and not neither."""
+    """Either a bag or a positive time with ``--live`` must be given, but not both."""
     with pytest.raises(SystemExit) as ended:
         main(wrong)
     assert ended.value.code == 2
@@ -186,7 +186,7 @@ def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str
 
 
 def test_a_bag_is_reported_on_where_there_is_no_ros(drive: Drive, tmp_path: Path) -> None:
-    """The process cannot import rclpy or messages, and its reader leaves at once."""
+    """The process cannot import ROS modules; a closed stdout does not disturb it either."""
     bag = write(tmp_path / "bag", [drive])
     program = (
         "import sys\n"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bags that were not finished or are damaged: all that is whole is reported on, and it is said."""
+"""Unfinished or damaged bags: the intact part is reported on, and the damage is named."""
 
 import shutil
 import sqlite3
@@ -33,7 +33,7 @@ def log_of(path: Path) -> Log:
 
 
 def cut(bag: Path, end: int) -> Path:
-    """Its only file, as if the recorder had been killed at this length."""
+    """Return the bag's only file, cut to ``end`` bytes as if the recorder had been killed."""
     (bag / "metadata.yaml").unlink()
     (file,) = bag.iterdir()
     file.write_bytes(file.read_bytes()[:end])
@@ -48,7 +48,7 @@ def test_an_unfinished_bag_is_read_and_called_so(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The report is written, the end is not 0, and the repair is named."""
+    """The report is written and names the repair, and the exit code is 3."""
     monkeypatch.setattr(page, "PICTURES", ())
     bag = write(tmp_path / "bag", [drive], plugin)
     (bag / "metadata.yaml").unlink()
@@ -59,7 +59,7 @@ def test_an_unfinished_bag_is_read_and_called_so(
 
 
 def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Path) -> None:
-    """The tenth comes before the second by name."""
+    """By name the tenth file would come before the second."""
     bag = tmp_path / "bag"
     bag.mkdir()
     for name, first in (("bag_2", 0), ("bag_10", 10)):
@@ -81,7 +81,7 @@ def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Pa
 def test_metadata_that_make_no_sense_are_not_needed(
     drive: Drive, tmp_path: Path, text: str
 ) -> None:
-    """The files say the same."""
+    """The bag's other files contain the same information."""
     bag = write(tmp_path / "bag", [drive])
     (bag / "metadata.yaml").write_text(text)
     log = log_of(bag)
@@ -95,8 +95,8 @@ def test_metadata_that_make_no_sense_are_not_needed(
 def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     tmp_path: Path, mode: CompressionMode
 ) -> None:
-    """A damaged chunk is dropped, those before it are read."""
-    drive = Drive(40.0)  # some chunks
+    """The damaged chunk is discarded, and all chunks before it are read."""
+    drive = Drive(40.0)  # long enough for several chunks
     bag = write(tmp_path / "bag", [drive], compression=mode)
     size = (bag / "bag.mcap").stat().st_size
     file = cut(bag, size * 9 // 10)
@@ -105,7 +105,7 @@ def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     assert 0.3 * len(drive.imu.stamp_s) < len(log.imu) < len(drive.imu.stamp_s)
     np.testing.assert_array_equal(log.imu.values, drive.imu.series().values[: len(log.imu)])
     assert len(log_of(file).imu) == len(log.imu)
-    assert file.stat().st_size == size * 9 // 10  # what was found is left as it is
+    assert file.stat().st_size == size * 9 // 10  # the file is not changed
 
 
 def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> None:
@@ -120,7 +120,7 @@ def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> No
 
 
 def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
-    """Record by record, up to the one that is not whole, and put in order by arrival."""
+    """Records are read up to the first incomplete one, and sorted by arrival."""
     kind = "std_msgs/msg/Bool"
     bag = tmp_path / "bag"
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -149,7 +149,7 @@ def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("size", [0, 8, 20])
 def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path, size: int) -> None:
-    """The message names the repair that may do more."""
+    """The message names ``ros2 bag reindex``, which may recover more."""
     bag = write(tmp_path / "bag", [drive])
     file = cut(bag, size)
     with pytest.raises(ToolError, match=f"{file.name} cannot be read: .*ros2 bag reindex {bag}"):
@@ -157,7 +157,7 @@ def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path,
 
 
 def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_path: Path) -> None:
-    """The write-ahead log that a recorder leaves beside it when it is killed."""
+    """A recorder that is killed leaves a write-ahead log beside the database."""
     bag = write(tmp_path / "bag", [drive], StoragePlugin.SQLITE3)
     killed = tmp_path / "killed"
     killed.mkdir()
@@ -174,7 +174,7 @@ def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_p
 
 
 def test_damaged_messages_are_counted_and_passed_over(drive: Drive, tmp_path: Path) -> None:
-    """One that is too short, in the middle."""
+    """One message in the middle is too short; all others are read."""
     with Writer(tmp_path / "bag", version=9) as writer:
         connections = {}
         for number, (topic, kind, at_ns, told) in enumerate(drive.messages()):

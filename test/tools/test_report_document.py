@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""docs/tools/report.md names what the report judges, and the limits that it judges by."""
+"""docs/tools/report.md lists the subjects of the report, and the limits that it judges by."""
 
 import ast
 import re
@@ -17,7 +17,7 @@ ROWS = dict(re.findall(r"^\| (\S+) \| [^|]+ \| ([^|]+) \|$", DOCUMENT, re.MULTIL
 
 
 def test_every_subject_has_a_row() -> None:
-    """There is no other row."""
+    """The table lists exactly the subjects of the findings in the code."""
     subjects = {
         node.args[1].value
         for file in (ROOT / "omnibot_driver/tools/report").glob("*.py")
@@ -51,5 +51,5 @@ def test_every_subject_has_a_row() -> None:
     ],
 )
 def test_the_limits_are_those_of_the_code(subject: str, limit: str) -> None:
-    """Each row has those of its subject."""
+    """Each limit of the code is in the row of its subject."""
     assert limit in ROWS[subject]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a report says of the streams of a drive in which a trouble was planted, or none."""
+"""Findings of a report on a drive's streams, healthy or with a planted fault."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def drive() -> Drive:
 
 
 def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
-    """The report has figures, and nothing to do."""
+    """The findings give figures, and none gives advice."""
     findings = judge(drive.log())
     assert not troubles(drive)
     assert headline(findings) == "Healthy."
@@ -30,7 +30,7 @@ def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
 
 
 def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
-    """The stream lacks 15 readings from 6 s on."""
+    """15 readings are missing from 6 s on."""
     drive.imu.drop(6.0, 6.15)
     (gap,) = troubles(drive)
     assert gap.level is Level.WARN
@@ -40,7 +40,7 @@ def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
 
 
 def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None:
-    """The counts in /diagnostics grow."""
+    """The driver's count in /diagnostics grows by 10 during the gap."""
     drive.imu.drop(6.0, 6.1)
     for at_s, *_, values in drive.statuses:
         values["IMU frames lost"] = "7" if at_s < 7.0 else "17"
@@ -48,13 +48,13 @@ def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None
 
 
 def test_a_long_gap_is_worse(drive: Drive) -> None:
-    """Odometry is missing for more than half a second."""
+    """A gap of more than 0.5 s, here 1 s of odometry, is BAD instead of WARN."""
     drive.odom.drop(8.0, 9.0)
     assert said(drive, "Gaps", "odom", "1 gap").level is Level.BAD
 
 
 def test_a_pause_is_no_gap(drive: Drive) -> None:
-    """The state accounts for it."""
+    """The driver's state explains the missing messages."""
     drive.states += [(16.9, "paused"), (18.0, "nominal")]
     drive.imu.drop(17.0, 18.0)
     drive.odom.drop(17.0, 18.0)
@@ -63,7 +63,7 @@ def test_a_pause_is_no_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_told_and_is_no_gap_besides(drive: Drive) -> None:
-    """State and stream are two words for the same."""
+    """State and streams show the same event, so it is reported once."""
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
     drive.odom.drop(16.9, 18.0)
@@ -71,14 +71,14 @@ def test_a_lost_board_is_told_and_is_no_gap_besides(drive: Drive) -> None:
 
 
 def test_the_end_of_the_driver_is_no_lost_board(drive: Drive) -> None:
-    """It says disconnected last, and then nothing any more."""
+    """A driver that ends publishes ``disconnected`` last, and then nothing more."""
     drive.states.append((19.5, "disconnected"))
     assert not troubles(drive)
     assert "ended at 19.5 s" in said(drive, "State", "driver").text
 
 
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
-    """20 ms ahead, and slowly back, as of a driver that was kept from reading."""
+    """A driver that was kept from reading gives timestamps 20 ms ahead, which slowly return."""
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
     (leap,) = troubles(drive)
@@ -87,7 +87,7 @@ def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
 
 
 def test_uneven_stamps_are_noticed(drive: Drive) -> None:
-    """An example is stamps that are arrival times."""
+    """This happens, for example, if the timestamps are arrival times."""
     drive.imu.stamp_s = drive.imu.stamp_s + np.random.default_rng(2).uniform(0, 4e-3, 2000)
     (jitter,) = troubles(drive)
     assert jitter.subject == "Timing"
@@ -95,7 +95,7 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
 
 
 def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) -> None:
-    """The two states have one cause, the cable."""
+    """``disconnected`` and ``connecting`` in a row have one cause, such as the cable."""
     drive.states += [(8.0, "disconnected"), (8.5, "connecting"), (9.0, "nominal")]
     for topic in (drive.imu, drive.odom, drive.joints):
         topic.drop(8.0, 9.0)
@@ -103,7 +103,7 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 
 
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
-    """No later message ends the gap."""
+    """The gap lasts to the end of the log, unless the driver's state explains it."""
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
     assert gap.level is Level.BAD
@@ -115,7 +115,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
-    """Every other reading is missing throughout."""
+    """Every other reading is missing in the complete log."""
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.imu, name, getattr(drive.imu, name)[::2])
     found = [finding.text for finding in troubles(drive) if finding.subject in ("Timing", "Gaps")]
@@ -133,7 +133,7 @@ def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
 def test_the_rate_that_a_stream_should_have_is_the_one_that_its_driver_says(
     values: dict[str, str], wanted: str
 ) -> None:
-    """Boards differ, and so do their settings."""
+    """The diagnostics give the rate, as boards and their settings differ."""
     drive = Drive()
     drive.statuses.append((1.5, "omnibot_driver: Stream", 0, "complete", values))
     (found,) = [one for one in judge(drive.log()) if one.text.startswith("odom comes at")]
@@ -142,14 +142,14 @@ def test_the_rate_that_a_stream_should_have_is_the_one_that_its_driver_says(
 
 
 def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
-    """Stamps must increase."""
+    """A timestamp that is not later than the one before is BAD."""
     drive.odom.stamp_s[100:] -= 0.2
     drive.odom.late_s[100:] += 0.2
     assert said(drive, "Timing", "1 stamp of odom").level is Level.BAD
 
 
 def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
-    """A timer of 16 ms in the adapter."""
+    """The delays are those of a USB adapter with a latency timer of 16 ms."""
     drive.imu.late_s = drive.imu.late_s + np.remainder(-drive.imu.stamp_s, 0.016)
     late = said(drive, "Timing", "imu/data_raw arrives")
     assert late.level is Level.WARN
@@ -157,14 +157,14 @@ def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
 
 
 def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
-    """The offset is half a minute, for every topic."""
+    """The messages of the IMU arrive 30 s after their timestamps."""
     drive.imu.late_s = drive.imu.late_s + 30.0
     (clock,) = troubles(drive)
     assert "30 s after its stamp" in clock.text
 
 
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
-    """What is left is judged as ever."""
+    """Messages with NaN or infinity are left out, and the others are judged as usual."""
     drive.imu.values[100:103, 4] = np.nan
     drive.odom.values[50, 0] = np.inf
     found = troubles(drive)
@@ -174,14 +174,14 @@ def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
 
 
 def test_nothing_but_nan_is_told(drive: Drive) -> None:
-    """This holds for every topic."""
+    """If every message has NaN, IMU, odometry and commands are each reported."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert {finding.subject for finding in troubles(drive)} == {"IMU", "Odometry", "Commands"}
 
 
 def test_what_an_estop_refuses_is_no_trouble(drive: Drive) -> None:
-    """The driver warns of each; other refusals are listed."""
+    """The driver warns of each refused command; only other refusals are reported."""
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
     assert not troubles(drive)
@@ -190,7 +190,7 @@ def test_what_an_estop_refuses_is_no_trouble(drive: Drive) -> None:
 
 
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
-    """The worst word of each status."""
+    """Each status is reported by its worst level, with message and number."""
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.6, "omnibot_driver: IMU", 2, "the gyro is stuck", {}))
@@ -204,7 +204,7 @@ def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
 
 
 def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
-    """They share /diagnostics, which does not say whose is whose."""
+    """They share /diagnostics, which does not show which robot a count belongs to."""
     drive.imu.drop(6.0, 6.1)
     findings = judge(replace(drive.log(), alone=False))
     (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
@@ -213,7 +213,7 @@ def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
 
 
 def test_topics_that_are_missing_are_named(drive: Drive) -> None:
-    """The report says what it cannot judge without them."""
+    """Missing odometry is BAD; missing commands are only a NOTE."""
     drive.odom.drop(0.0, 99.0)
     drive.cmd_vel.drop(0.0, 99.0)
     assert said(drive, "Recording", "No message of odom").level is Level.BAD
@@ -221,7 +221,7 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 
 
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
-    """They come from another publisher."""
+    """This driver stamps all messages, so another node published these."""
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan
     assert any("3 messages of imu/data_raw without a stamp" in item.text for item in judge(log))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a report says of a robot with a trouble in its motion or in its IMU."""
+"""Findings of a report on a robot with a planted fault in its motion or its IMU."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -27,7 +27,7 @@ def drive() -> Drive:
 def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
     drive: Drive, factor: float, advice: str
 ) -> None:
-    """An accelerometer set to another range reads a half or a quarter."""
+    """An accelerometer that is set to another range reads a half or a quarter of gravity."""
     drive.imu.values[:, 3:] *= factor
     gravity = said(drive, "IMU", "Gravity")
     assert gravity.level is Level.BAD
@@ -35,7 +35,7 @@ def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
 
 
 def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
-    """The tilt is ten degrees."""
+    """The sensor is tilted by 10° about y."""
     tilt = np.radians(10.0)
     force = drive.imu.values[:, 3:].copy()
     drive.imu.values[:, 3] = force[:, 0] * np.cos(tilt) + force[:, 2] * np.sin(tilt)
@@ -44,7 +44,7 @@ def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
 
 
 def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> None:
-    """The bias is 0.05 rad/s about y."""
+    """A bias of 0.05 rad/s about y can be removed by ``~/calibrate_gyro``."""
     drive.imu.values[:, 1] += 0.05
     (bias,) = troubles(drive)
     assert "+0.05" in bias.text
@@ -53,7 +53,7 @@ def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> N
 
 
 def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
-    """The accelerometer still varies."""
+    """200 readings are identical; the accelerometer varies, so it is not named."""
     drive.imu.values[500:700, :3] = drive.imu.values[500, :3]
     stuck = said(drive, "IMU", "identical readings")
     assert stuck.level is Level.BAD
@@ -62,7 +62,7 @@ def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
 
 
 def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
-    """A wrong radius, or slip."""
+    """The cause is a wrong ``base_radius``, or slip."""
     drive.imu.values[:, 2] *= 1.2
     assert "base_radius" in said(drive, "IMU", "gyro turned 1.2").advice
 
@@ -71,32 +71,32 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """Two seconds of a turn, which the next pose takes in one step."""
+    """Two seconds of a turn are lost, so the next pose contains them in a single step."""
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
     assert said(drive, "IMU", "gyro turned 1.000 times").level is Level.GOOD
 
 
 def test_a_gap_in_the_odometry_is_no_rest(drive: Drive) -> None:
-    """What the gyro turned meanwhile is not its bias."""
+    """The robot turns during the gap, so those gyro readings are not a bias."""
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
 def test_an_even_turn_is_no_rest_without_odometry(drive: Drive) -> None:
-    """The IMU alone tells rest then."""
+    """Rest is then found from the IMU alone, where a steady turn looks like a bias."""
     drive.odom.drop(0.0, 99.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
 def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
-    """It turns as the wheels do."""
+    """The gyro turns in the same sense as the wheels, unlike one that is upside down."""
     drive.imu.values[:, 2] *= -1.0
     assert "imu_rpy" in said(drive, "IMU", "upright").advice
 
 
 def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
-    """The robot shakes at 20 Hz while driving."""
+    """The robot shakes at 20 Hz while it drives."""
     times_s = drive.imu.stamp_s
     on = (times_s > 5.0) & (times_s < 15.0)
     drive.imu.values[:, 3] += 6.0 * np.sin(2 * np.pi * 20.0 * times_s) * on
@@ -106,14 +106,14 @@ def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
 
 
 def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
-    """The lag is right within a step of the search and half a step of the odometry."""
+    """The lag is exact to a step of the search plus half a step of the odometry."""
     text = said(drive, "Commands", "followed").text
     lag_s = float(text.split("followed ")[1].split(" ms")[0]) / 1e3
     assert lag_s == pytest.approx(DELAY_S, abs=0.041)
 
 
 def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) -> None:
-    """It reaches 70 % in x and y, and all of the yaw rate."""
+    """It reaches 70 % of the command in x and y, and 100 % of the yaw rate."""
     drive.odom.values[:, :2] *= 0.7
     drive.odom.values[:, 3:5] *= 0.7
     (slow,) = troubles(drive)
@@ -122,14 +122,14 @@ def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) ->
 
 
 def test_a_robot_that_goes_the_wrong_way_is_told_with_the_signs(drive: Drive) -> None:
-    """The sign of yaw is wrong."""
+    """The measured yaw rate has the opposite sign of the command."""
     drive.odom.values[:, 2] *= -1.0
     drive.odom.values[:, 5] *= -1.0
     assert "axis_signs" in said(drive, "Commands", "followed").advice
 
 
 def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
-    """The robot stands for the last four seconds of the drive."""
+    """The robot stands still during the last four seconds of commands."""
     rows = drive.odom.stamp_s > 12.0
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
     drive.odom.values[rows, 3:] = 0.0
@@ -139,19 +139,19 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 
 
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
-    """The driver stops the robot, so this says why it stood."""
+    """The driver then stops the robot, so the note explains why it stood still."""
     drive.cmd_vel.drop(10.0, 10.8)
     assert "1 time in motion" in said(drive, "Commands", "ceased").text
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
-    """There is no command for two seconds, and no rest."""
+    """Commands are missing for four seconds, and the robot keeps moving."""
     drive.cmd_vel.drop(10.0, 14.0)
     assert said(drive, "Commands", "without a command").level is Level.WARN
 
 
 def test_an_estop_is_noted_and_what_it_stops_is_no_trouble(drive: Drive) -> None:
-    """Commands continue and the robot stands."""
+    """Commands continue while the e-stop keeps the robot at rest."""
     drive.estops += [(10.0, True), (19.0, False)]
     rows = drive.odom.stamp_s > 10.1
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
@@ -162,7 +162,7 @@ def test_an_estop_is_noted_and_what_it_stops_is_no_trouble(drive: Drive) -> None
 
 
 def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
-    """It is the worst finding."""
+    """It has the worst level, BAD."""
     drive.estops += [(10.0, True)]
     moved = said(drive, "E-stop", "moved while")
     assert moved.level is Level.BAD
@@ -170,7 +170,7 @@ def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
 
 
 def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
-    """Half a metre that no twist tells of."""
+    """The pose jumps by 0.5 m, which the twist does not explain."""
     drive.odom.values[300:, 0] += 0.5
     (leap,) = troubles(drive)
     assert leap.level is Level.BAD
@@ -179,7 +179,7 @@ def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
 
 
 def test_a_reset_of_the_odometry_is_noted_and_is_no_way(drive: Drive) -> None:
-    """It begins anew at zero."""
+    """The pose begins again at zero; the jump is not added to the distance."""
     way = said(drive, "Odometry", "Driven").text.split(",")[0]
     drive.odom.values[450:, :3] = 0.0
     assert not troubles(drive)
@@ -206,7 +206,7 @@ JOINTS = ("left_wheel_joint", "right_wheel_joint", "front_steering_joint")
 
 
 def two_wheels() -> Recorder:
-    """One rate in five is commanded of the left wheel and half of it turned."""
+    """Return a recorder of two wheels, the left of which turns at half its commanded rate."""
     recorder = Recorder("/")
     for number in range(200):
         rate, stamp = float(number % 50 > 10), SimpleNamespace(sec=number, nanosec=1)
@@ -220,7 +220,7 @@ def two_wheels() -> Recorder:
 
 
 def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
-    """A steering joint is not a wheel; the driver refuses a command of another length."""
+    """A steering joint is not a wheel; a command of another length is read as NaN."""
     log = two_wheels().log()
     assert log.wheels == JOINTS[:2]
     assert log.joint_states.values[20].tolist() == [0.5, 1.0]
@@ -232,7 +232,7 @@ def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
 
 
 def test_an_imu_that_the_board_has_not_is_not_missed(drive: Drive) -> None:
-    """The driver's diagnostics count no frames of it then."""
+    """Its driver's diagnostics have no count of IMU frames."""
     drive.imu.drop(0.0, 99.0)
     said_of_it = [finding.text for finding in judge(drive.log())]
     assert "No message of imu/data_raw: nothing can be said of the IMU." in said_of_it

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The page needs nothing but itself, and the pictures show what there is."""
+"""The report's page is self-contained, and its pictures show the available data."""
 
 import re
 from pathlib import Path
@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_page_has_everything_inside(folder: Path) -> None:
-    """No address in it but data, so it can be mailed and opened anywhere."""
+    """Every picture is embedded as data, so the page can be mailed and opened anywhere."""
     text = (folder / "report.html").read_text()
     addresses = re.findall(r"""(?:src|href|url)\s*[=(]\s*["']?([^"'>)]{0,30})""", text)
     assert len(addresses) == len(PICTURES)
@@ -40,7 +40,7 @@ def test_the_page_has_everything_inside(folder: Path) -> None:
 
 
 def test_every_picture_lies_beside_the_page(folder: Path) -> None:
-    """Each is a PNG of moderate size."""
+    """Each is a PNG of less than 200 kB."""
     assert sorted(file.stem for file in folder.glob("*.png")) == PICTURES
     for file in folder.glob("*.png"):
         assert file.read_bytes().startswith(b"\x89PNG")
@@ -48,14 +48,14 @@ def test_every_picture_lies_beside_the_page(folder: Path) -> None:
 
 
 def test_a_name_cannot_become_markup(folder: Path) -> None:
-    """Files may have any name."""
+    """A bag may have any name, so the page escapes it."""
     text = (folder / "report.html").read_text()
     assert "&lt;a &amp; b&gt;" in text
     assert "<a & b>" not in text
 
 
 def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
-    """The words are the same."""
+    """Both are made from the same findings."""
     drive = Drive(10.0)
     drive.estops += [(5.0, True), (6.0, False)]
     findings = judge(drive.log())
@@ -67,7 +67,7 @@ def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
 
 
 def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
-    """A topic of NaN has no picture, and a picture of an earlier report is removed."""
+    """A topic of NaN only has no picture, and a picture of an earlier report is removed."""
     drive = Drive(10.0)
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
@@ -81,7 +81,7 @@ def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
 
 @given(st.integers(0, 40_000), st.integers(0, 2**32 - 1))
 def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) -> None:
-    """The number of points is small, whatever the length."""
+    """A long series is reduced to ``POINTS`` points at most."""
     values = np.random.default_rng(seed).normal(size=length)
     times_s = np.arange(length, dtype=float)
     shown_s, shown = envelope(times_s, values)
@@ -98,5 +98,5 @@ def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) ->
     [(0.02, "0.02 s"), (9.0, "9 s"), (99.6, "100 s"), (150.4, "2 min 30 s"), (7384, "2 h 03 min")],
 )
 def test_lengths_of_time_are_told_as_people_do(seconds: float, told: str) -> None:
-    """They have at most three figures."""
+    """At most three significant digits are shown, in the usual units."""
     assert span(seconds) == told

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which words of a command line are ROS's."""
+"""Splitting a command line into ROS arguments and those of the tool."""
 
 from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 
 def test_ros_arguments_are_told_from_ours() -> None:
-    """The rule is that of rclpy."""
+    """ROS arguments lie between ``--ros-args`` and ``--``, as in rclpy."""
     words = ["imu", "--yes", "--ros-args", "-r", "cmd_vel:=other", "--", "--minutes", "2"]
     own, ros = split_ros_arguments(words)
     assert own == ["imu", "--yes", "--minutes", "2"]

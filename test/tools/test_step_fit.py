@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step``: constants that were planted in a wheel are found in its deltas."""
+"""``calibrate step`` finds planted constants of a wheel in its encoder deltas."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 NOISE_RADPS = 0.05
-"""What encoder and wire make of a delta by their steps."""
+"""Noise of a rate, in rad/s, as from the resolution of encoder and serial protocol."""
 TOLERANCE = 0.01
-"""Of what a motor is found to be; its delay within a millisecond."""
+"""Relative tolerance of a motor's constants; that of its delay is 1 ms."""
 
 
 def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
-    """Eight steps of a wheel that is exactly like this, heard with noise."""
+    """Return eight steps of a wheel that follows this model exactly, measured with noise."""
     random = np.random.default_rng(seed)
     steps = []
     for number in range(8):
@@ -43,7 +43,7 @@ def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
 @settings(max_examples=20)
 @given(st.floats(0.8, 1.2), st.floats(0.03, 0.2), st.floats(0.0, 0.06), st.integers(0, 2**32 - 1))
 def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed: int) -> None:
-    """Within five of the deviations that are claimed."""
+    """The parameters are within five of their claimed standard deviations."""
     planted = (gain, lag_s, delay_s)
     found = fit(FIRST_ORDER, made_up(FIRST_ORDER, planted, seed))
     assert (np.abs(found.values - planted) < 5 * found.sigmas + 1e-6).all()
@@ -57,7 +57,7 @@ def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed:
 def test_a_motor_is_found_in_the_manuals_loop(
     pwm_per_count: float, lag_s: float, delay_s: float, seed: int
 ) -> None:
-    """The same, and nothing explains the steps better."""
+    """The parameters are within five sigma, and a first order does not fit better."""
     planted = (1.0, pwm_per_count, lag_s, delay_s)
     steps = made_up(motor_model(MANUAL), planted, seed)
     found = fit(motor_model(MANUAL), steps)
@@ -66,7 +66,7 @@ def test_a_motor_is_found_in_the_manuals_loop(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """Over forty recordings, errors divided by what is claimed have a deviation near one."""
+    """For 40 recordings the errors over the claims have a standard deviation near 1."""
     planted = (1.0, 46.0, 0.06, 0.013)
     fits = [fit(motor_model(MANUAL), made_up(motor_model(MANUAL), planted, n)) for n in range(40)]
     errors = np.array([(one.values - planted) / one.sigmas for one in fits])
@@ -74,7 +74,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 
 def test_a_command_seen_a_tick_off_is_put_right() -> None:
-    """Two of eight steps had their onset taken for a tick too late, or too soon."""
+    """Two of eight steps have an onset that is one tick too late or too early."""
     planted = (1.0, 0.05, 0.02)
     steps = made_up(FIRST_ORDER, planted, 1)
     steps[2], steps[5] = steps[2].sooner(1), steps[5].sooner(-1)
@@ -83,7 +83,7 @@ def test_a_command_seen_a_tick_off_is_put_right() -> None:
 
 
 def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
-    """Three commands were late by up to 0.15 s; in one step the wheel was held for a while."""
+    """Three commands were up to 0.15 s late; in one step the wheel was blocked for a while."""
     planted = (1.0, 46.0, 0.06, 0.01)
     steps = made_up(motor_model(MANUAL), planted, 2) + made_up(motor_model(MANUAL), planted, 3)
     for number, ticks in ((1, 3), (4, 15), (9, 7)):
@@ -96,7 +96,7 @@ def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
 
 
 def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
-    """The message names a possible reason."""
+    """A note warns of it, as one model cannot fit all steps."""
     random = np.random.default_rng(5)
     steps = made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 1) + made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 2)
     for step in steps:
@@ -116,7 +116,7 @@ def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
     ],
 )
 def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
-    """Through encoder, friction and firmware loop it is right within 1 %, the delay within 1 ms."""
+    """Despite encoder, friction and firmware loop the errors are below 1 %, the delay's 1 ms."""
     steps = steps_of(*steps_to_and_fro(planted), 0, LEVELS)
     motor = fit_wheel("A", steps, MANUAL).motor
     assert motor.pwm_per_count == pytest.approx(planted.pwm_per_count, rel=TOLERANCE)
@@ -125,7 +125,7 @@ def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
 
 
 def test_other_gains_must_be_told() -> None:
-    """Told, they lead to the same motor; not told, the misfit shows that something is wrong."""
+    """With the true gains the motor is found; with the manual's the misfit shows the mistake."""
     gains = WheelGains(feed_forward=15.0, proportional=40.0, integral=5.0)
     steps = steps_of(*steps_to_and_fro(MotorConstants(), gains), 0, LEVELS)
     told = fit_wheel("A", steps, Gains(15.0, 40.0, 5.0))
@@ -136,7 +136,7 @@ def test_other_gains_must_be_told() -> None:
 
 
 def test_rise_and_overshoot_are_those_of_the_answer() -> None:
-    """A first order has a rise of 2.2 time constants, and no overshoot."""
+    """A first order rises in 2.2 time constants and does not overshoot."""
     traits = fit(FIRST_ORDER, made_up(FIRST_ORDER, (1.0, 0.1, 0.0), 3)).traits()
     rise_s, sigma_s = traits["rise time"]
     assert rise_s == pytest.approx(0.22, abs=5 * sigma_s + 2e-3)
@@ -151,7 +151,7 @@ def test_a_damped_swing_overshoots_as_the_books_say() -> None:
 
 
 def test_lost_deltas_are_left_out() -> None:
-    """The remaining steps are identified by the data received."""
+    """A fifth of the deltas is lost, and the others still determine the motor."""
     commands, wheels = steps_to_and_fro(MotorConstants())
     kept = np.random.default_rng(1).random(len(wheels.stamp_s)) > 0.2
     thinned = replace(
@@ -165,7 +165,7 @@ def test_lost_deltas_are_left_out() -> None:
 
 
 def test_odometry_that_was_lost_is_said() -> None:
-    """Without data there is no fit."""
+    """Five deltas do not make a complete step."""
     commands, wheels = steps_to_and_fro(MotorConstants(), steps=2)
     silent = replace(
         wheels,

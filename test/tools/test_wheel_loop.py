@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The loop that is calculated with, its models, and the gains chosen for it."""
+"""The calculated control loop of a wheel, its models, and the gains chosen for it."""
 
 import numpy as np
 import pytest
@@ -27,9 +27,7 @@ wheel_motors = st.builds(Motor, st.floats(15, 120), st.floats(2, 15), st.floats(
 
 
 def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
-    """The answer of the simulated board's motor and controller, without friction and
-    quantisation.
-    """
+    """Return the simulated board's step response without friction and quantisation."""
     wheel = simulated.Motor(
         simulated.MotorConstants(
             pwm_per_count=motor.pwm_per_count,
@@ -45,7 +43,7 @@ def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
             integral=gains.integral,
         )
     )
-    base, step = 20.0, 10.0  # far from rest, where it sticks
+    base, step = 20.0, 10.0  # far from rest, where friction acts
     wheel.speed = base
     turned, speeds = base, []
     for tick in range(-3000, ticks):
@@ -57,7 +55,7 @@ def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_the_loop_is_the_simulated_boards(delay: int) -> None:
-    """Two independent programs answer a step alike."""
+    """Two independent programs give the same step response."""
     motor = Motor(46.0, 6.0, float(delay))
     assert answer(motor, MANUAL, 100).speed == pytest.approx(
         simulated_answer(motor, MANUAL, 100), abs=1e-6
@@ -65,7 +63,7 @@ def test_the_loop_is_the_simulated_boards(delay: int) -> None:
 
 
 def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
-    """This holds for every tick of the rise."""
+    """A delay of 1.4 ticks is between 1 and 2 at every tick of the rise."""
     sooner, between, later = (
         answer(Motor(46.0, 6.0, delay), MANUAL, 8).speed for delay in (1.0, 1.4, 2.0)
     )
@@ -76,7 +74,7 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
 @settings(max_examples=25)
 @given(wheel_motors, st.floats(0.02, 3.0))
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
-    """The gain from effort to speed, of which Ms is made, is that of a sine fed through."""
+    """The sensitivity at any frequency, from the impulse response, does not exceed Ms."""
     ticks = 4000
     pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks).speed, prepend=0.0)
     z = np.exp(1j * frequency)
@@ -105,7 +103,7 @@ def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: flo
 def test_second_order_deltas_are_mean_values(
     omega: float, damping: float, zero_s: float, delay_s: float
 ) -> None:
-    """The same with any damping and a zero on either side."""
+    """They agree with scipy's response for any damping, with a zero in either half-plane."""
     times_s = np.linspace(0.0, 0.6, 6001)
     system = ([zero_s, 1.0], [1 / omega**2, 2 * damping / omega, 1.0])
     _, response = signal.step(system, T=times_s)
@@ -124,7 +122,7 @@ def _check(turned, parameters, times_s, response, delay_s) -> None:  # type: ign
 
 
 def test_two_equal_poles_are_no_exception() -> None:
-    """A damping of 1 lies between its neighbours."""
+    """The response at a damping of 1 is between those at 0.99 and 1.01."""
     low, mid, high = (
         second_order(np.array([10.0, damping, 0.0, 0.0]), np.array([0.2]))
         for damping in (0.99, 1.0, 1.01)
@@ -133,7 +131,7 @@ def test_two_equal_poles_are_no_exception() -> None:
 
 
 def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
-    """The comparison is at the ends of ticks, as the sum of the ticks."""
+    """At the end of a tick the angle is the sum of the speeds of all ticks."""
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))
     speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5).speed
@@ -143,7 +141,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @settings(max_examples=5)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
-    """For any motor they are robust, hardly overshoot, and follow command and load more closely."""
+    """They keep the limits of Ms and overshoot, and reduce the errors after command and load."""
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)
     assert after.ms <= LARGEST_MS
@@ -157,7 +155,7 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
 
 
 def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
-    """This holds for the motor that they suit least."""
+    """The limits hold even for the motor that these gains suit least."""
     motors = [Motor(46.0, 6.0, 0.0), Motor(35.0, 10.0, 1.0), Motor(60.0, 4.0, 3.0)]
     gains = better_gains(motors)
     for motor in motors:
@@ -167,7 +165,7 @@ def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
 
 
 def test_what_is_predicted_comes_about() -> None:
-    """The gains that are proposed, in the simulated board's controller, do what was said."""
+    """The simulated board's controller with the proposed gains has the predicted response."""
     motor = Motor(46.0, 6.0, 2.0)
     gains = better_gains([motor])
     speeds = np.array(simulated_answer(motor, gains, 200))

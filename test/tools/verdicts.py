@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a report says of a drive made of numbers."""
+"""Look up the findings of a report on a synthetic drive."""
 
 from drives import Drive
 
@@ -9,7 +9,7 @@ from omnibot_driver.tools.report.judge import judge
 
 
 def said(drive: Drive, subject: str, *words: str) -> Finding:
-    """The one finding of this subject that has these words."""
+    """Return the only finding of this subject whose text contains all these words."""
     (found,) = [
         finding
         for finding in judge(drive.log())
@@ -19,5 +19,5 @@ def said(drive: Drive, subject: str, *words: str) -> Finding:
 
 
 def troubles(drive: Drive) -> list[Finding]:
-    """The findings that are worse than a note."""
+    """Return the findings that are worse than a note."""
     return [finding for finding in judge(drive.log()) if finding.level > Level.NOTE]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One wheel of the simulated board, faster than real time: what a calibration would hear."""
+"""Steps of one simulated wheel, faster than real time, as a calibration would record them."""
 
 import math
 import random
@@ -22,7 +22,10 @@ SENT_BEFORE_S = 0.0015
 def steps_to_and_fro(
     motor: MotorConstants, gains: WheelGains | None = None, *, hold_s: float = 1.5, steps: int = 8
 ) -> tuple[Commands, Wheels]:
-    """Wheel A between two speeds, at random moments of the control tick."""
+    """Return the commands to wheel A, which alternates between two speeds, and its measured rates.
+
+    The commands arrive at random moments of the control tick.
+    """
     settings: dict[str, Any] = {} if gains is None else {"wheel_gains": gains}
     board = SimulatedBoard(
         BoardSettings(running=True, frame="wheel_counts", motors=(motor,) * 3, **settings)

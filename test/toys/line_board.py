@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A toy: two serial lines, ASCII, two wheels, no IMU, odometry every 0.4 s. Its whole profile.
+"""The profile and core of a toy board: two serial lines of text, two wheels, without IMU.
 
-``drive`` takes ``v LEFT RIGHT`` in mm/s; ``sense`` says ``d WAY TURN`` in mm and mrad.
+``drive`` takes ``v LEFT RIGHT`` in mm/s; ``sense`` sends ``d WAY TURN`` in mm and mrad every 0.4 s.
 """
 
 import re

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The other half of the toy of two lines: two wheels that follow commands."""
+"""The simulated robot of the toy with two lines."""
 
 import argparse
 
@@ -12,7 +12,7 @@ TICK_S = 0.01
 
 
 class LineRobot:
-    """Two wheels that follow commands; it never stops by itself."""
+    """Two wheels that follow commands; the robot never stops by itself."""
 
     channels, tick_s = CHANNELS, TICK_S
 
@@ -52,7 +52,7 @@ class LineRobot:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """It has none."""
+    """Add no options."""
 
 
 def from_arguments(arguments: argparse.Namespace) -> LineRobot:

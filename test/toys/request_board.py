@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A toy: it answers requests over UDP, and obeys one blocking move at a time. Its whole profile.
+"""The profile and core of a toy board: requests over UDP, and one blocking move at a time.
 
-``WHERE`` → ``at WAY TURN`` in mm and mrad since the last one. ``MOVE V W`` in mm/s and mrad/s → it
-moves for 0.2 s, then ``ok``. ``HALT`` on the port above ends a move at once.
+``WHERE`` → ``at WAY TURN``, in mm and mrad since the last reply. ``MOVE V W`` in mm/s and mrad/s →
+the robot moves for 0.2 s, then ``ok``. ``HALT`` on the next higher port ends a move at once.
 """
 
 import math
@@ -32,7 +32,7 @@ AT = re.compile(rb"at (-?\d+) (-?\d+)")
 
 
 class Moves:
-    """Its actuator: a move at a time, each after the answer to what was asked before."""
+    """The toy's actuator: one move at a time, each after the reply to the request before."""
 
     rate_hz = 20.0
     commanded: BodyTwist | None = BodyTwist(0.0, 0.0, 0.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ports at the far end of a network: served like a terminal, given up when they are gone."""
+"""Ports on a network: used like a serial port, and given up when the peer is gone."""
 
 import contextlib
 import ctypes
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
-    """A port at this server, and the far end."""
+    """Return a port that is connected to this server, and the far end."""
     port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     return port, server.accept()[0]
 
@@ -34,7 +34,7 @@ def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
 def test_a_peer_that_vanished_without_a_word_is_given_up(
     monkeypatch: pytest.MonkeyPatch, said: bytes
 ) -> None:
-    """A half-open connection: nothing is acknowledged, nothing is refused."""
+    """On a half-open connection, nothing is acknowledged and nothing is refused."""
     options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
     monkeypatch.setattr("omnibot_driver.transports.serial_port.PEER_OPTIONS", options)
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -53,7 +53,7 @@ def go_on(action: Callable[[], object]) -> None:
 
 
 def drop_everything(peer: socket.socket) -> None:
-    """Have the kernel throw away what comes in for this socket: a packet filter that says no."""
+    """Let the kernel discard everything that arrives at this socket, with a packet filter."""
     program = ctypes.create_string_buffer(struct.pack("HBBI", 0x06, 0, 0, 0))
     so_attach_filter = 26
     peer.setsockopt(
@@ -62,7 +62,7 @@ def drop_everything(peer: socket.socket) -> None:
 
 
 def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
-    """Once the buffers on both sides are full."""
+    """The error comes when the buffers on both sides are full."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port, far = connected(server)
         with far, closing(port), pytest.raises(LinkError, match="while writing"):
@@ -70,7 +70,7 @@ def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
 
 
 def test_a_board_behind_a_socket_is_served_as_well() -> None:
-    """Any pyserial URL will do: ``socket://host:port`` reads and writes the same bytes."""
+    """Any URL of pyserial can be used; ``socket://host:port`` carries the same bytes."""
     server = socket.create_server(("127.0.0.1", 0))
     port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     far, _ = server.accept()
@@ -89,7 +89,7 @@ def test_a_board_behind_a_socket_is_served_as_well() -> None:
 
 
 def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
-    """pyserial closes only one that it can still shut down."""
+    """pyserial itself closes only a socket that it can still shut down."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         descriptors = len(os.listdir("/proc/self/fd"))
         port, far = connected(server)
@@ -103,7 +103,7 @@ def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
 def test_a_board_behind_rfc2217_is_served_as_well() -> None:
-    """A serial port server on the network, as pyserial's own example has it."""
+    """The server is pyserial's own example of a serial port server."""
     board_side = serial.serial_for_url("loop://", timeout=0.05)
     listener = socket.create_server(("127.0.0.1", 0))
     done = threading.Event()

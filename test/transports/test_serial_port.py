@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One open terminal: refused with advice, exclusively ours, written whole."""
+"""A single serial port: errors with advice, exclusive use, complete writes."""
 
 import fcntl
 import os
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_every_way_a_port_can_refuse_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, error: Exception, advice: str
 ) -> None:
-    """Root is never refused, so the library is made to refuse."""
+    """Root is never refused, so the library is replaced by one that refuses."""
 
     def refuse(*_: object, **__: object) -> None:
         raise error
@@ -64,7 +64,7 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
 
 
 def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
-    """DTR falling would restart a board that is wired to it; here it was set to."""
+    """If DTR fell, a board that is wired to it would restart; the port was set to do so."""
     near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
     attributes = termios.tcgetattr(near)
     attributes[2] |= termios.HUPCL
@@ -77,10 +77,10 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Programs that ask for no lock are kept out as well; a pseudo-terminal stays as it is."""
+    """This keeps out programs that do not use locks, too; a pseudo-terminal is left as it is."""
 
     def exclusive() -> bool:
-        near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)  # as root, one may
+        near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)  # root may open it
         answer = fcntl.ioctl(near, TIOCGEXCL, bytes(4))
         os.close(near)
         return answer != bytes(4)
@@ -96,11 +96,11 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
 
 
 TIOCGEXCL = 0x80045440
-"""Linux's ioctl for whether a terminal is exclusive; the termios module does not have it."""
+"""Linux's ioctl that reads whether a terminal is exclusive; the termios module lacks it."""
 
 
 def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
-    """What waited in the kernel is given up: a board that listens again hears the newest."""
+    """Data that waits in the kernel is discarded, so that the board first receives the newest."""
     port = SerialPort(terminal.path, 115200)
     terminal.fill()
     with pytest.raises(LinkError, match="while writing"):
@@ -110,7 +110,7 @@ def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) 
 
 
 def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
-    """The kernel takes what there is room for, and the rest when somebody reads."""
+    """The kernel takes what it has room for, and the rest as the other end is read."""
     port = SerialPort(terminal.path, 115200)
     message = b"".join(b"%05d" % number for number in range(8000))
     reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))

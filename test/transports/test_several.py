@@ -60,7 +60,7 @@ def lines(ends: Ends) -> Iterator[Several]:
 
 
 def heard(far: int, words: bytes) -> bytes:
-    """All that came, once these words did."""
+    """Return all that has arrived, when it ends with these bytes."""
     came = b""
     while not came.endswith(words):
         came += os.read(far, 4096)
@@ -77,7 +77,7 @@ def next_packets(lines: Several, count: int) -> set[Packet]:
 
 
 def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) -> None:
-    """Both lines are used at once."""
+    """Both lines are used at the same time."""
     os.write(ends.far[0], b"drive")
     os.write(ends.far[1], b"front")
     assert next_packets(lines, 2) == {(0, b"drive"), (1, b"front")}
@@ -92,14 +92,14 @@ def read_on(lines: Several) -> NoReturn:
 
 
 def changed(lines: Several) -> dict[int, str]:
-    """What is missing once the lines have changed."""
+    """Return the missing lines, once the lines have changed."""
     with pytest.raises(LinesChanged):
         read_on(lines)
     return dict(lines.missing)
 
 
 def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Several) -> None:
-    """The stop still reaches the half that is there, and what it says is heard."""
+    """The remaining board still receives the stop, and its data is read."""
     ends.hang_up(0)
     lines.write(((0, b"stop"), (1, b"stop")))
     assert os.read(ends.far[1], 99) == b"stop"
@@ -120,7 +120,7 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 
 
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
-    """A write never waits for it; after a while it is missing, and nothing old is sent to it."""
+    """A write never waits for it; after a while it is missing, and old data is not sent to it."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     poll = select.poll
@@ -143,7 +143,7 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
 def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reader may be busy with something else."""
+    """The reader may be busy, so the write itself must notice it."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -155,7 +155,7 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A guard that held it open would hold its lock too."""
+    """If a guard held it open, its lock would prevent that."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -167,7 +167,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several
 ) -> None:
-    """It follows as soon as the reader makes room."""
+    """It is written as soon as the other end's reader makes room."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     lines.write(((0, b"one"),))
@@ -206,7 +206,7 @@ def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
 
 
 def test_where_none_can_be_opened_none_is_kept() -> None:
-    """The sentence is of the first."""
+    """The error is that of the first line, and no descriptor stays open."""
     before = len(os.listdir("/proc/self/fd"))
     paths = "/dev/no-such", "/dev/no-such-either"
     with pytest.raises(LinkError, match="/dev/no-such does not exist"):
@@ -215,7 +215,7 @@ def test_where_none_can_be_opened_none_is_kept() -> None:
 
 
 def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
-    """A port is exclusive, so it opens once."""
+    """A port is exclusive, so it can be opened only once."""
     with contextlib.closing(Several([partial(SerialPort, ends.paths[0], 115200)] * 2)) as lines:
         assert "in use" in lines.missing[1]
 

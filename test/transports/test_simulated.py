@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board in the driver's own process, as a transport."""
+"""A simulated board in the driver's own process, used as a transport."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ PATIENCE_S = 60.0
 
 @pytest.fixture
 def stack() -> Iterator[ExitStack]:
-    """A stack of contexts that ends with the test."""
+    """Yield a stack of contexts that is closed with the test."""
     with ExitStack() as stack:
         yield stack
 
@@ -55,7 +55,7 @@ def test_a_read_ends_without_a_packet() -> None:
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
-    """Closing a driver does not wait for the next notice of a paused board."""
+    """Otherwise closing a driver would wait for the next notice of a paused board."""
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
     canceller.start()
@@ -78,7 +78,7 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """It keeps what a terminal would of each channel, and the oldest of it."""
+    """As much is kept of each channel as in a terminal, the oldest bytes first."""
     served = InProcessBoard(toy_lines.ToyLines())
     taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]
     assert taken == [1000, 1000, 1000, 1000, UNREAD_LIMIT - 4000, 0]
@@ -89,7 +89,7 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
-    """It keeps as many as a socket would, apart from each other, an empty one too."""
+    """As many are kept as in a socket, each by itself, an empty one too."""
     served = InProcessBoard(ToyServer())
     taken = [served._send(0, data) for data in [b"", *[b"ok 1"] * UNREAD_DATAGRAMS]]
     assert taken == [0, *[4] * (UNREAD_DATAGRAMS - 1), 0]
@@ -97,7 +97,7 @@ def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
 
 
 def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> None:
-    """What came on another channel in between is not joined."""
+    """Bytes of one channel are not joined with those of another that came in between."""
     transport = stack.enter_context(closing(SimulatedTransport("sim://", TOY)))
     transport.write([(toy_lines.FRONT, b"angle 30\n"), (toy_lines.DRIVE, b"go 0.5 0\n")])
     assert b"30" in read(transport, 200, toy_lines.FRONT)
@@ -115,7 +115,7 @@ def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> 
     ],
 )
 def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -> None:
-    """The sentence names the command line that lists them."""
+    """The message names the command that lists the options."""
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, TOY)
     assert f"port '{url}' is not valid: " in str(refusal.value)
@@ -124,7 +124,7 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is raised with its cause, and not taken for a lost cable; the board still closes."""
+    """It is raised with its cause, and not taken for a lost cable; the board can be closed."""
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:
         raise ZeroDivisionError

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Datagrams on the loopback: a packet each way is one datagram of its channel."""
+"""Datagrams on the loopback: each packet is one datagram of its channel, in both directions."""
 
 import contextlib
 import os
@@ -21,7 +21,7 @@ PATIENCE_S = 60.0
 
 
 class Host:
-    """A host with two ports, one above the other."""
+    """A host with two ports with consecutive numbers."""
 
     def __init__(self) -> None:
         while True:
@@ -81,7 +81,7 @@ def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPort
 
 
 def test_what_comes_from_another_address_is_not_heard(host: Host, transport: UdpPorts) -> None:
-    """Anybody on the network can send to a port."""
+    """Anybody on the network could send to the port."""
     transport.write(((0, b"hello"),))
     _, driver = host.ports[0].recvfrom(99)
     with socket.socket(type=socket.SOCK_DGRAM) as stranger:
@@ -94,7 +94,7 @@ def test_what_comes_from_another_address_is_not_heard(host: Host, transport: Udp
 def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_back(
     host: Host, transport: UdpPorts
 ) -> None:
-    """An error of the datagram before does not keep this one from being sent."""
+    """The pending error of an earlier datagram must not prevent the next one from being sent."""
     address = host.ports[0].getsockname()
     host.ports[0].close()
     transport.write(((0, b"hello"), (1, b"halt")))
@@ -143,7 +143,7 @@ def test_a_url_that_means_no_place_is_refused(url: str) -> None:
 
 @pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="no IPv6 here")
 def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
-    """IPv6 stands in brackets; the second channel is one port higher."""
+    """IPv6 addresses are in brackets; the second channel is one port higher."""
     lost = pytest.raises(LinkError, match=re.escape("lost udp://[::1]:5001: "))
     with contextlib.closing(UdpPorts("udp://[::1]:5000", 2)) as transport, lost:
         transport.write(((1, bytes(100_000)),))
@@ -151,7 +151,7 @@ def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
 
 @pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])
 def test_a_host_that_is_not_known_is_refused(name: str) -> None:
-    """The resolver's error does not matter; no descriptor stays open."""
+    """This holds for any error of the resolver; no descriptor stays open."""
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(LinkError, match="check the parameter `port`"):
         UdpPorts(f"udp://{name}:5000", 2)

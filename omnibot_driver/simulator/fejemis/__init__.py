@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two Teensys of the Fejemis sweeping robot in software, from their manual and public hosts.
+"""The two simulated Teensys of the Fejemis sweeping robot, after their manual and public hosts.
 
-Shares no code with the driver: a misread manual must not cancel out. ``SimulatedFejemis`` is pure.
+Shares no code with the driver, so that a misread manual does not cancel out. ``SimulatedFejemis``
+is pure.
 """
 
 from omnibot_driver.simulator.fejemis.board import CHANNELS, SimulatedFejemis

@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pair of Teensys and their robot: what both ports receive and send, a millisecond at a time.
+"""The pair of Teensys and their robot: bytes in and out of both ports, in steps of a millisecond.
 
 Pure: bytes in, ticks of ``tick_s``, bytes out; the same settings and input give the same output.
-Knows which half is at which port, and when what befalls them. Must not know commands.
+Knows which half is at which port, and when a fault occurs. Must not know commands.
 
-Where the manual is silent: no ``rc`` ever ends by itself; a Teensy that restarts lets its motors go
-and forgets its subscriptions; the front wheel stays where it is until an ``rc`` comes.
+Assumptions where the manual says nothing: an ``rc`` never expires; a Teensy that restarts lets its
+motors run out and forgets its subscriptions; the front wheel stays where it is until an ``rc``
+comes.
 """
 
 from collections.abc import Mapping
@@ -24,7 +25,10 @@ STEPS_PER_TICK = 2
 
 
 class SimulatedFejemis:
-    """``drive``, ``front``: the two Teensys; ``vehicle``: the robot; ``tick``: how many passed."""
+    """A simulated Fejemis with the common interface of simulated boards.
+
+    drive, front: the two Teensys. vehicle: the robot. tick: number of ticks since construction.
+    """
 
     channels = CHANNELS
     tick_s = STEP_S * STEPS_PER_TICK
@@ -43,33 +47,36 @@ class SimulatedFejemis:
 
     @property
     def now_s(self) -> float:
-        """Since construction."""
+        """Simulated time since construction, in s."""
         return self._steps * STEP_S
 
     @property
     def truth(self) -> TrueState:
-        """Where the robot is."""
+        """True pose and motion of the robot."""
         return self.vehicle.truth
 
     @property
     def standing(self) -> bool:
-        """Whether both driving wheels truly stand."""
+        """Whether both driving wheels are truly at rest."""
         return self.vehicle.standing
 
     def half(self, name: str) -> DriveTeensy | FrontTeensy:
-        """``drive`` or ``front``."""
+        """Return the Teensy that is named ``drive`` or ``front``."""
         return self.drive if name == "drive" else self.front
 
     def befall(self, half: str, what: str) -> None:
-        """One of ``faults.FAULTS`` or ``SENSOR_FAULTS``, now. Raises KeyError."""
+        """Apply a fault to a half now: one of ``FAULTS``, or for ``front`` of ``SENSOR_FAULTS``.
+
+        Raises KeyError for an unknown fault.
+        """
         allowed(half)[what](self.half(half))
 
     def receive(self, data: bytes, now: float = 0.0, channel: int = 0) -> None:
-        """Take bytes off one of the two ports."""
+        """Receive bytes at one of the two ports."""
         self._at_port[channel].receive(data)
 
     def advance(self) -> list[Packet]:
-        """Let one tick pass; what left at the ports in it."""
+        """Let one tick pass and return what was sent at each port in it."""
         self.tick += 1
         sent: list[bytes] = [b"", b""]
         for _ in range(STEPS_PER_TICK):
@@ -87,7 +94,7 @@ class SimulatedFejemis:
         return [(channel, data) for channel, data in enumerate(sent) if data]
 
     def reboot(self) -> None:
-        """A power cycle of both; the robot stays where it is."""
+        """Cycle the power of both Teensys; the robot stays where it is."""
         for half in (self.drive, self.front):
             half.powered = True
             half.reboot()
@@ -95,7 +102,7 @@ class SimulatedFejemis:
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """Of the robot and its boards."""
+        """Facts about the robot and its boards, by name."""
         truth, drive, front, vehicle = self.truth, self.drive, self.front, self.vehicle
         return {
             "x_m": truth.x_m,

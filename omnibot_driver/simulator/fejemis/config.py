@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What each Teensy keeps in its configuration memory, as values, with the factory's settings."""
+"""Contents of the configuration memory of each Teensy, with the factory values."""
 
 from dataclasses import dataclass
 
@@ -9,15 +9,19 @@ Vector = tuple[float, float, float]
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
-"""use, Kp, useI, taui, ilimit, 1, useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp, useULim,
-Ulim: the manual's P-Lead controller, with tp = alpha * tau_d."""
+"""Factory parameters of the steering controller, in the order use, Kp, useI, taui, ilimit, 1,
+useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp, useULim, Ulim: the manual's P-Lead controller,
+with tp = alpha * tau_d."""
 
 WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveConfig:
-    """wheel_base_m is of odometry; confs_m are B and F of the turning control."""
+    """Configuration of the drive Teensy.
+
+    wheel_base_m: wheelbase for odometry. confs_m: B and F of the turning control.
+    """
 
     number: int
     name: str = "drive"
@@ -35,7 +39,11 @@ class DriveConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrontConfig:
-    """ir: A1, B1, A2, B2, the readings at 13 and 50 cm; steering: as ``cpsteer`` has it."""
+    """Configuration of the front Teensy.
+
+    confs_m: wheelbase and steer base. ir: A1, B1, A2, B2, the readings of the two infrared sensors
+    at 13 cm (A) and 50 cm (B). steering: parameters in the order of ``cpsteer``.
+    """
 
     number: int
     name: str = "front"

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the drive Teensy's two distance sensors see of a wall across the x axis.
+"""The two distance sensors of the drive Teensy, which face a wall across the x axis.
 
-Time of flight measures always, the sonar when it is triggered. Knows the robot's place alone.
+Time of flight measures always, the sonar only when it is triggered. Knows the pose of the robot
+alone.
 """
 
 from math import cos
@@ -15,20 +16,23 @@ SONAR_FAR_M = 4.0
 
 
 class Distances:
-    """sonar_m: as it was measured last, 0 where it saw nothing."""
+    """The two distance sensors.
+
+    sonar_m: the last measurement of the sonar, 0 if it saw nothing.
+    """
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
         self._settings, self._vehicle = settings, vehicle
         self.trigger()
 
     def trigger(self) -> None:
-        """The sonar measures."""
+        """Measure with the sonar."""
         distance_m = max(0.0, self._wall_m())
         self.sonar_m = distance_m if distance_m < SONAR_FAR_M else 0.0
 
     @property
     def tof_m(self) -> float:
-        """The range of the sensor where it sees nothing."""
+        """Distance by time of flight, in m; the range of the sensor if it sees nothing."""
         return min(TOF_FAR_M, max(0.0, self._wall_m()))
 
     def _wall_m(self) -> float:

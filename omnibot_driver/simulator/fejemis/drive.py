@@ -2,8 +2,8 @@
 
 """The drive Teensy: turning control of two wheels, odometry, IMU, battery, distance sensors.
 
-Knows the drive half of the manual and the robot. Must not know the front Teensy: the angle of its
-wheel comes by the line, or not at all.
+Knows the drive half of the manual and the robot. Must not know the front Teensy: the angle of the
+front wheel arrives by a command, or not at all.
 """
 
 from collections.abc import Callable
@@ -23,9 +23,11 @@ STOPPED, FREE = -1, 10
 
 
 class DriveTeensy(Teensy[DriveConfig]):
-    """source: rcSource of the heartbeat. reference: v in m/s and w in rad/s of the last ``rc``.
+    """The simulated drive Teensy.
 
-    told_angle_deg: of the front wheel. off_at_s: when the power is cut.
+    source: rcSource of the heartbeat, -1 while stopped. reference: v in m/s and w in rad/s of the
+    last ``rc``. told_angle_deg: angle of the front wheel by the last ``fwl``. off_at_s: when the
+    power is cut, or None.
     """
 
     version = 110
@@ -52,7 +54,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         )
 
     def boot(self) -> None:
-        """Nothing is driven, and the pose is zero."""
+        """Clear reference, wheel speeds and pose; restart the sensors."""
         self.source = FREE
         self.reference = (0.0, 0.0)
         self.told_angle_deg = 0.0
@@ -64,13 +66,13 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.imu.boot(self.config)
 
     def started(self) -> None:
-        """What the wheels did meanwhile is not counted."""
+        """Reset the pose, so that turns of the wheels during the boot are not counted."""
         self._reset_pose()
 
     # Each cycle
 
     def cycle(self) -> None:
-        """Encoders, odometry, turning control."""
+        """Run one cycle: power, odometry, IMU, turning control."""
         self.vehicle.powered = True
         if self.off_at_s is not None and self._told_s >= self.off_at_s:
             self.powered = self.vehicle.powered = False
@@ -97,7 +99,7 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     @property
     def ticks(self) -> tuple[int, int]:
-        """Of both encoders, since it booted."""
+        """Ticks of the left and the right encoder since the boot or the last ``enc0``."""
         left, right = self._raw_ticks()
         return left - self._ticks_at_boot[0], right - self._ticks_at_boot[1]
 
@@ -121,7 +123,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """As its help lists them."""
+        """Return the function that writes the line of each item that the help lists, by key."""
         return super().items() | {
             "hbt": self._heartbeat,
             "adc": lambda: f"adc {self.settings.volts * 100:.0f} 2050 812 790 0",
@@ -176,7 +178,10 @@ class DriveTeensy(Teensy[DriveConfig]):
         return "mago " + " ".join(f"{x:.4f}" for x in (*config.mag_offset_ut, *config.mag_matrix))
 
     def velocity(self) -> tuple[float, float]:
-        """Left and right in m/s, by the time from one tick of an encoder to the next."""
+        """Return the speed of the left and the right wheel in m/s.
+
+        It is not quantised, because the firmware measures the time between two ticks of an encoder.
+        """
         (left, right), (left_m, right_m) = self.vehicle.radps, self.config.radii_m
         return left * left_m, right * right_m
 
@@ -201,7 +206,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """As its help lists them."""
+        """Return the function that executes each command that the help lists."""
         return super().commands_table() | {
             "rc": self._remote_control,
             "fwl": self._front_wheel,
@@ -279,10 +284,10 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     @property
     def turn_dps(self) -> float:
-        """Of the last ``rc``, as it was said."""
+        """Turn rate of the last ``rc``, in deg/s."""
         return degrees(self.reference[1])
 
 
 def _padded(rest: str, count: int) -> list[float]:
-    """``count`` numbers; what is missing is zero, as with ``strtof``."""
+    """Return ``count`` numbers; missing ones are zero, as with ``strtof``."""
     return (wire.numbers(rest) + [0.0] * count)[:count]

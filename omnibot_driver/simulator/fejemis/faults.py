@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What can befall one of the two Teensys, by name, at any time.
+"""Faults that can occur in one of the two Teensys at any time, by name.
 
-Knows what each name means. Must not know when it happens.
+Knows what each name means. Must not know when a fault occurs.
 """
 
 from collections.abc import Callable
@@ -35,8 +35,9 @@ FAULTS: dict[str, Callable[[Half], None]] = {
     "sums-begin": _set(sums=True),
     "sums-end": _set(sums=False),
 }
-"""Of either half. silent: sends nothing, and obeys; hung: neither; unplugged: nothing passes its
-cable; well: none of these."""
+"""Faults of either half. silent: it obeys, but sends nothing; hung: it does neither; unplugged:
+nothing passes its cable; well: ends these three; sums-begin, sums-end: whether its lines carry
+checksums."""
 
 SENSOR_FAULTS: dict[str, Callable[[Half], None]] = {
     "sensor-well": _set(diagnosis=HEALTHY, error_flags=0, frozen=False, absent=False),
@@ -55,9 +56,9 @@ SENSOR_FAULTS: dict[str, Callable[[Half], None]] = {
     "loops-unfinished": _diagnosis(1 << 1),
     "supply-5v": _diagnosis(1 << 0),
 }
-"""Of the front half alone: its angle sensor."""
+"""Faults of the angle sensor, for the front half alone."""
 
 
 def allowed(half: str) -> dict[str, Callable[[Half], None]]:
-    """By name, for ``drive`` or ``front``."""
+    """Return the faults of ``drive`` or ``front``, by name."""
     return FAULTS | SENSOR_FAULTS if half == "front" else FAULTS

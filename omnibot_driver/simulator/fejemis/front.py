@@ -26,11 +26,14 @@ LED_DEFAULT = (0, 20, 0)
 
 
 class FrontTeensy(Teensy[FrontConfig]):
-    """wanted_deg: of the steered wheel, None before the first ``rc``. leds: RGB of each.
+    """The simulated front Teensy.
 
-    What befalls the angle sensor is set from outside. diagnosis: its bits without the frame
-    counter; error_flags: beside them. frozen: it repeats its last angle. absent: it reads zero, and
-    no magneto core loop finishes.
+    wanted_deg: target angle of the steered wheel, None before the first ``rc``. leds: RGB of each
+    LED.
+
+    Faults of the angle sensor are set from outside. diagnosis: its diagnosis bits without the frame
+    counter; error_flags: its error flags. frozen: it repeats its last angle. absent: it reads zero,
+    and its diagnosis says that the magneto core loops have not finished.
     """
 
     version = 100
@@ -53,7 +56,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         )
 
     def boot(self) -> None:
-        """The wheel stays where it is; brush and lift are off."""
+        """Reset the state; the wheel stays where it is, brush and lift are off."""
         self.wanted_deg: float | None = None
         self._error_deg = self._lead_deg = 0.0
         self.vehicle.servo.command = 0.0
@@ -70,7 +73,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # Each cycle
 
     def cycle(self) -> None:
-        """Sense the angle, steer, end what was to last for a time."""
+        """Measure the angle, stop the lift when its time is over, and steer."""
         self._measured_deg = self._measure()
         if self.hung:
             return
@@ -88,7 +91,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         return -seen_deg if self.config.angle_inverted else seen_deg
 
     def _steer(self) -> None:
-        """The P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
+        """Set the servo by the P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
         servo, gains = self.vehicle.servo, self.config.steering
         if self._servo_raw is not None:
             servo.command = self._servo_raw
@@ -110,7 +113,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """As its help lists them."""
+        """Return the function that writes the line of each item that the help lists, by key."""
         return super().items() | {
             "hbt": lambda: (
                 f"hbt {self.clock_text(4)} {self.config.number} {self.version} 0.00 1 0.011"
@@ -168,7 +171,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """As its help lists them."""
+        """Return the function that executes each command that the help lists."""
         return super().commands_table() | {
             "brush": self._set_brush,
             "ledb": self._set_band,
@@ -195,7 +198,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         }
 
     def _remote_control(self, rest: str) -> None:
-        """``theta = atan2(S w, v)``, within ±90°."""
+        """Set the target angle ``theta = atan2(S w, v)``, limited to ±90°."""
         _, v, turn_dps = _padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)
         if v < 0.0 and self.firmware.reverse == "mirrored":
@@ -253,7 +256,7 @@ class FrontTeensy(Teensy[FrontConfig]):
 
 
 def _padded(rest: str, count: int) -> list[float]:
-    """``count`` numbers; what is missing is zero, as with ``strtof``."""
+    """Return ``count`` numbers; missing ones are zero, as with ``strtof``."""
     return (wire.numbers(rest) + [0.0] * count)[:count]
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the two Teensys answer to ``help``, as the manual prints it."""
+"""Replies of the two Teensys to ``help``, as the manual prints them."""
 
 DRIVE_HELP = "\n".join(
     (

@@ -2,7 +2,7 @@
 
 """The IMU on the drive Teensy: gyro, accelerometer, magnetometer, orientation, calibration.
 
-Knows how the body truly moves. Must not know lines.
+Knows the true motion of the body. Must not know the lines of the protocol.
 """
 
 from collections.abc import Iterator
@@ -16,12 +16,16 @@ from omnibot_driver.simulator.fejemis.vehicle import Vehicle
 
 GRAVITY_MPS2 = 9.80665
 EARTH_UT = (17.0, 0.0, -47.0)
-"""Of the magnetic field: north is along x, and most of it points down."""
+"""Magnetic field of the earth in µT: north is along x, and most of it points down."""
 CALIBRATION_S = 1.0
 
 
 class Imu:
-    """``calibrated``: what a calibration has just found, for the configuration."""
+    """The simulated IMU.
+
+    orientation: roll, pitch and yaw in rad. calibrated: the result of a calibration that has just
+    ended, for the configuration; otherwise None.
+    """
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
         self._settings, self._vehicle = settings, vehicle
@@ -33,13 +37,13 @@ class Imu:
         self._cycles = 0
 
     def boot(self, config: DriveConfig) -> None:
-        """Its orientation begins anew."""
+        """Reset the orientation and give up a calibration in progress."""
         self.orientation = (0.0, 0.0, 0.0)
         self._kind, self._samples = "", []
         self._offset_dps = config.gyro_offset_dps
 
     def cycle(self, step_s: float) -> None:
-        """Integrate the yaw; go on with a calibration."""
+        """Integrate the yaw, and continue a calibration in progress."""
         truth = self._vehicle.truth
         bias_dps = self._settings.gyro_bias_dps[2] - self._offset_dps[2]
         roll, pitch, yaw = self.orientation
@@ -49,11 +53,11 @@ class Imu:
             self._calibrate(step_s)
 
     def calibrate_gyro(self) -> None:
-        """Begin to average, whether or not the robot stands."""
+        """Begin to average the gyro for 1 s, even if the robot moves."""
         self._kind, self._left_s, self._samples = "gyro", CALIBRATION_S, []
 
     def calibrate_accelerometer(self) -> None:
-        """The same, taking the board to be level."""
+        """Begin to average the accelerometer for 1 s, with the board assumed to be level."""
         self._kind, self._left_s, self._samples = "accel", CALIBRATION_S, []
 
     def _calibrate(self, step_s: float) -> None:
@@ -70,12 +74,12 @@ class Imu:
         self._kind = ""
 
     def gyro(self, config: DriveConfig) -> Iterator[float]:
-        """Degrees per second."""
+        """Return the turn rates in deg/s, less the configured offsets."""
         self._offset_dps = config.gyro_offset_dps
         return _minus(self._raw_gyro(), config.gyro_offset_dps)
 
     def accel(self, config: DriveConfig) -> Iterator[float]:
-        """Specific force in m/s²."""
+        """Return the specific force in m/s², calibrated."""
         raw, offset = self._raw_accel(), config.accel_offset_mps2
         return (
             (axis - off) * scale
@@ -83,13 +87,13 @@ class Imu:
         )
 
     def mag_raw(self) -> Vector:
-        """Microtesla, in the axes of the board."""
+        """Return the magnetic field in µT, uncalibrated, in the axes of the board."""
         yaw = self._vehicle.truth.yaw_rad
         north, _, up = EARTH_UT
         return (north * cos(yaw), -north * sin(yaw), up)
 
     def mag(self, config: DriveConfig) -> Iterator[float]:
-        """The same, calibrated."""
+        """Return the magnetic field in µT, calibrated."""
         shifted = list(_minus(self.mag_raw(), config.mag_offset_ut))
         rows = [config.mag_matrix[at : at + 3] for at in (0, 3, 6)]
         return (sum(a * b for a, b in zip(row, shifted, strict=True)) for row in rows)

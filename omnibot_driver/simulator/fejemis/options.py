@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user may choose about a simulated Fejemis, besides its seed and the faults of its lines.
+"""Command line options of a simulated Fejemis, besides its seed and the faults of its lines.
 
-Knows words and their meaning. Must not know what runs the boards.
+Knows the names, values and effects of options. Must not know what runs the boards.
 """
 
 import argparse
@@ -24,7 +24,7 @@ _SWITCHES = (
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Let the parser know them all."""
+    """Add all options to the parser."""
     parser.add_argument(
         "--sums",
         choices=("on", "off"),
@@ -86,7 +86,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def from_arguments(arguments: argparse.Namespace) -> SimulatedFejemis:
-    """The pair that was chosen."""
+    """Return the pair of boards that the parsed options describe."""
     names = [name.replace("-", "_") for name, _ in _SWITCHES]
     return SimulatedFejemis(
         FejemisSettings(

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the simulated pair of Teensys and its robot are like: sizes, firmware, planted errors.
+"""Settings of the simulated pair of Teensys and its robot: sizes, firmware, planted errors.
 
-``Firmware`` are the ways in which the manual, the public hosts and sibling firmware differ, one
-switch each, and what the manual does not say.
+``Firmware`` has one switch for each difference between the manual, the public hosts and related
+firmware, and for what the manual leaves open.
 """
 
 from dataclasses import dataclass, field
@@ -12,23 +12,28 @@ from typing import Literal
 
 Reverse = Literal["mirrored", "clamped"]
 WHEEL_BASE_M = 0.40
-"""From one driving wheel to the other: the manual's B."""
+"""Distance between the driving wheels in m: the manual's B."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Firmware:
-    """sums: lines carry ``;NN`` and are checked, as with the public hosts; without, as in the
-        manual, a line that begins with ``;`` is an unknown command.
-    reverse: what becomes of an angle beyond 90° for a negative speed. mirrored: the wheel takes the
-        angle of the same curve; clamped: it stays at 90°.
-    timed_velocity: ``vel`` has the time first. acceleration_in_g: ``acc`` is in g, not m/s².
-    tilt: ``pose`` has a fifth number. carriage_return: lines end ``\\r\\n``.
-    start_resumes: after ``start`` the last ``rc`` holds again, as if there had been no ``stop``.
-    confirms: a command behind ``!`` is confirmed, as in newer siblings.
-    shows_source: the heartbeat of drive has the source of the last ``rc``; otherwise 10 or -1 only.
+    """Variant of the firmware, one switch for each difference.
+
+    sums: lines carry the checksum ``;NN`` and are checked, as with the public hosts. Without, as in
+        the manual, a line that begins with ``;`` is an unknown command.
+    reverse: what becomes of a wheel angle beyond 90° at a negative speed. mirrored: the wheel takes
+        the angle of the same curve; clamped: it stays at 90°.
+    timed_velocity: ``vel`` has the time first.
+    acceleration_in_g: ``acc`` is in g, not m/s².
+    tilt: ``pose`` has a fifth number.
+    carriage_return: lines end with ``\\r\\n``.
+    start_resumes: after ``start`` the last ``rc`` is in effect again, also one sent while stopped.
+    confirms: a command behind ``!`` is confirmed, as in newer related firmware.
+    shows_source: the heartbeat of the drive Teensy has the source of the last ``rc``; otherwise
+        only 10 or -1.
     single_precision: times are float32, so after an hour they have steps of 0.2 ms.
-    exact_words: a command without numbers is known only if its line has nothing else, not even a
-        space, as a sibling compares ``stop``.
+    exact_words: a command without numbers is recognised only if its line has nothing else, not even
+        a space, as related firmware compares ``stop``.
     """
 
     sums: bool = True
@@ -46,7 +51,7 @@ class Firmware:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """``what`` befalls ``half`` at ``at_s`` since construction; see ``faults.FAULTS``."""
+    """The fault ``what`` of ``half``, ``at_s`` after construction; see ``faults.FAULTS``."""
 
     at_s: float
     half: str
@@ -55,18 +60,20 @@ class Fault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FejemisSettings:
-    """The pair, its robot, and where it is.
+    """Settings of the pair of Teensys, its robot and its surroundings.
 
-    wheel_radius_scale, track_scale: true over what the board is configured to. slip: standard
-    deviation in m of the way of a wheel after 1 m. motor_lag_s: of the speed of a driving wheel.
-    steer_base_m: from the axle to the steered wheel, the manual's S, F or f. servo_degps: of the
-    servo at its full velocity value 1000, so that the manual's controller crosses over at
-    12 rad/s; servo_lag_s: of that velocity. sensor_zero_deg: what the angle sensor is off by,
-    beside its configuration. gyro_bias_dps, accel_bias_mps2: what calibration is to find.
-    clock_ppm: of the two crystals. uptime_s: since when the boards run; their first boot is over.
-    swapped: drive is at the second port. ids: what they call themselves. lose_inbound:
-    chance for each byte to a board to be lost. front_m: from the start to a wall in front. faults:
-    in any order.
+    wheel_radius_scale, track_scale: true value divided by the configured one. slip: standard
+    deviation in m of the distance of a wheel after 1 m. motor_lag_s: time constant of the speed of
+    a driving wheel. steer_base_m: distance from the axle to the steered wheel, the manual's S, F or
+    f. servo_degps: speed of the servo at its full velocity value 1000, chosen so that the manual's
+    controller crosses over at 12 rad/s; servo_lag_s: time constant of that speed. sensor_zero_deg:
+    zero offset of the angle sensor, which the factory configuration corrects. angle_noise_deg,
+    gyro_noise_dps, accel_noise_mps2: standard deviations. gyro_bias_dps, accel_bias_mps2: biases
+    that a calibration is to find. clock_ppm: errors of the two crystals, drive first. boot_s:
+    duration of a boot. uptime_s: how long the boards have run at construction; beyond boot_s their
+    first boot is over. swapped: the drive Teensy is at the second port. ids: the numbers in their
+    heartbeats, drive first. lose_inbound: probability that a byte to a board is lost. front_m:
+    distance from the start to a wall in front. faults: in any order.
     """
 
     firmware: Firmware = field(default_factory=Firmware)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What both Teensys share: lines in and out, clock, subscriptions, identity, configuration memory.
+"""The common part of both Teensys: lines, clock, subscriptions, identity, configuration memory.
 
-A control cycle takes a millisecond of the Teensy's own crystal. Knows the manual's software
-structure. Must not know what either Teensy measures or moves.
+A control cycle takes a millisecond of the Teensy's own crystal. Knows the software structure of the
+manual. Must not know what either Teensy measures or moves.
 """
 
 import struct
@@ -40,11 +40,13 @@ class Obeyed:
 
 
 class Teensy(Generic[C]):
-    """One of the two. ``commands``: what it executed, newest last. ``received``: all its bytes.
+    """The common part of the drive and the front Teensy.
 
-    What befalls it is set from outside, at any time. sums: whether its firmware has them. silent:
-    it sends nothing, and obeys. hung: neither sends nor obeys; whatever was driven goes on.
-    unplugged: its cable is out, and it goes on. powered: False once the power is cut.
+    commands: the lines that it executed, newest last. received: all bytes that reached it.
+
+    Faults are set from outside, at any time. sums: whether lines carry checksums. silent: it obeys,
+    but sends nothing. hung: it neither obeys nor sends, and its last control outputs stay in
+    effect. unplugged: its cable is out, and it keeps running. powered: False once the power is cut.
     """
 
     version = 0
@@ -58,14 +60,14 @@ class Teensy(Generic[C]):
         self.commands: deque[Obeyed] = deque(maxlen=100_000)
         self.received = bytearray()
         self.unhandled = 0
-        """Lines that it did not know."""
+        """Number of lines that it did not recognise."""
         self.inbound = FaultyLine(
             LineFaults(lose=settings.lose_inbound), f"fejemis inbound {settings.seed} {place}"
         )
         self._rate = 1.0 + settings.clock_ppm[place] * 1e-6
         self._factory: C = config
         self.saved: C = config
-        """What is in the configuration memory."""
+        """Contents of the configuration memory."""
         self._reader = wire.LineReader()
         self._arrived: list[str] = []
         self._out = bytearray()
@@ -75,17 +77,20 @@ class Teensy(Generic[C]):
         self.config: C = config
         self._restart(settings.uptime_s)
 
-    # What a kind of Teensy has
+    # What each kind of Teensy extends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """By the key of a subscription: what sends it."""
+        """Return the function that writes the line of each item, by the key of its subscription."""
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
             "id": lambda: f"id {self.config.name} {self.config.number}",
         }
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """By its first word: what executes a command, given the rest of its line."""
+        """Return the function that executes each command, by the first word of the line.
+
+        It is called with the rest of the line.
+        """
         return {
             "sub": self._subscribe,
             "leave": lambda _: self._leave(),
@@ -97,30 +102,30 @@ class Teensy(Generic[C]):
         }
 
     def boot(self) -> None:
-        """Power comes back to it."""
+        """Reset the state, as after power-up."""
 
     def started(self) -> None:
-        """The boot is over."""
+        """Do what is due when the boot is over."""
 
     def cycle(self) -> None:
-        """One control cycle."""
+        """Run one control cycle."""
 
     # Time
 
     @property
     def clock_s(self) -> float:
-        """By its own crystal, since it booted."""
+        """Time since the boot in s, by its own crystal."""
         return self._clock_s
 
     def clock_text(self, digits: int) -> str:
-        """As it is printed."""
+        """Return the clock as lines show it, with ``digits`` decimals."""
         time_s = self._clock_s
         if self.firmware.single_precision:
             (time_s,) = struct.unpack("f", struct.pack("f", time_s))
         return f"{time_s:.{digits}f}"
 
     def reboot(self) -> None:
-        """Its power goes and comes; what was not saved is lost."""
+        """Cycle its power; configuration that was not saved is lost."""
         self._restart(0.0)
 
     def _restart(self, uptime_s: float) -> None:
@@ -138,7 +143,7 @@ class Teensy(Generic[C]):
     # Bytes
 
     def receive(self, data: bytes) -> None:
-        """Take bytes off the cable."""
+        """Receive bytes from the cable."""
         if self.unplugged or not self.powered:
             return
         data = self.inbound.carry(data)
@@ -147,7 +152,7 @@ class Teensy(Generic[C]):
             self._arrived += self._reader.feed(data)
 
     def step(self, now_s: float) -> bytes:
-        """Let a millisecond pass, which ends at ``now_s``; what left over the cable in it."""
+        """Let a millisecond pass, up to ``now_s``; return the bytes sent over the cable."""
         if not self.powered:
             return b""
         self._told_s = now_s
@@ -209,7 +214,7 @@ class Teensy(Generic[C]):
             self.commands.append(Obeyed(self._told_s, body))
             self.say(self._items[word[:-1]]())
             return
-        for name, execute in self._commands.items():  # as strncmp finds them, the longest first
+        for name, execute in self._commands.items():  # as by strncmp, the longest name first
             if body.startswith(name) and not (self._is_exact(name) and body != name):
                 self.commands.append(Obeyed(self._told_s, body))
                 execute(body[len(name) :])
@@ -237,7 +242,7 @@ class Teensy(Generic[C]):
 
     @property
     def subscriptions(self) -> dict[str, int]:
-        """Periods in ms, by key."""
+        """Period of each subscription in ms, by key."""
         return {key: self._periods_ms[key] for key in self._due_ms}
 
     def _leave(self) -> None:

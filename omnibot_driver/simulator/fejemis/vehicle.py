@@ -2,7 +2,7 @@
 
 """The robot that the two Teensys move: driving wheels, the steered wheel's servo, lift, brush.
 
-Knows speeds and angles, and where they bring the body. Must not know the boards or their lines.
+Knows speeds and angles, and the pose that results. Must not know the boards or their lines.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ STANDS_MPS = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class TrueState:
-    """Where the robot truly is and how it moves: m, rad (unwrapped), m/s, rad/s."""
+    """True pose and motion of the robot: m, rad (unwrapped), m/s, rad/s."""
 
     x_m: float
     y_m: float
@@ -30,9 +30,9 @@ class TrueState:
 
 
 class Servo:
-    """The steering servo, an integrator with a lag; it takes a new velocity value every 25 ms.
+    """The steering servo: an integrator with a lag, which takes a new velocity value every 25 ms.
 
-    command: -1000 to 1000. angle_deg: of the wheel, positive to the left.
+    command: velocity value, -1000 to 1000. angle_deg: angle of the wheel, positive to the left.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -44,7 +44,7 @@ class Servo:
         self._lag_s = settings.servo_lag_s
 
     def advance(self, step_s: float) -> None:
-        """Let a step pass."""
+        """Let ``step_s`` seconds pass."""
         self._since_s += step_s
         if self._since_s >= SERVO_PERIOD_S - 1e-9:
             self._since_s = 0.0
@@ -59,24 +59,26 @@ class Servo:
 
 
 class Lift:
-    """The linear actuator; ``height`` is 0 at its lower end and 1 at its upper one."""
+    """The linear actuator; ``height`` is 0 at its lower end and 1 at its upper end."""
 
     def __init__(self) -> None:
         self.volts = 0.0
         self.height = 0.0
 
     def advance(self, step_s: float) -> None:
-        """Let a step pass."""
+        """Let ``step_s`` seconds pass."""
         if self.volts:
             moved = self.height + self.volts / 6.0 * step_s / LIFT_SECONDS_AT_6_V
             self.height = max(0.0, min(1.0, moved))
 
 
 class Vehicle:
-    """``truth``: where it is. ``turns``: of the left and the right wheel since construction.
+    """The robot with its true state.
 
-    wanted_radps: speeds of the two wheels that their controllers aim at. powered: whether they do;
-    without power the wheels run out. held: wheels that somebody keeps from turning.
+    truth: pose and motion. turns: revolutions of the left and the right wheel since construction.
+    wanted_radps: target speeds of the two wheel controllers. powered: whether the controllers drive
+    the wheels; without power the wheels run out. held: whether each wheel is kept from turning by
+    hand.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -92,7 +94,7 @@ class Vehicle:
         self.radps = [0.0, 0.0]
         self.turns = [0.0, 0.0]
         self.accel_mps2 = (0.0, 0.0)
-        """Of the body, forward and to the left."""
+        """Acceleration of the body in m/s², forward and to the left."""
         self._radii_m = tuple(
             settings.wheel_radius_m * scale for scale in settings.wheel_radius_scale
         )
@@ -100,11 +102,11 @@ class Vehicle:
 
     @property
     def standing(self) -> bool:
-        """Whether both driving wheels truly stand."""
+        """Whether both driving wheels are truly at rest."""
         return self.radps == [0.0, 0.0]
 
     def advance(self, step_s: float) -> None:
-        """Let a step pass."""
+        """Let ``step_s`` seconds pass."""
         self.servo.advance(step_s)
         self.lift.advance(step_s)
         if self.standing and (self.wanted_radps == (0.0, 0.0) or not self.powered):
@@ -149,10 +151,10 @@ class Vehicle:
 def wheel_speeds(
     speed: float, turn_radps: float, angle_deg: float, base_m: float, steer_m: float
 ) -> tuple[float, float]:
-    """Left and right in m/s, by the manual's turning control.
+    """Return the speed of the left and the right wheel in m/s, by the manual's turning control.
 
-    The outer wheel gets ``v2 = sqrt(v² + w²)`` with the sign of ``v``, the inner one
-    ``v1 = v2 - v2 B / d`` with ``d = f / tan(theta) + B / 2``.
+    The outer wheel gets ``v2 = sqrt(v² + w²)`` with the sign of ``v``, the inner one ``v1 = v2 - v2
+    B / d`` with ``d = f / tan(theta) + B / 2``.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0

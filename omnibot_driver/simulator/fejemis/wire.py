@@ -1,24 +1,24 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines of text as a Teensy reads and writes them; from the manual and its hosts, its own codec.
+"""Codec of text lines as a Teensy reads and writes them, written from the manual and its hosts.
 
-A line begins with ``;NN`` in firmware that has sums: 1 plus the remainder by 99 of the sum of all
-later characters from the space on. Numbers are read as C's ``strtof`` reads them. Knows no meaning
-of a command.
+In firmware with checksums a line begins with ``;NN``: 1 plus the sum, modulo 99, of all later
+characters from the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. Must not
+know the meaning of a command.
 """
 
 import re
 from enum import Enum
 
 BUFFER = 200
-"""Characters of a line that fit; a longer one is cut into several."""
+"""Characters of a line that fit; each time a longer one fills the buffer, these are discarded."""
 
 _NUMBER = re.compile(r"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 _PREFIX = re.compile(r";(\d\d)")
 
 
 class Check(Enum):
-    """What the sum says of a line."""
+    """Result of checking the checksum of a line."""
 
     GOOD = "good"
     WRONG = "wrong"
@@ -26,19 +26,19 @@ class Check(Enum):
 
 
 def sum_of(text: str) -> int:
-    """1 to 99."""
+    """Return the checksum of a text, 1 to 99."""
     return sum(ord(character) for character in text if character >= " ") % 99 + 1
 
 
 def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
-    """One line as it goes over the wire."""
+    """Encode one line, with its checksum and its end."""
     prefix = f";{sum_of(text):02d}" if sums else ""
     end = "\r\n" if carriage_return else "\n"
     return f"{prefix}{text}{end}".encode("latin-1")
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """What the sum says, the line without it, and the number that it should have been."""
+    """Return the result of the check, the line without ``;NN``, and the correct checksum."""
     found = _PREFIX.match(text)
     if found is None:
         return Check.ABSENT, text, 0
@@ -48,7 +48,10 @@ def checked(text: str) -> tuple[Check, str, int]:
 
 
 def numbers(text: str) -> list[float]:
-    """All that ``strtof`` finds, one after the other, up to the first text that is not a number."""
+    """Return the numbers that repeated calls of ``strtof`` find.
+
+    They end at the first text that is not a number.
+    """
     found, at = [], 0
     while match := _NUMBER.match(text, at):
         found.append(float(match[1]))
@@ -57,17 +60,17 @@ def numbers(text: str) -> list[float]:
 
 
 class LineReader:
-    """Characters to lines; those that do not fit the buffer begin a line of their own."""
+    """Splits characters into lines; a character beyond the buffer discards what it holds."""
 
     def __init__(self) -> None:
         self._held = bytearray()
 
     def clear(self) -> None:
-        """Nothing was received."""
+        """Discard an incomplete line."""
         self._held.clear()
 
     def feed(self, data: bytes) -> list[str]:
-        """The lines that these bytes complete, without their ends; empty ones are left out."""
+        """Return the lines that these bytes complete, without line ends; omit empty ones."""
         lines = []
         for byte in data:
             if byte in b"\r\n":

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART motion controller in software, as its manual describes it or as its public server is.
+"""A simulated MART motion controller, after its manual or after its public server.
 
-Shares no code with the driver: a misread manual must not cancel out. ``MartServer`` is pure:
-``receive(datagram, port, sender, now)``, ``advance(now)`` and ``copy()``. ``SimulatedMart`` is the
-same for ports, ``sim://`` and bad networks.
+Shares no code with the driver, so that a misread manual does not cancel out. ``MartServer`` is
+pure: its interface is ``receive(datagram, port, sender, now)``, ``advance(now)`` and ``copy()``.
+``SimulatedMart`` wraps it for real ports, ``sim://`` and simulated bad networks.
 """
 
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart

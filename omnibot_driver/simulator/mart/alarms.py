@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the server does 100 times a second while a motion is under way.
+"""Supervision of a motion in progress, 100 times a second, as the server does it.
 
-It sees that the wheel turns, that it stands again, that something is in the way, and ends
-controlled moves. Without samples of the IMU it sees nothing of that. Knows motions. Must not know
-commands.
+Detects that the wheel starts to turn, that it comes to rest, and obstacles; ends controlled moves.
+Without samples of the IMU only the obstacles and the dock of controlled linear moves are detected.
+Knows motions. Must not know commands.
 """
 
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ _TIMED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR)
 
 
 def stop_motors(server: "MartServer", motion: Motion) -> None:
-    """Begin to stop."""
+    """Write stop to the motors and begin to wait until the wheel is at rest."""
     if motion.kind is Kind.REFERENCE and (
         motion.left < motions.FAST_REGISTER or motion.right < motions.FAST_REGISTER
     ):
@@ -39,7 +39,7 @@ def stop_motors(server: "MartServer", motion: Motion) -> None:
 
 
 def sample(server: "MartServer", motion: Motion) -> None:
-    """10 ms have passed."""
+    """Supervise the motion for one sample period of 10 ms."""
     kind, now = motion.kind, server.now_s
     if kind in _TIMED:
         _watch_clearance(server, motion)
@@ -72,7 +72,10 @@ def sample(server: "MartServer", motion: Motion) -> None:
 
 
 def _miss(server: "MartServer", motion: Motion) -> None:
-    """Notice a missing sample, in controlled moves only."""
+    """End the motion with an error if samples of the IMU are missing for too long.
+
+    With ``drives_trust_imu`` only controlled motions are checked.
+    """
     if server.quirks.drives_trust_imu and motion.kind not in (*_TIMED, Kind.CONTROLLED_SPIN):
         return
     now, last = server.now_s, motion.sampled_s
@@ -143,7 +146,10 @@ def _end(server: "MartServer", motion: Motion) -> None:
 
 
 def _timed_distance_in(motion: Motion) -> float:
-    """The distance by the calibration and the time alone; the ramps are in feet."""
+    """Return the distance in inches, from the calibration and the time alone.
+
+    The share of the ramps is in feet, although the sum is reported in inches.
+    """
     if motion.kind not in _TIMED:
         return 0.0
     ramps_s, top_inps = sum(motions.RAMPS_S[motion.word]), motions.TOP_SPEED_INPS[motion.word]
@@ -175,7 +181,10 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 
 
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
-    """Change the speeds, forward positive, within the server's limits."""
+    """Change both speeds, in register units with forward positive.
+
+    A speed saturates at stop and at full speed; an excess over full speed slows the other wheel.
+    """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:
         if new_right > 255:

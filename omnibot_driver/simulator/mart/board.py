@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated controller as a board of two channels of datagrams, tick by tick.
+"""The simulated controller as a simulated board: two channels of datagrams, and time in ticks.
 
 Knows the server and the common protocol of simulated boards. Must not know commands.
 """
@@ -16,7 +16,10 @@ TICK_S = 0.002
 
 
 class SimulatedMart:
-    """``server``: the controller with its robot; everything else is found there."""
+    """A simulated MART controller with the common interface of simulated boards.
+
+    ``server`` is the controller with its robot; it holds all other state.
+    """
 
     channels, tick_s = CHANNELS, TICK_S
 
@@ -26,25 +29,25 @@ class SimulatedMart:
 
     @property
     def now_s(self) -> float:
-        """Since construction."""
+        """Simulated time since construction, in s."""
         return self.ticks * TICK_S
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """A datagram for one of the two ports."""
+        """Deliver a datagram to the port ``channel`` at the simulated time, not at ``now``."""
         self.server.receive(data, channel, None, self.now_s)
 
     def advance(self) -> list[Packet]:
-        """Let one tick pass; the replies that left in it."""
+        """Let one tick pass and return the replies sent in it."""
         self.ticks += 1
         return [(reply.port, reply.data) for reply in self.server.advance(self.now_s)]
 
     def reboot(self) -> None:
-        """A power cycle; the robot stays where it is."""
+        """Cycle the power; the robot stays where it is."""
         self.server.power_cycle()
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """Facts of the robot and its controller."""
+        """Facts about the robot and its controller, by name."""
         server, chassis = self.server, self.server.chassis
         motion = server.motion
         return {

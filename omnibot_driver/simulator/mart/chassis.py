@@ -3,7 +3,7 @@
 """The motor board, its two motors, and the robot that they move.
 
 Knows registers (0 full forward, 128 stop, 255 full backward), volts and metres. Must not know
-commands, nor why it moves.
+commands, nor the reason of a movement.
 """
 
 from math import cos, exp, inf, pi, sin
@@ -13,16 +13,18 @@ from omnibot_driver.simulator.mart.settings import MartSettings, Stuck
 STOP = 128
 STEP_S = 0.01
 RAMPS_PER_S = 40.0
-"""The board changes what it applies each 25 ms, by its acceleration."""
+"""Updates of the applied effort per second: every 25 ms it changes by the acceleration."""
 STANDS_MPS = 0.006
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 
 
 class Chassis:
-    """``right``, ``left``: registers. Speeds in m/s; the true pose in m and rad, unwrapped.
+    """The motor board with its motors, its encoder and the body of the robot.
 
-    counts: of the right wheel since the last reset. way_m: driven in all, of either sign. To change
-    volts, stuck, motor_status or silent: ``change``.
+    right, left: registers. right_mps, left_mps: speeds in m/s. x_m, y_m, yaw_rad: the true pose,
+    yaw unwrapped. counts: encoder counts of the right wheel since the last reset. way_m: total
+    distance, forward and backward added. Set volts, stuck, motor_status and silent by ``change``
+    only.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -56,7 +58,7 @@ class Chassis:
         motor_status: int | None = None,
         silent: bool | None = None,
     ) -> None:
-        """Something happens to it."""
+        """Change the given properties of the motor board; None leaves a property as it is."""
         self.volts = self.volts if volts is None else volts
         self.stuck = self.stuck if stuck is None else stuck
         self.motor_status = self.motor_status if motor_status is None else motor_status
@@ -73,18 +75,18 @@ class Chassis:
         self._gain_left = 0.0 if stopped_left else speed * (1 + half)
 
     def copy(self) -> "Chassis":
-        """An independent one."""
+        """Return an independent copy."""
         new = Chassis.__new__(Chassis)
         new.__dict__.update(self.__dict__)
         return new
 
     def set(self, right: int, left: int) -> None:
-        """Write both registers; a board whose line is cut hears nothing."""
+        """Write both registers; without effect if the serial line of the board is cut."""
         if not self.silent:
             self.right, self.left = right & 0xFF, left & 0xFF
 
     def accelerate(self, units: int) -> None:
-        """Set the acceleration from now on."""
+        """Set the acceleration, in register units per 25 ms."""
         if not self.silent:
             self.acceleration = units
 
@@ -95,12 +97,12 @@ class Chassis:
 
     @property
     def encoder(self) -> int:
-        """The count that the board reports; 0 if its line is cut."""
+        """Encoder count that the board reports; 0 if its serial line is cut."""
         return 0 if self.silent else int(self.counts)
 
     @property
     def speed_mps(self) -> float:
-        """Forward."""
+        """Speed of the body in m/s, forward positive."""
         return (self.right_mps + self.left_mps) / 2
 
     @property
@@ -115,18 +117,18 @@ class Chassis:
 
     @property
     def rests(self) -> bool:
-        """Whether nothing changes as time passes."""
+        """Whether motors, applied effort and wheels are all zero, so that time changes nothing."""
         return not (self.powered or self.moving or self._applied_right or self._applied_left)
 
     @property
     def error_bits(self) -> int:
-        """The state bits that the board reports."""
+        """Status bits that the board reports, as in the reply to MCSTAT."""
         return self.motor_status | (64 if self.volts > 30 else 0) | (128 if self.volts < 16 else 0)
 
     def _turn(
         self, wanted: int, applied: float, speed_mps: float, gain: float
     ) -> tuple[float, float]:
-        """Run 10 ms of a motor: its applied effort and its speed."""
+        """Return the applied effort and the speed in m/s of a motor after 10 ms more."""
         if applied != wanted:
             slew = self.acceleration * RAMPS_PER_S * STEP_S
             if applied < wanted:
@@ -140,7 +142,7 @@ class Chassis:
         return applied, speed_mps
 
     def step(self) -> float:
-        """Let 10 ms pass; the turn rate in deg/s, with the shaking of a robot that moves."""
+        """Let 10 ms pass; return the turn rate in deg/s, with noise while a wheel turns."""
         self._applied_right, right = self._turn(
             STOP - self.right, self._applied_right, self.right_mps, self._gain_right
         )
@@ -164,7 +166,10 @@ class Chassis:
 
 
 def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
-    """Range of a sonar to a wall across x, in front of it or behind it."""
+    """Return the range in m of a sonar to the wall that it faces, or infinity if it faces none.
+
+    The walls lie across the x axis, ``front_m`` in front of the start and ``rear_m`` behind it.
+    """
     along = cos(chassis.yaw_rad + (pi if backward else 0.0))
     if along > 0.3:
         return (front_m - chassis.x_m) / along

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The commands of the first port: how they are distinguished, what they need, what they answer.
+"""The commands of the command port: how they are recognised and checked, and their replies.
 
-The server compares beginnings, in this order, so that F takes every word that begins with F. Knows
-words and numbers. Must not know how a motion goes on.
+The server compares the beginning of a request with its commands in a fixed order, so F matches any
+later command that begins with F. Knows command words and numbers. Must not know how a motion
+proceeds.
 """
 
 from collections.abc import Callable
@@ -16,14 +17,18 @@ if TYPE_CHECKING:
     from omnibot_driver.simulator.mart.server import MartServer
 
 Handler = Callable[["MartServer", str], str | None]
-"""Does it; returns the answer, or None where it comes later, or never."""
+"""Function that executes a command. It returns the reply, or None if that comes later or never."""
 
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
 
 
 class Row(NamedTuple):
-    """word: the whole command, or its beginning. moves: refused while anything is in progress."""
+    """A command and its handler.
+
+    word: the complete command, or its beginning if ``begins``. moves: whether the server refuses it
+    while a motion, a recording or MCS is in progress.
+    """
 
     word: str
     handler: Handler
@@ -32,7 +37,7 @@ class Row(NamedTuple):
 
 
 def execute(server: "MartServer", text: str) -> str | None:
-    """Begin one command; its answer, unless that comes later."""
+    """Begin a command; return its reply, or None if that comes later or never."""
     if not server.quirks.undocumented_commands and _is_undocumented(text):
         return NOT_SUPPORTED
     for word, handler, begins, is_motion in ROWS:
@@ -67,7 +72,7 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _joined(server: "MartServer") -> bool:
-    """Whether something is in progress that refuses L."""
+    """Return whether something in progress makes the server refuse L."""
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict
     others = [each for each in server.motions if each.kind is not Kind.REFERENCE]
@@ -75,7 +80,10 @@ def _joined(server: "MartServer") -> bool:
 
 
 def _timed(server: "MartServer", text: str) -> str | None:
-    """TF, TB: the speed word comes first."""
+    """Start TF or TB: an optional speed word, then a distance in inches.
+
+    Without ``speed_word_first`` the speed word may also follow the distance.
+    """
     server.motions[Kind.CONTROLLED_LINEAR].reported_in = 0.0
     behind = text[2:]
     word, no_clearance, docking = "NORMAL", False, False
@@ -107,7 +115,7 @@ def _timed(server: "MartServer", text: str) -> str | None:
 
 
 def _controlled_spin(server: "MartServer", text: str) -> str | None:
-    """MCR, MCL."""
+    """Start a spin by an angle in degrees (MCR, MCL)."""
     slow = text[3:].startswith(" SLOW")
     numbers = wire.fields(text[8:] if slow else text)
     if not numbers:
@@ -168,7 +176,7 @@ def _change_linear(server: "MartServer", text: str) -> str | None:
 
 
 def _measured(server: "MartServer", text: str) -> str | None:
-    """MCF, MCB: by the accelerometer; here they drive as TF and TB do."""
+    """Start a move measured by the accelerometer (MCF, MCB), simulated like TF and TB."""
     numbers = wire.fields(text)
     if not numbers:
         return MISSNG if text[2] == "F" else MISSING
@@ -183,7 +191,7 @@ def _measured(server: "MartServer", text: str) -> str | None:
 
 
 def _tuned(server: "MartServer", text: str) -> str | None:
-    """PTF inches and three gains, that are not played."""
+    """Start PTF: a distance in inches and three gains, whose effect is not simulated."""
     slow = text.startswith("PTF SLOW")
     behind = text[len("PTF SLOW") if slow else len("PTF") :].removeprefix(" NORMAL")
     numbers = wire.fields(behind)
@@ -201,13 +209,13 @@ def _last_distance(server: "MartServer", text: str) -> str | None:
 
 
 def _clearance(server: "MartServer", text: str) -> str | None:
-    """TFSFC: how near the next TF may come."""
+    """Set the least front clearance of the next TF, in inches (TFSFC)."""
     server.motions[Kind.CONTROLLED_LINEAR].clearance_in = wire.integer(text[6:])
     return "ok"
 
 
 def _parameters(name: str, wrong: str) -> Handler:
-    """SLMP, SSP: acceleration and speed."""
+    """Return the handler that stores an acceleration and a speed (SLMP, SSP)."""
 
     def handle(server: "MartServer", text: str) -> str | None:
         numbers = wire.fields(text)
@@ -220,7 +228,7 @@ def _parameters(name: str, wrong: str) -> Handler:
 
 
 def _gains(server: "MartServer", text: str) -> str | None:
-    """SLPP: three gains, that are not played."""
+    """Accept three gains (SLPP), whose effect is not simulated."""
     return "ok" if len(wire.fields(text)) >= 3 else MISSNG
 
 

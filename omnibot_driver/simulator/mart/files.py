@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The files that the server keeps of motions, and its log.
+"""The files in which the server records motions.
 
 Knows their form. Must not know when they are sent.
 """
@@ -27,7 +27,11 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class FileNote:
-    """Enough to write a file: its head, and how many samples it has. ``is_turn``: of a spin."""
+    """The data from which the file of a motion is generated.
+
+    head: its first lines. rows: number of samples in it. is_turn: whether the motion was a spin.
+    angle_deg, encoder: totals of the motion.
+    """
 
     name: str
     is_turn: bool
@@ -38,7 +42,7 @@ class FileNote:
 
     @property
     def content(self) -> bytes:
-        """Its text in Latin-1: 0xb0 is the sign of a degree."""
+        """Contents of the file in Latin-1, where 0xb0 is the degree sign."""
         lines = [*self.head, ""]
         for row in range(self.rows):
             part = (row + 1) / self.rows
@@ -48,7 +52,7 @@ class FileNote:
 
 
 def note_of(server: "ServerState", motion: Motion) -> FileNote:
-    """The file of a motion that is over."""
+    """Return the file of a motion that has ended."""
     head = (
         server.date,
         "Gyro Z bias (\u00b0/sec): 0.000",

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The gyro, whether it lives, and what the server makes of it.
+"""The IMU: its gyro, whether it works, and the heading that the server integrates from it.
 
 Knows turn rates and times. Must not know motions or commands.
 """
@@ -9,10 +9,12 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 
 
 class Imu:
-    """``alive``: set it to unplug the IMU or to plug it in again; option times come on top.
+    """The gyro, and what the server derives from it.
 
-    closed: the server gave it up, and tries again only with RST IMU or SB. rate_dps: of the last
-    sample, less the bias that the server knows. heading_deg: the relative angle, left positive.
+    alive: False while the IMU is unplugged; can be set at any time, besides the times in the
+    settings. closed: whether the server has given the IMU up, which it retries only at RST IMU or
+    SB. rate_dps: turn rate of the last sample in deg/s, less the bias that the server knows.
+    heading_deg: the relative heading in degrees, left positive.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -23,39 +25,45 @@ class Imu:
         self.restart()
 
     def restart(self) -> None:
-        """The server begins anew."""
+        """Forget the bias, the heading and the rate, as at the start of the server."""
         self._known_dps = 0.0
         self.closed = False
         self.heading_deg = 0.0
         self.rate_dps = 0.0
 
     def copy(self) -> "Imu":
-        """An independent one."""
+        """Return an independent copy."""
         new = Imu.__new__(Imu)
         new.__dict__.update(self.__dict__)
         return new
 
     def plugged(self, now: float) -> bool:
-        """Whether it answers on its bus."""
+        """Return whether the IMU answers on its bus."""
         return self.alive and not self._dies_s <= now < self._returns_s
 
     def living(self, now: float) -> bool:
-        """Whether the server gets samples."""
+        """Return whether the server receives samples."""
         return self.alive and not self.closed and not self._dies_s <= now < self._returns_s
 
     def learn(self) -> None:
-        """Take the bias of a robot at rest."""
+        """Learn the gyro bias, as the server measures it while the robot is at rest."""
         self._known_dps = self._bias_dps
 
     def sample(self, rate_dps: float, now: float, *, integrates: bool) -> None:
-        """The robot turned at this rate since the last sample."""
+        """Take a sample of the turn rate.
+
+        If ``integrates``, add the rate times the time since the previous sample to the heading.
+        """
         self.rate_dps = rate = rate_dps + self._bias_dps - self._known_dps
         if integrates:
             self.heading_deg += rate * (now - self._since_s)
         self._since_s = now
 
     def drift(self, now: float, *, integrates: bool) -> None:
-        """The robot has stood since the last sample."""
+        """Advance to ``now``, for a robot at rest since the previous sample.
+
+        If ``integrates``, the part of the bias that the server does not know moves the heading.
+        """
         if integrates and self.living(now):
             self.heading_deg += (self._bias_dps - self._known_dps) * (now - self._since_s)
         self._since_s = now

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the server remembers of a kind of motion; its texts, speeds and times.
+"""What the server remembers of each kind of motion, with its texts, speeds and times.
 
-Values alone. Must not know what changes them.
+Holds values alone. Must not know what changes them.
 """
 
 from enum import IntEnum
@@ -11,7 +11,7 @@ SAMPLE_S = 0.01
 START_SAMPLES, STOP_SAMPLES, STILL_SAMPLES = 60, 75, 15
 SLOW_STOP_SAMPLES = 188
 FAST_REGISTER = 45
-"""A register below it is so fast that RM stops gently."""
+"""Register value below which RM is so fast that it stops gently (0 is full forward)."""
 SETUP_S = 0.05
 BIAS_SAMPLE_S = 0.0107
 LOST_AT_START_S, LOST_S = 0.5, 1.5
@@ -24,20 +24,20 @@ NOT_SUPPORTED = "fail command not supported"
 
 
 class Kind(IntEnum):
-    """Each has a state of its own on the server."""
+    """The kinds of motion; the server keeps a separate state for each."""
 
     LINEAR = 0
-    """F, B."""
+    """Uncontrolled move (F, B)."""
     REFERENCE = 1
-    """RM."""
+    """Reference move: forward, with changes of speed (RM)."""
     SPIN = 2
-    """R, L."""
+    """Uncontrolled spin (R, L)."""
     CONTROLLED_SPIN = 3
-    """MCR, MCL."""
+    """Spin by an angle (MCR, MCL)."""
     CONTROLLED_LINEAR = 4
-    """TF, TB, PTF."""
+    """Move over a distance, by time (TF, TB, PTF)."""
     MEASURED_LINEAR = 5
-    """MCF, MCB."""
+    """Move over a distance, by the accelerometer (MCF, MCB)."""
 
 
 SPEEDS = {"NORMAL": 30, "FAST": 60, "SLOW": 20}
@@ -45,17 +45,18 @@ STOP_OFFSET_DEG = {"NORMAL": 3.16, "SLOW": 0.7}
 SMALL_SPIN_DEG = 10
 TOP_SPEED_INPS = {"NORMAL": 0.64 * 12, "SLOW": 0.34 * 12}
 RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
-"""Acceleration and deceleration, as calibrated."""
+"""Calibrated durations of acceleration and deceleration in s, by speed word."""
 
 
 class Motion:
-    """Of one kind; what it was like stays when it is over.
+    """The state of the last motion of a kind, kept after its end.
 
-    running: in progress, so that others are refused. posts: notices that it started or stopped, and
-    that were not read. error: of this motion. right, left: what the server believes of the
-    registers. encoder: as it was read last, of which the next sample knows. sampled_s: time of the
-    last sample of the IMU, or -1. moved_s, stopped_s, turned_s: when the wheel began to turn, got
-    its stop, and turned last. angle_deg: since its start. released: the stop port ended it.
+    running: in progress, so that other motions are refused. watching: supervised by the alarm.
+    posts: notices of a start or a stop that are not consumed yet. error: failure text of this
+    motion. right, left: what the server believes of the registers. encoder: the last reading, which
+    the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
+    stopped_s, turned_s: when the wheel began to turn, when it was commanded to stop, and when it
+    last turned. angle_deg: turned since the start. released: whether the stop port ended it.
     """
 
     def __init__(self, kind: Kind) -> None:
@@ -71,7 +72,7 @@ class Motion:
         self.starting = False
 
     def begin(self, now: float) -> None:
-        """A new one: nothing has happened yet."""
+        """Reset the state for a motion that begins at ``now``."""
         self.error = ""
         self.starting, self.stopping, self.watching, self.released = True, False, True, False
         self.right = self.left = 128
@@ -84,14 +85,14 @@ class Motion:
         self.stop_samples = STOP_SAMPLES
 
     def limit(self, inches: int) -> None:
-        """Stop after the time that it takes so far, by its calibration."""
+        """Set the time after which the motion stops, from a distance and its calibration."""
         up_s, down_s = RAMPS_S[self.word]
         top_inps = TOP_SPEED_INPS[self.word]
         self.stop_after_s = (inches - (up_s + down_s) / 2 * top_inps) / top_inps + up_s
         self.limited = True
 
     def copy(self) -> "Motion":
-        """An independent one."""
+        """Return an independent copy."""
         new = Motion.__new__(Motion)
         new.__dict__.update(self.__dict__)
         return new

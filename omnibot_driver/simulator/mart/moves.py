@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How the server begins each kind of motion, and ends it by a command.
+"""The start of each kind of motion, and its end by a command.
 
-Each step is a function that the server goes on with later, so that a copy of it can go on too.
+Each step is a function that the server calls later, so that a copy of the server can continue too.
 Knows motions. Must not know the words of commands.
 """
 
@@ -23,11 +23,11 @@ PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
 WRITES_S = 0.005
 LINEAR_S = REFERENCE_S = 0.015
-"""Duration of the set-up of the motor board."""
+"""Duration of the set-up of the motor board, in s."""
 
 
 def start_linear(server: "MartServer", word: str, *, backward: bool) -> None:
-    """F, B."""
+    """Start an uncontrolled move (F, B)."""
     motion = server.motions[Kind.LINEAR]
     motion.word, motion.backward, motion.no_clearance = word, backward, False
     motion.speed = server.custom.get("linear", (5, motions.SPEEDS[word]))[1]
@@ -47,7 +47,10 @@ def start_controlled(
     no_clearance: bool = False,
     plain: bool = False,
 ) -> None:
-    """TF, TB and their relatives; ``plain``: the answer has no distance."""
+    """Start a move over a distance (TF, TB, PTF, MCF, MCB).
+
+    A distance of 0 or less is unlimited. ``plain``: the reply has no distance.
+    """
     motion = server.motions[kind]
     motion.word, motion.backward = word, backward
     motion.docking, motion.no_clearance = docking, no_clearance
@@ -77,7 +80,11 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 
 
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
-    """Take one sample of the bias after the other; ``kind`` None: of SB."""
+    """Take a sample of the gyro bias, and schedule the next one until ``left`` are taken.
+
+    Then start the motion ``kind``, or answer SB if it is None. ``missed``: consecutive samples that
+    did not arrive.
+    """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0
     else:
@@ -111,7 +118,7 @@ def _go(server: "MartServer", motion: Motion, right: int, left: int) -> None:
 
 
 def start_reference(server: "MartServer", speed: int) -> None:
-    """RM."""
+    """Start a reference move (RM)."""
     motion = server.motions[Kind.REFERENCE]
     motion.speed, motion.backward, motion.no_clearance = speed, False, False
     server.starting = Kind.REFERENCE
@@ -133,14 +140,17 @@ def _go_reference(server: "MartServer", speed: int) -> None:
 
 
 def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
-    """R, L."""
+    """Start an uncontrolled spin (R, L)."""
     server.motions[Kind.SPIN].word = word
     server.starting = Kind.SPIN
     server.later(WRITES_S, _go_spin, Kind.SPIN, left)
 
 
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
-    """MCR, MCL."""
+    """Start a spin by an angle (MCR, MCL).
+
+    By 0 degrees or less it only tests the IMU, unless ``probe_turns``.
+    """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word
     motion.target = angle_deg
@@ -176,7 +186,7 @@ def _go_spin(server: "MartServer", kind: Kind, left: bool) -> None:
 
 
 def started(server: "MartServer", kind: Kind) -> None:
-    """An uncontrolled motion was seen to begin, or was not."""
+    """Answer the command of an uncontrolled motion that has started, or failed to start."""
     motion = server.motions[kind]
     server.starting = None
     if kind is Kind.REFERENCE and (server.settings.reference_start_fails or motion.error):
@@ -190,7 +200,7 @@ def started(server: "MartServer", kind: Kind) -> None:
 
 
 def controlled_done(server: "MartServer", kind: Kind) -> None:
-    """A controlled motion is over."""
+    """Save the file of a controlled motion that has ended, and answer its command."""
     motion = server.motions[kind]
     server.starting = None
     motion.running = False
@@ -206,12 +216,12 @@ def controlled_done(server: "MartServer", kind: Kind) -> None:
 
 
 def last_distance_in(server: "MartServer") -> int:
-    """The distance of the last TF or TB."""
+    """Return the distance of the last TF or TB, in inches."""
     return round(server.motions[Kind.CONTROLLED_LINEAR].reported_in)
 
 
 def stop(server: "MartServer", kind: Kind) -> None:
-    """SM, SRM."""
+    """Stop an uncontrolled motion (SM, SRM)."""
     if end_motion(server, COMMAND, server.motions[kind]):
         server.wait(COMMAND, kind, stopped, kind)
     else:
@@ -219,7 +229,7 @@ def stop(server: "MartServer", kind: Kind) -> None:
 
 
 def stopped(server: "MartServer", kind: Kind) -> None:
-    """The robot was seen to stand, or was not."""
+    """Answer SM or SRM, after the robot has come to rest or has failed to."""
     motion = server.motions[kind]
     motion.running = motion.released = False
     if kind is Kind.LINEAR:
@@ -235,7 +245,7 @@ def stopped(server: "MartServer", kind: Kind) -> None:
 
 
 def change_linear(server: "MartServer", right: int, left: int) -> bool:
-    """CS; whether the server did it."""
+    """Change the speeds of F or B (CS); return whether the server accepts it."""
     motion = server.motions[Kind.LINEAR]
     if motion.stopping:
         return False
@@ -244,7 +254,7 @@ def change_linear(server: "MartServer", right: int, left: int) -> bool:
 
 
 def change_reference(server: "MartServer", right: int, left: int) -> bool:
-    """RMCS; whether the server did it."""
+    """Change the speeds of RM (RMCS); return whether the server accepts it."""
     motion = server.motions[Kind.REFERENCE]
     if motion.stopping or motion.starting:
         return False

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user may choose about a simulated MART controller, besides its seed and its network.
+"""Command line options of a simulated MART controller, besides its seed and its network.
 
-Knows words and their meaning. Must not know what runs the board.
+Knows the names, values and effects of options. Must not know what runs the board.
 """
 
 import argparse
@@ -17,7 +17,7 @@ _DEFAULT = MartSettings()
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Let the parser know them all."""
+    """Add all options to the parser."""
     parser.add_argument(
         "--firmware",
         choices=get_args(Firmware),
@@ -54,7 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def from_arguments(arguments: argparse.Namespace) -> SimulatedMart:
-    """The board that was chosen."""
+    """Return the board that the parsed options describe."""
     return SimulatedMart(
         MartSettings(
             quirks=QUIRKS[arguments.firmware],

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The server: two ports, a thread for each, a timer while something moves, and the time.
+"""The server: two ports with a thread each, a timer while something moves, and simulated time.
 
-Pure: datagrams and times in, replies out; the same settings and input give the same output. It
-goes from event to event, so a robot that stands costs nothing. Must not know sockets or real time,
-nor which commands there are.
+Pure: datagrams and times in, replies out; the same settings and input give the same output. Time
+advances from event to event, so a robot at rest takes no computing time. Must not know sockets,
+real time or the set of commands.
 """
 
 from collections import deque
@@ -25,7 +25,7 @@ Sender = object
 
 
 class Reply(NamedTuple):
-    """A datagram that leaves a port at this time, and for whom."""
+    """A datagram that leaves ``port`` for ``sender`` at ``at_s``, in s since construction."""
 
     at_s: float
     port: int
@@ -40,10 +40,10 @@ class _Later(NamedTuple):
 
 
 class MartServer(ServerState):
-    """The controller with its robot: ``receive`` and ``advance``; what is known of it: ServerState.
+    """The controller with its robot, driven by ``receive`` and ``advance``.
 
-    blocked: the command port waits for samples of the IMU. received: all that came to either port,
-    with its time. executed: commands begun, in order.
+    ``ServerState`` describes its state. received: the last datagrams at either port, with time and
+    port. executed: the last commands begun, in order.
     """
 
     def __init__(self, settings: MartSettings | None = None) -> None:
@@ -56,7 +56,7 @@ class MartServer(ServerState):
         self.begin()
 
     def begin(self) -> None:
-        """The program starts: it knows nothing."""
+        """Reset all that the program knows, as when it starts."""
         super().begin()
         self._sender: Sender = None
         self._later: _Later | None = None
@@ -66,7 +66,7 @@ class MartServer(ServerState):
     # From outside
 
     def receive(self, datagram: bytes, port: int, sender: Sender, now: float) -> None:
-        """A datagram arrives now, in seconds since construction, not before the last."""
+        """Receive a datagram at ``now``, in s since construction and never decreasing."""
         self._run(now)
         self.received.append((now, port, datagram))
         if self.crashed or now < self._boots_until_s:
@@ -84,20 +84,20 @@ class MartServer(ServerState):
             self._next()
 
     def advance(self, now: float) -> list[Reply]:
-        """Let time pass up to this; the replies that leave meanwhile, and have not been fetched."""
+        """Let time pass until ``now`` and return the replies sent since the last call."""
         self._run(now)
         out, self._out = self._out, []
         return out
 
     @property
     def wake_at(self) -> float:
-        """The time of the next event without a datagram; infinite if there is none."""
+        """Time of the next event that needs no datagram, in s; infinity if none is due."""
         if self._out:
             return self.now_s
         return min(self._step_at_s, inf if self._later is None else self._later.at_s)
 
     def copy(self) -> "MartServer":
-        """An independent one, that goes on from here; cheaper than a deep copy."""
+        """Return an independent copy that continues from here; faster than a deep copy."""
         new = MartServer.__new__(MartServer)
         new.__dict__.update(self.__dict__)
         new.chassis, new.imu = self.chassis.copy(), self.imu.copy()
@@ -111,7 +111,10 @@ class MartServer(ServerState):
         return new
 
     def restart(self, boot_s: float = 0.0) -> None:
-        """Start the server again; the motors keep their last command."""
+        """Start the server program again; the motors keep their last command.
+
+        Datagrams of the next ``boot_s`` seconds are lost.
+        """
         self.begin()
         self.imu.restart()
         self._boots_until_s = self.now_s + boot_s
@@ -123,7 +126,7 @@ class MartServer(ServerState):
 
     @property
     def blocked(self) -> bool:
-        """Whether the command port answers only when the IMU lives again."""
+        """Whether the command port waits for samples of an IMU that is dead."""
         if self.imu.living(self.now_s) or self.crashed:
             return False
         later = self._later
@@ -140,17 +143,17 @@ class MartServer(ServerState):
         self._wake()
 
     def watch(self, kind: Kind) -> None:
-        """Begin to watch a motion; where one is being watched, the new one is not."""
+        """Supervise this kind of motion, unless another one is supervised already."""
         if self.alarm is None:
             self.alarm = kind
         self._wake()
 
     def later(self, seconds: float, then: Then, *args: Any) -> None:
-        """Go on with the command then."""
+        """Continue the command after ``seconds``, by calling ``then(server, *args)``."""
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Go on with the next notice of this kind of motion."""
+        """Call ``then`` at the next notice of this kind of motion, or now if one is pending."""
         motion = self.motions[kind]
         if motion.posts:
             motion.posts -= 1
@@ -160,7 +163,7 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Notify who waits for this kind of motion, or will."""
+        """Give a notice to the first waiter for this kind of motion, or keep it for the next."""
         for waiter in self.waiters:
             if waiter.kind is kind:
                 self.waiters.remove(waiter)
@@ -172,24 +175,24 @@ class MartServer(ServerState):
         self.motions[kind].posts += 1
 
     def answer(self, text: str) -> None:
-        """The reply to the command that is being executed."""
+        """Reply to the command in progress, and finish it."""
         self.last_reply = text
         self.send(wire.reply(text))
         self.done()
 
     def send(self, data: bytes) -> None:
-        """A datagram to the sender of the command."""
+        """Send a datagram to the sender of the command in progress."""
         if self.log is not None and len(self.log) < LOG_LINES:
             self.log.append(f"{self.date} {data[:49].decode('latin-1')}")
         self._out.append(Reply(self.now_s, COMMAND, self._sender, data))
 
     def done(self) -> None:
-        """The command is over."""
+        """Finish the command in progress and begin the next one."""
         self.busy = False
         self._next()
 
     def abort(self, text: str) -> None:
-        """Give up the motion that is being started."""
+        """Give up the motion that is being started, and answer its command."""
         kind, self.starting = self.starting, None
         self._later = None
         self.waiters = [waiter for waiter in self.waiters if waiter.port != COMMAND]
@@ -200,7 +203,7 @@ class MartServer(ServerState):
         self.answer(text)
 
     def end(self, why: str) -> None:
-        """The server is not there any more. Nothing stops the motors."""
+        """End the program, for the reason ``why``; the motors keep their last command."""
         self.crashed = why
         self.alarm = self.starting = self._later = None
         self.busy = False
@@ -209,12 +212,12 @@ class MartServer(ServerState):
         self._stop_queue.clear()
 
     def zero_heading(self) -> None:
-        """RM begins."""
+        """Set the relative heading to zero, as at the start of RM."""
         self.imu.drift(self.now_s, integrates=False)
         self.imu.heading_deg = 0.0
 
     def heading_deg(self) -> float:
-        """The relative heading, as RMRA tells it."""
+        """Return the relative heading in degrees, as RMRA reports it."""
         if self._step_at_s == inf:
             self.imu.drift(self.now_s, integrates=self.heading_integrates)
         return self.imu.heading_deg

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The commands that start no motion: questions, clock, log, files, and the motors by hand.
+"""The commands that do not start a motion: queries, clock, log, files, direct motor control.
 
-Knows what they answer and when. Must not know how they are distinguished.
+Knows their replies and delays. Must not know how commands are recognised.
 """
 
 import calendar
@@ -29,7 +29,7 @@ Handler = Callable[["MartServer", str], str | None]
 
 
 def missing(server: "MartServer", what: str) -> str | None:
-    """A number is missing that the server reads nevertheless."""
+    """Refuse a command that lacks numbers, or crash for the reason ``what`` as the server does."""
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
     server.end(what)
@@ -37,12 +37,12 @@ def missing(server: "MartServer", what: str) -> str | None:
 
 
 def fine(server: "MartServer", text: str) -> str | None:
-    """Accept a sound, which is not played."""
+    """Accept a command whose effect is not simulated (SMCST, STPMCST, SSR, MFC)."""
     return "ok"
 
 
 def bare_fail(server: "MartServer", text: str) -> str | None:
-    """Answer fail, as there are no calibration files."""
+    """Answer fail, because calibration files do not exist (MNLV)."""
     return "fail"
 
 
@@ -52,22 +52,22 @@ def hello(server: "MartServer", text: str) -> str | None:
 
 
 def volts(server: "MartServer", text: str) -> str | None:
-    """Answer with the battery's voltage."""
+    """Answer with the voltage of the battery in V."""
     return f"ok {server.chassis.volts:.2f}"
 
 
 def docked(server: "MartServer", text: str) -> str | None:
-    """Whether the switch is pressed."""
+    """Answer whether the dock switch is pressed."""
     return "ok true" if server.docked else "ok false"
 
 
 def heading(server: "MartServer", text: str) -> str | None:
-    """RMRA."""
+    """Answer with the relative heading in degrees (RMRA)."""
     return wire.degrees(server.heading_deg())
 
 
 def last_measured(server: "MartServer", text: str) -> str | None:
-    """MCD, MD."""
+    """Answer 0, because what MCD and MD ask for is not simulated."""
     return "ok 0"
 
 
@@ -76,7 +76,7 @@ def _ask_board(server: "MartServer", then: Callable[["MartServer"], None]) -> No
 
 
 def encoder(server: "MartServer", text: str) -> str | None:
-    """ENC."""
+    """Answer with the encoder count, or fail if the motor board is silent (ENC)."""
     _ask_board(server, _tell_encoder)
     return None
 
@@ -86,7 +86,7 @@ def _tell_encoder(server: "MartServer") -> None:
 
 
 def motor_status(server: "MartServer", text: str) -> str | None:
-    """MCSTAT."""
+    """Answer with the status bits of the motor board, or 255 if it is silent (MCSTAT)."""
     _ask_board(server, _tell_status)
     return None
 
@@ -97,7 +97,7 @@ def _tell_status(server: "MartServer") -> None:
 
 
 def sonar(*, backward: bool) -> Handler:
-    """SFC, SRC; what is near is measured three times."""
+    """Return the handler of SFC or SRC; a near obstacle takes three measurements."""
 
     def handle(server: "MartServer", text: str) -> str | None:
         least = REAR_CLEARANCE_IN if backward else FRONT_CLEARANCE_IN
@@ -118,12 +118,15 @@ def _tell_rear(server: "MartServer") -> None:
 
 
 def record_sonar(server: "MartServer", text: str) -> str | None:
-    """SFR, SRR minutes; no file is played."""
+    """Accept a recording of some minutes (SFR, SRR), whose file is not simulated."""
     return "ok" if wire.fields(text) else missing(server, f"{text} without a number")
 
 
 def take_bias(server: "MartServer", text: str) -> str | None:
-    """SB; opens an IMU that was given up, if it lives."""
+    """Measure the gyro bias (SB).
+
+    An IMU that was given up is opened again first, and the command fails if that is impossible.
+    """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):
         server.later(RESET_FAILS_S, _fail)
@@ -138,7 +141,7 @@ def _fail(server: "MartServer") -> None:
 
 
 def reset(server: "MartServer", text: str) -> str | None:
-    """RST IMU, RST MC."""
+    """Reset the IMU or the motor board (RST IMU, RST MC)."""
     if text == "RST IMU":
         plugged = server.imu.plugged(server.now_s)
         server.imu.closed = True
@@ -167,7 +170,7 @@ def _reset_board(server: "MartServer") -> None:
 
 
 def set_time(server: "MartServer", text: str) -> str | None:
-    """TIME m d yyyy h mi s in UTC; the seconds are ignored."""
+    """Set the clock in UTC (TIME m d yyyy h mi s); the seconds are ignored."""
     numbers = [wire.integer(word) for word in text.split(" ")[1:] if word]
     if len(numbers) < 6:
         return missing(server, "TIME with fewer than six numbers")
@@ -184,7 +187,7 @@ def set_time(server: "MartServer", text: str) -> str | None:
 
 
 def open_log(server: "MartServer", text: str) -> str | None:
-    """LOG; what is open stays open."""
+    """Open the log (LOG); a log that is open stays open."""
     if server.log is None:
         if server.quirks.log_deletes_files:
             server.files.clear()
@@ -194,7 +197,7 @@ def open_log(server: "MartServer", text: str) -> str | None:
 
 
 def last_file(which: str) -> Handler:
-    """LAST MOVE, LAST TURN."""
+    """Return the handler that sends the last file of a kind (LAST MOVE, LAST TURN)."""
 
     def handle(server: "MartServer", text: str) -> str | None:
         name = server.last_files.get(which)
@@ -213,7 +216,7 @@ def last_file(which: str) -> Handler:
 
 
 def leave(server: "MartServer", text: str) -> str | None:
-    """EXIT."""
+    """End the program (EXIT), after sending the log if one is open."""
     if server.log is not None:
         content = (
             "\n".join([*server.log, f"{server.date} UDP server shutting down"]) + "\n"
@@ -228,19 +231,19 @@ def leave(server: "MartServer", text: str) -> str | None:
 
 
 def start_record(server: "MartServer", text: str) -> str | None:
-    """REC START; no file is played."""
+    """Begin a recording (REC START), whose file is not simulated."""
     server.recording = True
     return "ok"
 
 
 def stop_record(server: "MartServer", text: str) -> str | None:
-    """REC STOP."""
+    """End a recording (REC STOP)."""
     server.recording = False
     return "ok"
 
 
 def set_motors(server: "MartServer", text: str) -> str | None:
-    """MCS right left: the registers themselves, once."""
+    """Write the motor registers directly, right first, once (MCS)."""
     numbers = wire.fields(text)
     if len(numbers) < 2:
         return missing(server, "MCS with one number")
@@ -250,7 +253,7 @@ def set_motors(server: "MartServer", text: str) -> str | None:
 
 
 def stop_motors(server: "MartServer", text: str) -> str | None:
-    """MSM: ends MCS."""
+    """Stop the motors if MCS started them (MSM)."""
     if server.manual:
         server.manual = False
         server.drive(128, 128)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a simulated MART motion controller and its robot are like: sizes, planted faults, firmware.
+"""Settings of a simulated MART controller and its robot: sizes, planted faults, firmware.
 
-``Quirks`` are the ways in which the public server departs from its manual, one switch each, so that
-a driver can be tried against either, or against one of them alone.
+``Quirks`` are the deviations of the public server from its manual, one switch each, so that a
+driver can be tested against both, or against a single deviation.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -13,36 +13,42 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quirks:
-    """All off: as the manual says.
+    """Deviations of the public server from its manual: none by default.
 
-    stop_port_keeps_motion: SL ends F, B and RM, but the motion stays in progress: all that follows
-        fails with a conflict, and SM or SRM hangs the command port for good.
-    spin_stop_ends_drives: SS does to F, B and RM what SL does.
-    early_stop_is_ignored: a stop on the stop port before the reply to F, B, R, L or RM.
+    stop_port_keeps_motion: SL stops F, B and RM, but the motion stays in progress: every later
+        motion is refused with a conflict, and SM or SRM hangs the command port for good.
+    spin_stop_ends_drives: SS acts on F, B and RM as SL does.
+    early_stop_is_ignored: a stop on the stop port has no effect before the reply to F, B, R, L or
+        RM.
     left_spin_in_reference_move: L during RM is accepted, and hangs the command port.
-    moves_wait_for_imu: F, B, TF, TB and SB wait for a dead IMU, and then go on.
-    drives_trust_imu: RM, R and L start without a living IMU, and every uncontrolled motion goes on
-        without one, blind to obstacles. Only samples of the IMU see that it started or stopped.
-    reference_speed_wraps: RM below 1 or above 127 is a register that wraps, and RMCS clamps it.
-    reference_start_counts_on: RM counts the samples until the wheel turns from where its last stop
-        left off. After a stop of 0.56 to 0.6 s it fails at once; after a longer one it waits for a
-        stuck motor for good. The reason that it gives is that of the last F or B.
-    speed_word_first: a speed word counts in front of the number only. Behind it, it is ignored.
-    zero_distance_is_unlimited: TF, TB, MCF and MCB by 0 inches, or by a word, drive until stopped.
-    echoes_distance: TF and TB answer what they should have driven.
-    crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR with fewer numbers end the server.
-    empty_datagram_ends: so does an empty datagram.
-    exit_is_silent: EXIT without LOG before is not answered.
-    log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, which are then not there.
-    unknown_reset_repeats: RST of something unknown is answered by the last reply.
-    clock_moves_heading: TIME during a motion turns the relative heading with it.
-    undocumented_commands: those that the manual does not have, ENC apart.
-    heading_in_reference_moves_only: RMRA stands still but in RM. So the public source reads; the
-        server that was run answers RMRA at any time.
-    probe_turns: MCR by 0 starts the motors until the wheel moves, or for 0.5 s if the IMU is dead.
-        So the public source reads.
-    heading_starts_off: the first sample of RM counts the time since the one before. So the public
-        source reads.
+    moves_wait_for_imu: F, B, TF, TB and SB wait until a dead IMU works again, and then continue.
+    drives_trust_imu: RM, R and L start without a working IMU, and every uncontrolled motion
+        continues without one, blind to obstacles. Its start and its stop are detected by samples of
+        the IMU only.
+    reference_speed_wraps: RM with a speed below 1 or above 127 writes a register value that wraps
+        around, which RMCS then clamps.
+    reference_start_counts_on: RM does not reset its count of samples until the wheel turns, but
+        continues from the count of its last stop. After a stop of 0.56 to 0.6 s it fails at once;
+        after a longer one it waits for a stuck motor for good. The reason in its reply is that of
+        the last F or B.
+    speed_word_first: a speed word has effect in front of the number only. Behind it, it is ignored.
+    zero_distance_is_unlimited: TF, TB, MCF and MCB with 0 inches, or with a word instead of a
+        number, drive until stopped.
+    echoes_distance: TF and TB reply with the distance computed from time, not the distance driven.
+    crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR with too few numbers end the server.
+    empty_datagram_ends: an empty datagram at the command port ends the server.
+    exit_is_silent: EXIT is not answered unless LOG was sent before.
+    log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, which then fail.
+    unknown_reset_repeats: RST with an unknown word is answered by the last reply.
+    clock_moves_heading: TIME during a motion integrates the turn rate over the jump of the clock.
+    undocumented_commands: commands that the manual lacks are accepted; without, of these only ENC
+        is.
+    heading_in_reference_moves_only: the heading of RMRA changes during RM only, according to the
+        public source. The server that was run updates it at any time.
+    probe_turns: MCR by 0 runs the motors until the wheel moves, or for 0.5 s if the IMU is dead,
+        according to the public source.
+    heading_starts_off: the first sample of RM is integrated over the time since the last sample of
+        the previous RM, according to the public source.
     """
 
     stop_port_keeps_motion: bool = False
@@ -73,9 +79,9 @@ _SOURCE_ALONE = ("heading_in_reference_moves_only", "probe_turns", "heading_star
 FIRMWARE = Quirks(
     **{field.name: True for field in fields(Quirks) if field.name not in _SOURCE_ALONE}
 )
-"""As the public server was seen to behave."""
+"""Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""The same where its source says something else than what was seen."""
+"""Quirks as observed, except where the public source contradicts the observation."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {
@@ -89,17 +95,19 @@ Stuck = Literal["none", "left", "right", "both"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MartSettings:
-    """The controller, its robot, and where it is.
+    """Settings of the controller, its robot and its surroundings.
 
-    speed_mps_per_unit: of a wheel at nominal_volts; the speed grows with the voltage.
-    dead_zone_units: a motor stands below it. motor_inequality: how much faster the left motor is
-    than the right one, as a part of the speed. encoder_sign: -1 where forward counts down.
-    gyro_bias_dps: what the server does not know of. gyro_noise_dps: standard deviation of a sample
-    while a wheel turns. imu_dies_s, imu_returns_s: since construction. stuck: wheels that do not
+    speed_mps_per_unit: wheel speed per register unit at nominal_volts; it grows with the voltage.
+    dead_zone_units: effort below which a motor does not turn. motor_inequality: how much faster the
+    left motor is than the right one, as a fraction of the speed. encoder_sign: -1 if the count
+    decreases forward. gyro_bias_dps: bias that the server does not know until it measures it.
+    gyro_noise_dps: standard deviation of a sample while a wheel turns. imu_dies_s, imu_returns_s:
+    times since construction when the IMU fails and when it works again. stuck: wheels that do not
     turn. motor_board_silent: its serial line is cut. motor_status: bits of MCSTAT, besides those of
-    the voltage; a tripped or short motor stops. front_m, rear_m: walls across the way, from where
-    the robot begins. dock_m: the way forward to the dock. reference_start_fails: a build that
-    answers ``fail`` to RM, and moves. clock_s: what its wall clock shows at first, in Unix time.
+    the voltage; a tripped or short-circuited motor stops. front_m, rear_m: distances from the start
+    to walls across the x axis. dock_m: distance forward from the start to the dock.
+    reference_start_fails: a build that answers ``fail`` to RM, although the robot moves. clock_s:
+    initial wall clock in Unix time.
     """
 
     quirks: Quirks = FIRMWARE

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is true of a simulated server and its robot, and what the server believes.
+"""State of a simulated server and its robot: true values, and what the server believes.
 
-Values and what follows from them. Must not know how time passes, nor commands.
+Holds values and what follows from them. Must not know how time passes, nor commands.
 """
 
 import time
@@ -16,9 +16,9 @@ from omnibot_driver.simulator.mart.motion import INCHES_PER_M, Kind, Motion
 from omnibot_driver.simulator.mart.settings import MartSettings
 
 COMMAND, STOP = 0, 1
-"""The ports, by their place."""
+"""Indices of the command port and the stop port."""
 NEAR_READINGS_S = 0.15
-"""Three readings confirm that something is near."""
+"""Duration of the three readings that confirm a near obstacle, in s."""
 FARTHEST_IN = 254
 FILES = 100
 
@@ -26,7 +26,7 @@ Then = Callable[..., None]
 
 
 class Waiter(NamedTuple):
-    """The thread of a port waits until a motion has started or stopped."""
+    """The thread of a port that waits for the notice that a motion has started or stopped."""
 
     port: int
     kind: Kind
@@ -35,13 +35,13 @@ class Waiter(NamedTuple):
 
 
 class ServerState:
-    """``now_s``: simulated time, since construction.
+    """The state of the server, its robot and its surroundings.
 
-    crashed: why the server is not there any more; empty while it runs. busy: a command is being
-    executed. motions: what the server knows of each kind; alarm: the one that it watches; starting:
-    the one whose command is not answered yet. custom: parameters that were set. sampling_since_s:
-    since when a motion uses a sonar, or -1. front_m, rear_m, dock_m, and what the chassis and the
-    IMU have, can be changed.
+    now_s: simulated time since construction. crashed: why the server ended; empty while it runs.
+    busy: a command is in progress. motions: what the server knows of each kind; alarm: the kind
+    that it supervises; starting: the kind whose command is not answered yet. custom: parameters set
+    by SLMP and SSP. sampling_since_s: since when a motion uses a sonar, or -1. front_m, rear_m,
+    dock_m and the attributes of the chassis and the IMU can be changed at any time.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -56,7 +56,7 @@ class ServerState:
         self.files: dict[str, FileNote] = {}
 
     def begin(self) -> None:
-        """The program starts: it knows nothing."""
+        """Reset all that the program knows, as when it starts."""
         self.crashed = ""
         self.motions = [Motion(kind) for kind in Kind]
         self.alarm: Kind | None = None
@@ -81,7 +81,7 @@ class ServerState:
 
     @property
     def stop_port_hung(self) -> bool:
-        """The same of the stop port."""
+        """Whether the stop port is silent for good, although the server runs."""
         return any(waiter.port == STOP and waiter.kind is not self.alarm for waiter in self.waiters)
 
     @property
@@ -91,50 +91,53 @@ class ServerState:
 
     @property
     def motion(self) -> Kind | None:
-        """The motion that is in progress as the server sees it."""
+        """Kind of motion in progress as the server sees it, or None."""
         return next((each.kind for each in self.motions if each.running), self.starting)
 
     @property
     def clock_s(self) -> float:
-        """The wall clock, in Unix time."""
+        """Wall clock of the server, in Unix time."""
         return self.now_s + self.clock_offset_s
 
     @property
     def date(self) -> str:
-        """The same, as files begin."""
+        """Wall clock of the server as text, in the form at the beginning of its files."""
         return time.strftime("%m/%d/%Y  %H:%M:%S", time.gmtime(self.clock_s))
 
     @property
     def docked(self) -> bool:
-        """Whether the robot stands at its dock."""
+        """Whether the robot is at its dock."""
         return self.chassis.x_m >= self.dock_m
 
     @property
     def driven_m(self) -> float:
-        """The distance of the right wheel since the encoder was reset."""
+        """Distance of the right wheel in m since the encoder was reset, by its counts."""
         return self.chassis.counts * self.settings.metres_per_count
 
     @property
     def conflict(self) -> bool:
-        """Whether something is in progress that refuses other motions."""
+        """Whether something in progress makes the server refuse other motions."""
         return self.manual or self.recording or any(each.running for each in self.motions)
 
     def save(self, note: FileNote) -> None:
-        """Keep a file, as the last of its kind."""
+        """Keep a file as the last move or turn; beyond 100 files, drop the oldest."""
         self.files[note.name] = note
         if len(self.files) > FILES:
             del self.files[next(iter(self.files))]
         self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
 
     def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
-        """The present or last reading of a sonar, in inches; -1 if it sees nothing."""
+        """Return the reading of a sonar ``ago_s`` ago, in inches; -1 if it sees nothing."""
         seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
         way_m = self.chassis.speed_mps * ago_s
         inches = (seen_m - way_m if backward else seen_m + way_m) * INCHES_PER_M
         return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
 
     def clearance_in(self, *, backward: bool) -> int:
-        """The last reading of the sonar that is sampled in a motion."""
+        """Return the last reading in inches of the sonar that a motion uses.
+
+        It is -1 if the sonar sees nothing, or before its first reading.
+        """
         since_s = self.sampling_since_s
         if since_s < 0.0 or self.now_s - since_s < NEAR_READINGS_S:
             return -1
@@ -146,7 +149,11 @@ class ServerState:
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
     def sample_reference(self, *, first: bool) -> None:
-        """A sample of RM; by its source, the first counts the time since the one before."""
+        """Note the time of a sample of RM.
+
+        With ``heading_starts_off``, the first sample of RM is integrated over the time since the
+        last sample of the previous RM.
+        """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s
         if first and before_s is not None and self.quirks.heading_starts_off:

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The second port: stops that are heard while the first one is busy, and are not answered.
+"""The stop port: stop commands that work while the command port is busy, without a reply.
 
-Knows its three commands. Must not know those of the first port.
+Knows its three commands. Must not know those of the command port.
 """
 
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ CONTROLLED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_SPIN
 
 
 def obey(server: "MartServer", text: str) -> None:
-    """Obey one stop command."""
+    """Execute one stop command: SL, SS or SDR."""
     quirks = server.quirks
     if text == "SL":
         _stop_first(server, DRIVES)
@@ -33,7 +33,7 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
-    """Stop an uncontrolled motion; whether a notice will tell that it stands."""
+    """Stop an uncontrolled motion; return whether a notice of its end will follow."""
     if motion.kind is Kind.SPIN:
         if motion.stopping:
             return False
@@ -70,7 +70,7 @@ def _stop_first(server: "MartServer", kinds: tuple[Kind, ...]) -> None:
 
 
 def _limit(server: "MartServer", text: str) -> None:
-    """A move without an end gets one, counted from where it began to move."""
+    """Limit an unlimited move to a distance in inches from where it began to move (SDR)."""
     motion = next(
         (each for each in server.motions if each.running and each.kind in DRIVES[1:3]), None
     )

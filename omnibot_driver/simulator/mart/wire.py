@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Datagrams of the protocol as the server reads and writes them; from the manual, its own codec.
+"""Codec of the datagrams as the server reads and writes them, written from the manual alone.
 
-A request is one line of text without an end. Numbers are read as C's ``atoi`` reads them. Knows no
-meaning of a command.
+A request is one line of text without a terminator. Numbers are parsed as C's ``atoi`` parses them.
+Must not know the meaning of a command.
 """
 
 import re
@@ -15,7 +15,7 @@ _NUMBER = re.compile(r"\s*([+-]?\d+)")
 
 
 def text_of(datagram: bytes) -> str:
-    """The part of a request that the server understands: up to the first NUL of its buffer."""
+    """Return the part of a request that the server reads: its first 50 bytes, up to a NUL."""
     return datagram[:LONGEST_REQUEST].partition(b"\0")[0].decode("latin-1")
 
 
@@ -25,22 +25,22 @@ def reply(text: str) -> bytes:
 
 
 def integer(text: str) -> int:
-    """The number that it begins with, or 0."""
+    """Return the number at the beginning of the text, or 0."""
     found = _NUMBER.match(text)
     return int(found[1]) if found else 0
 
 
 def fields(text: str) -> list[str]:
-    """The text behind each blank, up to the end."""
+    """Return, for each blank, all the text behind it."""
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 
 
 def degrees(angle_deg: float) -> str:
-    """An angle of RM."""
+    """Return the reply of RMCS and RMRA with an angle in degrees."""
     return f"ok {angle_deg:.2f}"
 
 
 def blocks(name: str, content: bytes) -> list[bytes]:
-    """A file: its name and size, then its bytes."""
+    """Return the datagrams of a file: its name and size, then its bytes."""
     head = reply(f"ok {name} {len(content)}")
     return [head, *(content[at : at + BLOCK] for at in range(0, len(content), BLOCK))]

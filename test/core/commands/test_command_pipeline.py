@@ -16,7 +16,7 @@ GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
 
 
 def running(**options: object) -> Bench:
-    """A board that stands still and runs, with nothing left to say on the line."""
+    """Return a bench with a running board at rest, after the driver has stopped sending."""
     bench = Bench(BoardSettings(running=True), **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -30,7 +30,7 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """The frames since a mark that were sent in mode 1, and Stop, as words with their times."""
+    """Return the words of mode 1 frames (base velocity) and Stops since a mark, with times."""
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -40,7 +40,7 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """The base after the wheels too: Stop, then the newest."""
+    """The same holds for the base after the wheels: Stop, then the newest command."""
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)
@@ -57,7 +57,7 @@ def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
 
 
 def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
-    """The base drives on, without a Stop."""
+    """The base continues without a Stop."""
     bench.drive(0.3)
     start = len(bench.written)
     with pytest.raises(CommandRefused):
@@ -67,7 +67,7 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """1 m/s² to 0.3 and 0.4 m/s takes half a second; 70 LSB per m/s; the bench has 10 ms."""
+    """At 1 m/s² it takes 0.5 s to 0.3 and 0.4 m/s; words are 70 LSB per m/s."""
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):
@@ -100,18 +100,18 @@ def test_a_reversal_is_ramped_through_zero() -> None:
 
 
 def test_turning_is_ramped_by_its_own_limit() -> None:
-    """2 rad/s² to 0.5 rad/s is a quarter of a second."""
+    """At 2 rad/s² it takes 0.25 s to 0.5 rad/s."""
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.drive(0.0, 0.0, 0.5)
     bench.run(0.3)
     words = [yaw_rate for _, (_, _, yaw_rate) in velocities(bench, start)]
-    assert words[:3] == [10, 30, 50]  # a tick of the bench is 10 ms
+    assert words[:3] == [10, 30, 50]  # one tick of the bench is 10 ms
     assert words[13] == words[-1] == 250
 
 
 def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
-    """A zero command may mean that somebody is in front of it."""
+    """A zero command may mean that a person is in front of the robot."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)
@@ -123,7 +123,7 @@ def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
 
 @pytest.mark.slow
 def test_what_comes_after_a_stop_begins_at_rest() -> None:
-    """A timeout, an e-stop and a zero command each take the set-point along."""
+    """A timeout, an e-stop and a zero command each reset the set point to zero."""
     bench = running(limits=GENTLE)
     for stop in (
         lambda: bench.run(1.0),
@@ -150,7 +150,7 @@ def test_wheels_are_not_ramped() -> None:
 
 
 def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
-    """One that is 0.3 s old has 0.2 s left."""
+    """A command that is 0.3 s old has 0.2 s left."""
     bench.drive(0.3, age_s=0.3)
     bench.run(0.19)
     assert bench.written[-1][1] != STOP
@@ -159,7 +159,7 @@ def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
 
 
 def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
-    """The sender's clock is a little ahead."""
+    """The sender's clock is a little ahead; the command still expires 0.5 s after its arrival."""
     bench.drive(0.3, age_s=-0.3)
     bench.run(0.49)
     assert bench.written[-1][1] != STOP
@@ -171,7 +171,7 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """It has no effect."""
+    """The command before it expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The e-stop: latched at once, repeated without end, ended by nothing but its release."""
+"""The e-stop: latched at once, repeated without end, ended only by its release."""
 
 from unittest.mock import ANY
 
@@ -63,7 +63,7 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """Latched while there was no port; the answer says so."""
+    """It is latched while the port is closed; the answer says so."""
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
@@ -76,7 +76,7 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_nothing(
     bench: Bench,
 ) -> None:
-    """A hundred commands under the latch, and nothing moves when it is let go."""
+    """A hundred commands are refused under the latch, and the release moves nothing."""
     estop(bench, True)
     for _ in range(100):
         with pytest.raises(CommandRefused, match="e-stop"):
@@ -90,7 +90,7 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """Released and commanded, it stands: after a second the driver says so, once; a reset helps."""
+    """If it stays at rest for 1 s when commanded, the driver reports it once; a reset helps."""
     bench = driving(estop_latches=True)
     estop(bench, True)
     bench.run(1.0)
@@ -108,7 +108,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """Speeding up takes its time, and that is all."""
+    """The robot needs time to speed up, which is not a fault."""
     for _ in range(3):
         estop(bench, True)
         bench.run(0.5)
@@ -127,7 +127,7 @@ def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) ->
 
 
 def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
-    """It is latched and sent, but not a byte has come from the board for a while."""
+    """It is latched and sent, but data from the board has been missing for a while."""
     assert estop(bench, True) == "e-stop latched"
     bench.speaks = False
     bench.run(2.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed limits keep the direction; rounding and saturation are honest."""
+"""Speed limits keep the direction, and rounding and saturation keep within the limits."""
 
 import math
 
@@ -25,7 +25,7 @@ ULPS = 1 + 1e-11
 
 
 def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
-    """Parallel to nine digits, and not opposite; a zero has every direction."""
+    """Return whether they are parallel to nine digits and not opposite; zero has all directions."""
     largest_a, largest_b = max(map(abs, a)), max(map(abs, b))
     if largest_a < 1e-290 or largest_b < 1e-290:
         return True
@@ -53,7 +53,7 @@ def test_a_shortened_vector_keeps_its_direction_and_the_limit(
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3), limits)
 def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: float) -> None:
-    """The vector is equal bit by bit; a longer one is cut to the limit."""
+    """The vector is equal bit for bit; a longer one is shortened to the limit."""
     length = math.hypot(*vector)
     if length <= limit / ULPS:
         assert shorten(vector, limit) == tuple(vector)
@@ -64,7 +64,7 @@ def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: 
 @given(vectors, limits)
 @example([1e308, -1e308], 17.0)
 def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit: float) -> None:
-    """The fastest decides for all."""
+    """The fastest wheel sets the factor for all."""
     slowed = slow(values, limit)
     assert max(map(abs, slowed)) <= limit * ULPS
     assert limit == 0 or same_direction(slowed, values)
@@ -74,7 +74,7 @@ def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit
 
 @given(any_twists)
 def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: BodyTwist) -> None:
-    """The linear velocity as a vector; the yaw rate keeps its sign."""
+    """The linear velocity is limited as a vector; the yaw rate keeps its sign."""
     limited = SpeedLimits(linear_mps=0.5, angular_radps=0.7).twist(twist)
     assert math.hypot(limited.vx_mps, limited.vy_mps) <= 0.5 * ULPS
     assert abs(limited.yaw_rate_radps) <= 0.7
@@ -106,13 +106,13 @@ def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
 
 
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
-    """3 and 4 m/s become 0.3 and 0.4, not 0.5 and 0.5; a turn is not part of it."""
+    """3 and 4 m/s become 0.3 and 0.4, not 0.5 and 0.5; the yaw rate is limited separately."""
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
     assert limited == BodyTwist(pytest.approx(0.3), pytest.approx(-0.4), 0.1)
 
 
 def test_wheels_are_limited_by_the_fastest() -> None:
-    """A command of 34 rad/s halves all three."""
+    """At a limit of 17 rad/s, a command of 34 rad/s halves all three."""
     limited = SpeedLimits(wheel_radps=17.0).wheels((34.0, -17.0, 1.0))
     assert limited == pytest.approx((17.0, -8.5, 0.5))
 
@@ -144,7 +144,7 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear one as a vector, on the straight way; what is within reach is reached exactly."""
+    """The linear velocity changes as a vector, straight to the wanted one, and reaches it."""
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)
     after = limits.approach(now, wanted, duration_s)
@@ -170,7 +170,7 @@ def test_an_acceleration_of_zero_is_no_limit() -> None:
 
 @pytest.mark.parametrize("age_s", [0.0, 0.5, -0.5])
 def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
-    """A clock that is ahead by as much is forgiven as well."""
+    """A clock that is ahead by up to the limit is accepted as well."""
     require_timely("cmd_vel", age_s, 0.5)
 
 

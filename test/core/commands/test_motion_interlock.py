@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When a robot that did not move as commanded may move again."""
+"""Rules by which a robot that did not move as commanded may move again."""
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
 
@@ -8,7 +8,7 @@ TIMEOUT_S = 0.5
 
 
 def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> bool:
-    """A command; whether it is let through."""
+    """Return whether a command is accepted."""
     return not interlock.arrive(now, TIMEOUT_S, stands=stands)
 
 
@@ -20,7 +20,7 @@ def test_motion_is_allowed_until_something_trips() -> None:
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """Each refused command begins the silence anew."""
+    """Each refused command restarts the required silence."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -29,7 +29,7 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """Counted from the last command, not from the trip."""
+    """The silence is counted from the last command, not from the trip."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -37,7 +37,7 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """The zero command itself is let through."""
+    """The zero command itself is accepted."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -46,7 +46,7 @@ def test_a_zero_command_ends_the_refusal() -> None:
 
 
 def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
-    """Zero commands are still let through."""
+    """Zero commands are still accepted."""
     interlock = MotionInterlock()
     interlock.trip(0.0)
     arrives(interlock, 1.0, stands=True)
@@ -72,7 +72,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """This holds after the second trip; a release before it changes nothing."""
+    """This holds after the second trip; an e-stop release before it changes nothing."""
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The one motion rule: the robot moves on nothing but a fresh command, to a board that is heard."""
+"""The motion rule: only a fresh command moves the robot, and only while its data arrives."""
 
 import contextlib
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 
 def unpause(bench: Bench) -> None:
-    """Paused by somebody else, and un-paused again before anybody has noticed."""
+    """Pause the board from outside, and resume it before the driver notices."""
     bench.board.receive(b"P")
     bench.run(0.02)
     bench.board.receive(b"P")
@@ -58,7 +58,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """It booted and was started within a moment, and no notice was heard."""
+    """The board boots and is started within a moment, and its notice is lost."""
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -77,7 +77,7 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """Silence ends the command sooner than a board can boot: its words may hide letters."""
+    """Silence ends the command before the board has booted; a frame may contain an S."""
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -104,7 +104,7 @@ def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Requ
 
 @pytest.mark.parametrize("state", ["connecting", "paused"])
 def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
-    """A paused board takes a 0x52 inside a motion command for R."""
+    """A paused board takes 0x52 inside a motion command for R."""
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state(state)
@@ -114,13 +114,13 @@ def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
 
 
 def test_motion_is_refused_without_a_port() -> None:
-    """The message says so."""
+    """The message says that the board is not connected."""
     with pytest.raises(CommandRefused, match="not connected"):
         Bench().drive(0.3)
 
 
 def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
-    """Timeout, a second of Stop, then a quiet line."""
+    """After the timeout, Stop is sent for a second; then the line is quiet."""
     bench.drive(0.5)
     bench.run(0.4)
     assert not bench.still()
@@ -163,7 +163,7 @@ def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
 
 
 def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Bench) -> None:
-    """A thousand zeros a second are still no more than one Stop per control tick."""
+    """A thousand zero commands a second cause only one Stop per control tick."""
     bench.speaks = False
     bench.run(0.5)
     start = len(bench.written)
@@ -179,7 +179,7 @@ def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Ben
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
     bench: Bench,
 ) -> None:
-    """The board drove on with its last command; it must not when it is heard again."""
+    """The board continues with its last command until its data arrives again."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = bench.hears = False
@@ -191,7 +191,7 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """What was current is not repeated; the silence was its own."""
+    """The last command is not repeated, and the board is not blamed for the driver's stall."""
     bench.drive(vx=0.3)
     bench.run(0.2)
     mark = len(bench.written)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Scales of the board that change while the robot drives: the repeated command is said in them."""
+"""Scales of the board that change while the robot drives: the current command is converted."""
 
 from robots import driving
 from session_bench import STOP, Bench, bare
@@ -12,12 +12,12 @@ RAMP = SpeedLimits(linear_mps2=0.5)
 
 
 def last(bench: Bench) -> bytes:
-    """The frame written last."""
+    """Return the last written frame."""
     return bare(bench.written[-1][1])
 
 
 def going_to(x_m: float) -> Bench:
-    """A board whose switch stands on position, on its way to a goal ahead."""
+    """Return a board with its switch on position, on its way to a goal ahead."""
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()
     bench.run_until_state("nominal")
@@ -27,7 +27,7 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """0.4 m/s are 28 LSB at 70, and 40 at 100; there is no new command."""
+    """0.4 m/s is 28 LSB at 70 LSB per m/s, and 40 LSB at 100; a new command is not needed."""
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)
@@ -38,7 +38,7 @@ def test_a_velocity_is_repeated_in_the_new_scale() -> None:
 
 
 def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> None:
-    """10 rad/s of a wheel of 0.029 m are 20 LSB at 70 LSB per m/s; twice as large they are 41."""
+    """10 rad/s at a radius of 0.029 m and 70 LSB per m/s is 20 LSB; at twice the radius, 41 LSB."""
     bench = driving()
     bench.turn_wheels(10.0, 0.0, -10.0)
     bench.run(0.1)
@@ -49,7 +49,7 @@ def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> No
 
 
 def test_a_goal_is_repeated_in_the_new_scale() -> None:
-    """1 m is 1000 LSB, then 500."""
+    """1 m is 1000 LSB at first, then 500."""
     bench = going_to(1.0)
     assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
     bench.configure_board(position_scale=500.0)
@@ -58,7 +58,7 @@ def test_a_goal_is_repeated_in_the_new_scale() -> None:
 
 
 def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() -> None:
-    """10 m at 10,000 LSB per m are more than a word holds."""
+    """10 m at 10,000 LSB per m exceeds a 16-bit word."""
     bench = going_to(10.0)
     bench.configure_board(position_scale=10_000.0)
     assert last(bench) == bare(STOP)
@@ -88,7 +88,7 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """Base vector control with zeros would be another command."""
+    """Velocity zero in mode 1 would be another command."""
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)
@@ -97,7 +97,7 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
 
 
 def test_a_robot_that_nobody_commands_hears_nothing_of_it() -> None:
-    """The line stays quiet."""
+    """Nothing is written on a new scale."""
     bench = driving()
     bench.run(3.0)
     start = len(bench.written)

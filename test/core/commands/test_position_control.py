@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Goals through a session to a simulated board whose switch stands on position."""
+"""Goals through a session to a simulated board whose switch is set to position control."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ ORIGIN = BoardPose()
 def at_position_control(
     initial_pose: BoardPose = ORIGIN, *, imu_only: bool = False, **options: object
 ) -> Bench:
-    """A board that runs, with its switch on position and its pose known to the driver."""
+    """Return a running board, its switch on position, whose pose is known to the driver."""
     settings = BoardSettings(
         running=True, control="position", initial_pose=initial_pose, imu_only=imu_only
     )
@@ -41,14 +41,14 @@ def where(bench: Bench) -> tuple[float, float, float]:
 
 
 def words(bench: Bench) -> list[int]:
-    """The words of the last frame written."""
+    """Return the words of the last written frame."""
     data = bare(bench.written[-1][1])
     assert data[:3] == b"\xff\xfe\x01"
     return [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)]
 
 
 def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench: Bench) -> None:
-    """1 m, -0.5 m and a quarter turn; nothing acknowledges it, so it is said again, for ever."""
+    """The goal is 1 m, -0.5 m and a quarter turn; the board does not acknowledge it."""
     start = len(bench.written)
     bench.go_to(1.0, -0.5, 1.571)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 03 E8 FE 0C 06 23")
@@ -64,7 +64,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
     heading: float, signs: tuple[int, int, int]
 ) -> None:
-    """The driver attaches late, to a turned robot with mirrored axes."""
+    """The driver attaches late to a turned robot, whose axes may be mirrored."""
     bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
     bench.go_to(0.8, 0.4, 0.9)
     bench.run(8.0)
@@ -76,7 +76,7 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
-    """The board's heading is unwrapped; a goal never winds it back."""
+    """The board's heading is not wrapped; a goal never turns it back by full turns."""
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
     bench.go_to(0.0, 0.0, 0.4)
@@ -90,7 +90,7 @@ def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(tur
 
 
 def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) -> None:
-    """A different goal is never substituted."""
+    """The driver never sends a different goal instead."""
     bench.go_to(0.2, 0.0, 0.0)
     for x in (33.0, 1e300, -1.7e308):
         with pytest.raises(CommandRefused, match="the limits are"):
@@ -101,14 +101,14 @@ def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
-    """Any of its numbers may be wrong."""
+    """Each of its numbers is tested."""
     for goal in ((bad, 0.0, 0.0), (0.0, bad, 0.0), (0.0, 0.0, bad)):
         with pytest.raises(CommandRefused, match="NaN or infinity"):
             bench.go_to(*goal)
 
 
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
-    """0.3 m/s would be taken for the place 21 mm from the origin."""
+    """0.3 m/s would be taken for a place 21 mm from the origin."""
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
         with pytest.raises(CommandRefused, match="`control_method` is 'position'"):
@@ -117,7 +117,7 @@ def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench
 
 
 def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
-    """1 m would be taken for 14 m/s."""
+    """1 m would be taken for a velocity of 14 m/s."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(1.5)
@@ -136,7 +136,7 @@ def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str,
 
 
 def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
-    """What was lost on the line moves both frames' ideas of the robot alike."""
+    """Motion that was lost on the line shifts odom and the board's frame equally."""
     bench.go_to(1.0, 0.0, 0.0)
     bench.run(0.5)
     bench.speaks = False
@@ -171,7 +171,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The robot stands until a newer goal comes, which uses the board's frame of that time."""
+    """The robot is at rest until a newer goal, which is converted with the new board frame."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -189,7 +189,7 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """Zeros in mode one would mean: drive to the origin."""
+    """Zeros in mode 1 would mean: drive to the origin."""
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)
@@ -204,7 +204,7 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 def test_a_robot_that_drives_away_from_its_goal_is_stopped(
     goal: tuple[float, float, float],
 ) -> None:
-    """The switch stands on velocity, whatever the parameter says."""
+    """The board's switch is on velocity, although the parameter says position."""
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()
     bench.run(1.5)
@@ -215,7 +215,7 @@ def test_a_robot_that_drives_away_from_its_goal_is_stopped(
 
 
 def test_a_robot_that_is_pushed_a_little_keeps_its_goal(bench: Bench) -> None:
-    """It is held there, as it was asked to."""
+    """The board moves back to its goal after each push."""
     bench.go_to(0.3, 0.0, 0.0)
     bench.run(3.0)
     pushed = bench.board.odometry

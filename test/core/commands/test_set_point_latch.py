@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The e-stop in the stream of set-points, and its release."""
+"""The e-stop in the stream of set points, and its release."""
 
 import pytest
 from set_point_bench import BOTH, GO, STOP, TURN, Stream, make_stream, order, run
@@ -33,7 +33,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """Stop with it: firmware that ignores mode 10 has to stand as well. At first both twice."""
+    """Stop is added for firmware that ignores mode 10; the first time both are sent twice."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
@@ -46,7 +46,7 @@ def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stre
 def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
     stream: Stream,
 ) -> None:
-    """Letters at 50 Hz, and the stop still goes out at 20 Hz."""
+    """Letters are written at 50 Hz, and the stop is still repeated at 20 Hz."""
     stream.latch(1.0)
     written = 0
     for step in range(1000):
@@ -58,7 +58,7 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A button node may publish as fast as it likes; the line has to take other things too."""
+    """A button node may publish at any rate; the line must have room for other data."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001

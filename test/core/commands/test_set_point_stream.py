@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pacing, repeating and timing out, with frames that mean nothing."""
+"""Pacing, repeating and timing out of set points, with arbitrary bytes as frames."""
 
 import math
 from typing import Any
@@ -21,7 +21,7 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """A motion that is another with each frame until it has arrived."""
+    """A motion that changes with each frame, for a given number of frames."""
 
     authority, is_zero = Authority.BASE, False
 
@@ -46,13 +46,13 @@ def stream() -> Stream:
 
 
 def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> None:
-    """No timer stands between a command and the wire."""
+    """The command does not wait for a timer."""
     order(stream, GO, 1.0)
     assert stream.write(1.0) == GO
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """More frames would only be more targets for damage."""
+    """More frames would only be more bytes that can be corrupted."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
@@ -98,7 +98,7 @@ def test_stop_never_waits(stream: Stream) -> None:
 
 
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
-    """Only new commands are thinned."""
+    """Only new commands are paced."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(1.05) == GO
@@ -154,7 +154,7 @@ def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
     stream: Stream,
 ) -> None:
-    """This holds although the command in the middle was never written."""
+    """This holds although the command in between was never written."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -168,7 +168,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """It has been stopped already."""
+    """The first authority has been stopped already."""
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
     order(stream, TURN, 1.62, Authority.WHEELS)
@@ -178,7 +178,7 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
     stream: Stream,
 ) -> None:
-    """A second one would only be late."""
+    """A second Stop would only delay the new command."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)
@@ -188,7 +188,7 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """A Stop that was to go out at once, and the second of them, included."""
+    """This includes a Stop that was due at once, and its repetition."""
     order(stream, GO, 1.0)
     stream.halt(1.0)
     stream.discard(1.0)
@@ -216,7 +216,7 @@ STEPS = st.lists(
 def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
     steps: list[tuple[str, float]],
 ) -> None:
-    """The invariants of the outbound line under any sequence of events."""
+    """The rules for outbound frames hold under any sequence of events."""
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""
     for step, pause in steps:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The last bytes before the port is closed: the robot is stopped, and left as it was asked for."""
+"""The last bytes before the port is closed: the robot is stopped, then paused or reset if asked."""
 
 import pytest
 from robots import driving, paused, standing
@@ -21,7 +21,7 @@ def bench() -> Bench:
 def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
-    """Stop comes first."""
+    """Stop comes first, three times."""
     assert bench.last_words(on_exit) == 3 * STOP + expected
 
 
@@ -32,7 +32,7 @@ def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """P has been said and not yet shown: a second one alone would undo it."""
+    """P has been sent but not confirmed yet; a second P alone would undo it."""
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
     bench.speaks = False
@@ -47,7 +47,7 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """The notice is still believed, but S is on its way."""
+    """The driver still believes the last notice, but S is on its way."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -58,13 +58,13 @@ def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
 
 
 def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
-    """The last thing the board hears is that it must not move."""
+    """The last frame that the board receives forbids motion."""
     bench.session.estop(True, bench.now)
     assert bench.last_words("stop") == 3 * STOP + EMERGENCY_STOP
 
 
 def left(bench: Bench) -> None:
-    """Leave as the link does it: wait until the robot is seen to stand."""
+    """Leave as the link does: wait until the robot is seen at rest."""
     bench.session.shutdown.begin(bench.now)
     bench.settle()
     while not bench.session.shutdown.stands:
@@ -72,7 +72,7 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """Then nothing more is said that the line could damage."""
+    """After that, nothing is sent that the line could corrupt into a motion."""
     bench = driving()
     left(bench)
     assert bench.session.shutdown.fall_silent(bench.now)
@@ -85,7 +85,7 @@ def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends(
 
 
 def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
-    """A byte was added within it."""
+    """An inserted byte corrupts the Stop; then Stop is sent again."""
     bench = driving()
     left(bench)
     bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))

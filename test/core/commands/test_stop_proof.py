@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When a robot counts as standing, by its displacements."""
+"""Proof by displacements that a robot is at rest."""
 
 import pytest
 from hypothesis import given
@@ -27,7 +27,7 @@ def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> Dis
 
 
 def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
-    """The proof after displacements, one each 40 ms, the first 0.1 s after Stop."""
+    """Return whether displacements at these speeds, one each 40 ms from 0.1 s on, are a proof."""
     for number, speed in enumerate(speeds):
         proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
     return proof.proved
@@ -57,11 +57,11 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
     assert proof.proved
     assert 1.1 < proof.takes_s < 1.3
     proof.look(DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=60.0, lost=0), 71.1)
-    assert proof.takes_s < 4.0  # that was a gap
+    assert proof.takes_s < 4.0  # the long displacement is taken for a gap
 
 
 def test_one_displacement_alone_is_no_proof_however_long_it_is(proof: StopProof) -> None:
-    """Boards with a `delta_period` of 0.1 s send such."""
+    """Boards with a ``delta_period`` of 0.1 s send such displacements."""
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
     assert not proof.proved
@@ -90,7 +90,7 @@ def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopP
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """A new line does not settle the debt; neither does Stop alone."""
+    """Neither a new line nor Stop alone replaces the proof."""
     assert not proof.owed
     proof.moved()
     proof.stopped(10.0)
@@ -105,14 +105,14 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """This includes a robot that stood and is pushed."""
+    """This includes a robot that was at rest and is pushed."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved
 
 
 def test_a_displacement_of_unknown_duration_is_no_evidence(proof: StopProof) -> None:
-    """The first after a pause holds all motion since."""
+    """The first displacement after a pause includes all motion since."""
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
         proof.look(unknown, 10.1 + number * PERIOD_S)
@@ -120,7 +120,7 @@ def test_a_displacement_of_unknown_duration_is_no_evidence(proof: StopProof) -> 
 
 
 def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
-    """It needs no displacement to show it."""
+    """No displacement is needed to show it."""
     proof.paused()
     assert proof.proved
 
@@ -133,7 +133,7 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """An encoder that trembles by a count stands."""
+    """Small displacements, as of an encoder that flickers by one count, are regarded as rest."""
     proof = StopProof()
     proof.stopped(10.0)
     shown(proof, *before)
@@ -143,7 +143,7 @@ def test_whatever_came_before_standing_for_long_enough_proves_it(
 
 
 def without_deltas(bench: Bench) -> None:
-    """All of them are lost from now on; IMU frames and poses arrive."""
+    """Lose all delta frames from now on; IMU frames and poses still arrive."""
     step = bench.board.step
 
     def heard() -> bytes:
@@ -155,7 +155,7 @@ def without_deltas(bench: Bench) -> None:
 
 
 def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it() -> None:
-    """It stood, and was said to move, as all odometry frames were lost."""
+    """All odometry frames are lost, so the log says only that the stop is unconfirmed."""
     bench = driving()
     without_deltas(bench)
     bench.run(8.0)
@@ -165,7 +165,7 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
-    """It does not hear Stop, and no motion monitor says so."""
+    """The board does not receive Stop, and the motion monitor is off."""
     bench = driving()
     bench.configure(motion_monitor=False)
     bench.hears = False

@@ -54,7 +54,7 @@ def test_what_was_commanded_under_looser_ones_ends(
     ],
 )
 def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
-    """Neither do other accelerations and rates: the robot drives on."""
+    """The robot also continues under other accelerations and rates."""
     bench = driving()
     start = len(bench.written)
     bench.drive(0.4)
@@ -65,7 +65,7 @@ def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
 
 
 def test_a_robot_that_stands_is_told_nothing() -> None:
-    """There is no current command, or it is a zero command."""
+    """It has no current command, or a zero command."""
     bench = driving()
     bench.drive()
     bench.configure(limits=SpeedLimits(linear_mps=0.1))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A session and the simulated pair of Teensys on one workbench, in simulated time."""
+"""A session with the simulated pair of Teensy boards, in simulated time."""
 
 import math
 from collections.abc import Callable
@@ -26,7 +26,11 @@ WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
 
 
 class Bench:
-    """``hears``, ``speaks``: the channels that carry bytes to the robot, and from it."""
+    """A session with both simulated boards.
+
+    ``hears``: channels that carry bytes to the robot; ``speaks``: channels that carry bytes from
+    it.
+    """
 
     def __init__(
         self,
@@ -50,7 +54,7 @@ class Bench:
         self.now = 1000.0
         self.hears, self.speaks = {DRIVE, FRONT}, {DRIVE, FRONT}
         self.carry: Callable[[int, bytes], bytes] = lambda _, data: data
-        """What becomes of bytes on the way to us, by channel."""
+        """Function that changes or drops the bytes from the robot, by channel."""
         self.events: list[Event] = []
         self.written: list[tuple[float, int, bytes]] = []
 
@@ -132,7 +136,7 @@ class Bench:
         return [e.value for e in self.events if isinstance(e, Extra) and isinstance(e.value, kind)]
 
     def lines(self, channel: int, since: float = -math.inf) -> list[str]:
-        """What was written to a channel, line by line, without sums and padding."""
+        """Return the lines written to a channel since a time, without sums and padding."""
         text = b"".join(d for at, to, d in self.written if to == channel and at >= since)
         found = text.decode("ascii").split("\n")
         bare = [line[3:] if line.startswith(";") else line for line in found]
@@ -144,7 +148,7 @@ def nominal(
     settings: FejemisSettings | None = None,
     **more: Any,
 ) -> Bench:
-    """A pair that talks and obeys."""
+    """Return a bench in state nominal: both boards send, and obey."""
     bench = Bench(simulated, settings, **more)
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")

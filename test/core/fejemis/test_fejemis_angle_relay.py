@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of the front wheel on its way to the drive board, with characters lost."""
+"""The front wheel's angle on its way to the drive board, on a line that loses characters."""
 
 import itertools
 import math
@@ -25,12 +25,15 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """However it is rounded by half a degree: -60° to -69°, -6° and -16° and so on."""
+    """Return whether an angle to the right has a 6 within half a degree.
+
+    These are about -60° to -69°, and -6°, -16° and so on.
+    """
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """Most are sent to a tenth."""
+    """Most angles are sent to a tenth of a degree; some need rounding, to be safe from damage."""
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -38,7 +41,10 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """Of all angles; those that have a 6 to the right become less than 10° to the left."""
+    """The exceptions are angles to the right with a 6: they become less than 10° to the left.
+
+    They are fewer than a tenth of all angles.
+    """
     across = 0
     for angle_deg in EVERY:
         text = relayed(angle_deg)
@@ -54,7 +60,7 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """Of the line with its sum and its end, to the most lenient reader."""
+    """The line includes its sum and its end, and the most lenient reader is assumed."""
     text = relayed(angle_deg)
     data = line(text, sums=True)
     for count in (1, 2):
@@ -63,7 +69,7 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
-    """However many decimals or zeros: each has a minus sign and a 6, whose loss no sum sees."""
+    """Every notation has a minus sign and a 6, and a sum does not detect the loss of both."""
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
         assert {"-", "6"} <= {*f"{angle_deg}"}
@@ -71,7 +77,7 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
-    """Few lines pass; docs/boards/fejemis.md has them."""
+    """Less than 1 % of the damaged lines pass; docs/boards/fejemis.md has the figures."""
     chance = random.Random(seed)
     passed = total = 0
     for _ in range(3):
@@ -85,7 +91,10 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """Whole degrees, of which any loss leaves a smaller number."""
+    """Whole degrees are sent, of which any loss leaves a smaller number.
+
+    Only beyond 90° would the inner wheel be the faster one.
+    """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
         assert text == b"fwl %d" % angle_deg
@@ -97,7 +106,7 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 @pytest.mark.parametrize("sums", [True, False])
 @pytest.mark.parametrize("angle_deg", [0.3, 5.5, 12.4, 45.5, -6.25, -64.9])
 def test_the_mean_of_what_is_told_is_the_angle(angle_deg: float, *, sums: bool) -> None:
-    """What was rounded off is sent later."""
+    """The rounding error of an angle is added to the next one."""
     relay = AngleRelay()
     told = [float(relay.text(math.radians(angle_deg), sums=sums)[4:]) for _ in range(200)]
     assert sum(told) / len(told) == pytest.approx(angle_deg, abs=0.01)

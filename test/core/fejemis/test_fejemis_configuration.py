@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the boards keep: read from them, written where the user has set it, and read back."""
+"""The configuration on the boards: read, written where the user has set it, and read back."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -23,7 +23,7 @@ WRITTEN: dict[Written, tuple[float, ...]] = {
 
 
 def test_only_what_the_user_set_is_written() -> None:
-    """All else is read and shown."""
+    """Without settings, nothing is written; everything is read and shown in diagnostics."""
     bench = nominal()
     bench.run(3.0)
     words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -41,7 +41,7 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """On the board whose it is."""
+    """Each setting is written to the board that it belongs to."""
     from omnibot_driver.simulator.fejemis import Firmware
 
     bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
@@ -66,14 +66,14 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
 
 
 def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
-    """After some tries."""
+    """A notice names the setting after some tries, here ``confw`` with an impossible radius."""
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
     bench.run(6.0)
     assert any("confw" in text for text in bench.notices)
 
 
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """The help text has it otherwise than the command; the track in ``conf`` decides."""
+    """The help text and the command differ in the order; the track in ``conf`` decides."""
     for turned in (False, True):
         configuration = Configuration("drive", {})
         for _ in range(2):
@@ -83,7 +83,7 @@ def test_the_order_of_the_steering_geometry_is_found_out() -> None:
 
 
 def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
-    """One in 99 damaged answers passes its sum."""
+    """A sum does not detect one in 99 damaged answers."""
     configuration = Configuration("drive", {})
     for text in ("confs 0.4200 0.4000", "confs 4.2 0.4000", "confs 0.4200 0.4000"):
         configuration.hear(parse(text))
@@ -95,7 +95,7 @@ def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
 
 
 def test_what_was_read_once_is_asked_for_again() -> None:
-    """A quarter of a second later; then no more."""
+    """The second reading confirms the first one; after that it is not queried again."""
     bench = nominal()
     bench.run(2.0)
     asked = bench.lines(DRIVE).count("confsi")
@@ -104,7 +104,7 @@ def test_what_was_read_once_is_asked_for_again() -> None:
 
 
 def test_what_was_written_and_read_once_is_not_written_again() -> None:
-    """Only asked for."""
+    """It is only queried a second time, to confirm it."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     bench.run(2.0)
     assert bench.lines(FRONT).count("confs 0.41 0.43") == 1
@@ -112,7 +112,7 @@ def test_what_was_written_and_read_once_is_not_written_again() -> None:
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
-    """Nothing is understood then but heartbeats."""
+    """With the wrong setting only heartbeats are understood, so a notice must give the reason."""
     bench = Bench(settings=FejemisSettings(line_sums="off"))
     bench.open()
     bench.run(4.0)
@@ -121,7 +121,7 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:
-    """One of them computes with a robot that is not there."""
+    """One of the boards must be wrong, and would compute wrong wheel speeds or angles."""
     bench = nominal()
     bench.robot.receive(b"confs 0.4 0.5\n", bench.now, FRONT)
     bench.session.closed(bench.now)
@@ -131,7 +131,10 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """The line that writes it may be lost, and while the robot is driven nothing is written."""
+    """The line that writes a setting may be lost, and is not repeated while the robot is driven.
+
+    So motion is refused until the board has the setting.
+    """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.45)})
     bench = Bench(settings=settings)
     bench.open()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A front wheel that does not go where it is commanded."""
+"""A front wheel that does not go to its commanded angle."""
 
 import contextlib
 import math
@@ -19,7 +19,7 @@ TICK_S = 0.015
 
 
 def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
-    """The wheel stands here while it is commanded to 1.5 rad; returns when that shows."""
+    """Hold the wheel at ``angle_rad`` with 1.5 rad commanded; return the time of the fault in s."""
     follower.aim(1.5)
     for n in range(200):
         if follower.look(angle_rad, since + TICK_S * n):
@@ -28,7 +28,7 @@ def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
 
 
 def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
-    """One that comes nearer, however slowly, follows."""
+    """A wheel that gets nearer, even slowly, is regarded as following."""
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.015 * n, TICK_S * n) for n in range(100))
@@ -38,7 +38,7 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """It had come near to its angle, and is far from the new one."""
+    """It was near its old angle and is far from the new one, so the time begins anew."""
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.02 * n, TICK_S * n) for n in range(60))
@@ -47,7 +47,7 @@ def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
 
 
 def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
-    """From one side to the other."""
+    """New commands, here 0.9 and 1.5 rad in turn, do not restart the time of a wheel at rest."""
     follower = Follower()
     seen = 0
     for n in range(200):
@@ -57,7 +57,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """A sender that goes on would else move the robot for a second, again and again."""
+    """Otherwise a sender that continues would move the robot for a second, again and again."""
     follower = Follower()
     at = blocked(follower, 0.0)
     assert follower.refusal == UNTIL_IT_MOVES
@@ -69,7 +69,7 @@ def test_motion_is_refused_until_the_wheel_has_moved() -> None:
 
 
 def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
-    """Later it is a first one again."""
+    """After more than a minute a fault is again a first one, which ends when the wheel moves."""
     follower = Follower()
     at = blocked(follower, 0.0)
     follower.look(1.0, at + 1.0)
@@ -87,7 +87,7 @@ def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
 
 
 def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> None:
-    """A sender that goes on."""
+    """Command the twist ten times a second for ``seconds``, ignoring refusals."""
     for _ in range(round(seconds / 0.1)):
         with contextlib.suppress(CommandRefused):
             bench.drive(v, w)
@@ -96,7 +96,10 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """The wheel goes across instead; the robot rolls some centimetres at the most, twice."""
+    """This firmware does not reverse: it turns the front wheel across instead.
+
+    Until that was noticed twice, the robot has rolled less than 12 cm.
+    """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
     )

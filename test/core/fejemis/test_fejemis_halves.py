@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two boards, one robot: each may be swapped, lost, restarted or silent alone."""
+"""Two boards, one robot: each may be swapped, disconnected, restarted or silent by itself."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -13,7 +13,7 @@ HALVES = {"drive": DRIVE, "front": FRONT}
 
 
 def drive_until_refused(bench: Bench, limit_s: float = 5.0) -> float:
-    """Seconds until a command is refused."""
+    """Drive until a command is refused; return the time that it took, in s."""
     began = bench.now
     with pytest.raises(CommandRefused):
         bench.drive_on(seconds=limit_s)
@@ -30,7 +30,7 @@ def assert_stands(bench: Bench) -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
-    """The heartbeats tell; the channels are named by what is there."""
+    """The heartbeats identify the boards, and the channels are renamed accordingly."""
     bench = nominal(Simulated(swapped=swapped))
     bench.drive_on()
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
@@ -44,7 +44,7 @@ def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> None:
-    """It is driven again when both talk, on a new command."""
+    """The robot is driven again once both boards send again, and only on a new command."""
     bench = nominal()
     bench.drive_on()
     bench.speaks = {1 - HALVES[half]}
@@ -62,7 +62,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
-    """The robot stands meanwhile, and moves only on a new command."""
+    """The robot stands still meanwhile, and moves only on a new command."""
     bench = nominal()
     bench.drive_on()
     before = dict(bench.robot.half(half).subscriptions)
@@ -81,7 +81,7 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """As the link does it: all begins again with the lines that are there."""
+    """The link then closes both ports, and opens again those that are present."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -116,7 +116,7 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
     ],
 )
 def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
-    """One sentence, and no motion."""
+    """The reason is reported once, and motion is refused."""
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -128,7 +128,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_never_speaks_is_missed(half: str) -> None:
-    """By name and port."""
+    """The notice names the silent board, and comes once."""
     bench = Bench()
     bench.speaks = {1 - HALVES[half]}
     bench.open()
@@ -138,7 +138,7 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
-    """From then on it is driven in the other way."""
+    """After that stop the robot is driven with, or without, sums."""
     bench = nominal(Simulated(firmware=Firmware(sums=not begins)))
     bench.drive_on()
     bench.robot.drive.sums = bench.robot.front.sums = begins
@@ -153,7 +153,7 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
 
 
 def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
-    """66 times a second, with the angle that the front board sent."""
+    """The front board sends it 66 times a second, and the drive board needs each without delay."""
     bench = nominal()
     mark = bench.now
     bench.drive_on(0.2, 0.4, 1.0)
@@ -165,7 +165,7 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """At that moment, not with the next command."""
+    """It is stopped when the angle becomes too old, not with the next command."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -186,7 +186,7 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """Each bit of the diagnosis, in words; when it is well again a new command drives."""
+    """Each bit of the diagnosis has a notice; once it is cleared, a new command drives."""
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -203,7 +203,7 @@ def test_a_broken_angle_sensor_stops_the_robot() -> None:
 
 
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """It says that all is well."""
+    """Its diagnosis does not report a fault, so only the missing rotation shows it."""
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
     with pytest.raises(CommandRefused, match="front wheel did not go where"):
@@ -213,7 +213,7 @@ def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_t
 
 
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
-    """A flood of them costs nothing but their bytes."""
+    """They are skipped, and the unknown line is shown in diagnostics."""
     bench = nominal()
     bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
     bench.robot.receive(b"help\nxyz\n", bench.now, FRONT)
@@ -228,7 +228,7 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
     Firmware(shows_source=False),
 ])  # fmt: skip
 def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
-    """Whichever way it says it."""
+    """The variants differ in units, in optional fields and in the form of their lines."""
     bench = nominal(Simulated(firmware=firmware))
     bench.drive_on(0.3, 0.2, 0.8)
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
@@ -237,7 +237,7 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
 
 
 def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
-    """Both lines are silent for 0.1 s, and a command comes."""
+    """Both boards are silent for 0.1 s when the command comes."""
     bench = nominal()
     bench.speaks = set()
     bench.run(0.1)
@@ -248,7 +248,10 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
 
 
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
-    """What the other board did not know there is asked of this one again."""
+    """The list of what a board does not know belongs to the board, not to the port.
+
+    So another board on the same port is queried for everything again.
+    """
     bench = nominal()
     for swapped in (True, False, True):
         bench.close()
@@ -263,7 +266,7 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
 
 
 def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() -> None:
-    """Before its first heartbeat, too: its pose is another one."""
+    """Even before its first heartbeat, as its pose begins anew."""
     bench = nominal()
     bench.close()
     bench.session.opened(bench.now)

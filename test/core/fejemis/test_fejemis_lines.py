@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines of both Teensys: sums, messages, damage. Golden lines are typed from the manual."""
+"""Lines of both Teensys: sums, messages, damage. The golden lines are copied from the manual."""
 
 import random
 
@@ -41,7 +41,7 @@ GOLDEN_SUMS = [
     b";31leave",
     b";06hbt 44.97199 90 110 24.95 10 0",
 ]
-"""As the public hosts write them."""
+"""Lines as the public hosts write them."""
 GOLDEN: dict[str, Message] = {
     "hbt 44.97199 90 110 24.95 10 0": Heartbeat(44.97199, 90, 110, 24.95, 10.0),
     "hbt 45.1 90 110 24.95 -1 0": Heartbeat(45.1, 90, 110, 24.95, -1.0),
@@ -120,7 +120,7 @@ def feed(decoder: FejemisDecoder, data: bytes) -> list[Message]:
 
 @pytest.mark.parametrize("line", GOLDEN_SUMS)
 def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
-    """Both ways."""
+    """A sum is written and checked as the public hosts do it."""
     text = line[3:]
     assert with_sum(text) == line
     assert without_sum(line) == (text, True)
@@ -129,20 +129,20 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 
 @pytest.mark.parametrize("text", GOLDEN)
 def test_every_message_is_understood(text: str) -> None:
-    """As the manual shows it, and as it lists it."""
+    """Both the manual's examples and its lists of fields are covered."""
     assert parse(text) == GOLDEN[text]
 
 
 @pytest.mark.parametrize("text", DAMAGED)
 def test_what_no_board_says_is_no_message(text: str) -> None:
-    """Too few fields, numbers that nothing measures, unknown words."""
+    """The lines have too few fields, implausible numbers or unknown keywords."""
     assert parse(text) is None
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 @pytest.mark.parametrize("sums", [False, True])
 def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
-    """Whole, byte by byte and in random pieces."""
+    """The bytes come at once, byte by byte and in random pieces."""
     of_each_kind = {text.split()[0]: (text, GOLDEN[text]) for text in GOLDEN}.values()
     texts = [text.encode() for text, _ in of_each_kind]
     lines = [with_sum(text) if sums else text for text in texts]
@@ -162,13 +162,13 @@ def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
 
 
 def test_extra_fields_are_left_alone() -> None:
-    """Newer firmware adds some."""
+    """Newer firmware may add fields at the end of a line."""
     assert parse("vel 1.0 0.250 -0.250 7 8") == WheelSpeeds(0.25, -0.25, 1.0)
     assert parse("gyro 1 2 3 4 5") == Gyro(1.0, 2.0, 3.0)
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A cut line takes the one that is merged with it, not the next."""
+    """A cut line also spoils the line that is joined to it, but not the one after."""
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
     assert feed(decoder, good[:9] + good + good) == [Gyro(1.0, 2.0, 3.0)]
@@ -179,7 +179,7 @@ def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
 
 
 def test_a_line_may_have_200_characters_and_no_more() -> None:
-    """What is longer is dropped to its end, however it comes."""
+    """A longer line is discarded up to its end, in whatever pieces it comes."""
     decoder = FejemisDecoder()
     text = b"# " + b"x" * (LONGEST_LINE - 2)
     assert len(feed(decoder, text + b"\n")) == 1
@@ -189,7 +189,7 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
 
 
 def test_half_a_line_at_the_end_is_none() -> None:
-    """It may be cut."""
+    """Without its line end it may be incomplete."""
     decoder = FejemisDecoder()
     assert feed(decoder, b"gyro 1 2 3") == []
     assert decoder.flush(0.0) == []
@@ -201,7 +201,7 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 
 @pytest.mark.parametrize("sums", [False, True])
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
-    """From then on others are not believed."""
+    """After that, lines of the other kind are discarded."""
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
     beat, gyro = (with_sum(t) if sums else t for t in (BEAT, b"gyro 1 2 3"))
@@ -214,7 +214,7 @@ def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> 
 
 
 def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None:
-    """One may be damaged."""
+    """A single heartbeat of the other kind may be damaged."""
     decoder = FejemisDecoder("auto")
     feed(decoder, with_sum(BEAT) + b"\n")
     feed(decoder, BEAT + b"\n" + with_sum(BEAT) + b"\n" + BEAT + b"\n")
@@ -227,7 +227,7 @@ def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None
 
 @pytest.mark.parametrize(("setting", "sums"), [("on", True), ("off", False)])
 def test_a_setting_is_not_overruled_by_heartbeats(setting: str, *, sums: bool) -> None:
-    """The user knows."""
+    """The user's setting, on or off, has priority over what the lines look like."""
     decoder = FejemisDecoder(setting)  # type: ignore[arg-type]
     feed(decoder, (BEAT if sums else with_sum(BEAT)) + b"\n")
     feed(decoder, (BEAT if sums else with_sum(BEAT)) + b"\n")
@@ -235,7 +235,7 @@ def test_a_setting_is_not_overruled_by_heartbeats(setting: str, *, sums: bool) -
 
 
 def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None:
-    """A board prints a kind of line always alike."""
+    """A board always prints a kind of line with the same decimals, so a change shows damage."""
     decoder = FejemisDecoder("off")
     feed(decoder, b"pose 1.00000 1.234 0.567 0.1000\n" * 3)
     assert feed(decoder, b"pose 1.00000 1.24 0.567 0.1000\n") == []
@@ -244,7 +244,7 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """Three lines of a new form in a row, or a form that always changes."""
+    """Three lines in a row with new decimals are believed, as are decimals that always vary."""
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
     assert len(feed(decoder, b"gyro 1.0 2.0 3.0\n" * 5)) == 3
@@ -255,7 +255,7 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
 def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
-    """Whatever the bytes."""
+    """Random bytes in random pieces are decoded; less than one longest line is buffered."""
     decoder = FejemisDecoder()
     for piece in pieces:
         feed(decoder, piece)
@@ -265,13 +265,13 @@ def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
 
 @given(st.text(alphabet="0123456789.-+eExX hbtfwlposevgyrac;#\r", max_size=60))
 def test_no_line_raises(text: str) -> None:
-    """However like a line it looks."""
+    """The random text has the characters of real lines, so it often looks like one."""
     parse(text)
     feed(FejemisDecoder(), b";07" + text.encode() + b"\n")
 
 
 def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
-    """Which is why ranges, forms and steps are looked at besides."""
+    """This is why ranges, decimals and steps of the values are checked too."""
     chance, passed = random.Random(1), 0
     line = with_sum(b"pose 45.37199 1.234 -0.056 0.7854")
     for _ in range(20_000):
@@ -284,7 +284,7 @@ def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
 
 
 def test_what_is_a_command_without_its_last_character_is_asked_with_a_sum_alone() -> None:
-    """``svpi`` that loses its ``i`` sets the servo."""
+    """If ``svpi`` (a query) loses its ``i``, it is ``svp``, which sets the servo."""
     for sums in (True, False):
         polls = Polls("front")
         texts = [text for n in range(40) for text in polls.due(float(n), sums=sums)]

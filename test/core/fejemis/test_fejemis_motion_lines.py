@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion lines of which characters are lost on the way to a board."""
+"""Motion lines that lose characters on the way to a board."""
 
 import itertools
 import math
@@ -25,10 +25,10 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
-    """What a board takes out of these bytes that has sums, and reads numbers as C does.
+    """Return the motions that a board with sums takes from these bytes.
 
-    It is as lenient as any: missing numbers are 0, what follows them is left alone, a sum may have
-    one digit.
+    It reads numbers as C does, and is the most lenient reader: missing numbers are 0, further text
+    is ignored, and a sum may have one digit. ``keyword``, ``count``: of the lines to read.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -55,14 +55,14 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """Which is what the digits are chosen against."""
+    """The driver chooses the digits of its lines to prevent exactly this."""
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
     assert motions(damaged) == [(0.25, 1.459, 0.0)]
 
 
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """Over the whole range of commands, with the line that comes behind."""
+    """Commands over the complete range are tried, each with the line that follows it."""
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
     behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
@@ -77,7 +77,7 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 
 
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
-    """By the pairs that a sum does not see, and by its sum: the line has neither."""
+    """The lines lack the pairs of characters, and the sums, that would hide a loss."""
     chance = random.Random(7)
     for _ in range(150):
         v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
@@ -87,7 +87,7 @@ def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
 
 
 def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
-    """However much."""
+    """Any one to four characters are removed."""
     data = line(STOP, sums=True)
     for count in range(1, 5):
         for lost in itertools.combinations(range(len(data)), count):
@@ -95,7 +95,7 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 
 def test_what_three_lost_characters_leave() -> None:
-    """Of a thousand losses of three, few make another motion; docs/boards/fejemis.md has them."""
+    """Less than 1 % of such losses make another motion; see docs/boards/fejemis.md."""
     passed = total = 0
     for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
         for text in (front_line(v, w, FRONT_M), drive_line(v, w)):
@@ -109,7 +109,7 @@ def test_what_three_lost_characters_leave() -> None:
 
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """The front wheel's angle within 0.2°, the outer wheel's speed within half a per cent."""
+    """The front angle is right within 0.2°, the speed of the outer wheel within 0.6 %."""
     if v == w == 0.0:
         return
     _, front_v, front_w = motions(front_line(v, w, FRONT_M) + b"\n")[0]
@@ -122,7 +122,10 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 
 @pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, 1.25])
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """It gets no more than was asked for, and is near that."""
+    """The line's voltage is 60 to 100 % of the requested one, for at most the requested time.
+
+    A damaged line stays within 12 V and that time.
+    """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
     said_volts, said_s = motions(data, b"motv", 2)[0]
@@ -138,18 +141,24 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """A sibling's firmware compares `stop` with the whole line; an empty line may come before."""
+    """The firmware of a related robot compares ``stop`` with the complete line.
+
+    An empty line may precede it.
+    """
     data = line(text, sums=sums).lstrip(b"\n")
     assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"
 
 
 def plain(data: bytes) -> list[tuple[float, ...]]:
-    """What a board without sums takes out of these bytes."""
+    """Return the motions that a board without sums takes from these bytes."""
     return motions(data.replace(b";", b"?"))
 
 
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """A lost space or source moves the numbers by a place, and then it stands."""
+    """A lost space or source shifts the numbers by one place, which commands a stop.
+
+    Only damage within the speed itself can make the robot faster.
+    """
     for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
         text = plain_drive_line(speed, turn)
         rim = math.hypot(speed, turn)
@@ -164,7 +173,7 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
 
 
 def test_without_sums_the_front_board_gets_both_numbers() -> None:
-    """It takes the angle from their ratio."""
+    """The front board computes its angle from the ratio of the two numbers."""
     assert plain_front_line(0.25, 0.5) == b"rc 2 0.25 28.65"
     assert plain_front_line(0.0, -0.5) == b"rc 2 0 -28.65"
     assert plain_drive_line(0.0004, 0.0) == STOP

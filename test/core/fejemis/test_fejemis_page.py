@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every line of both help lists: a golden line, and what it is used for, or why for nothing."""
+"""Each line of both help lists has a golden line, and a use or the reason why it has none."""
 
 import math
 import re
@@ -24,7 +24,7 @@ from omnibot_driver.simulator.fejemis.help_text import DRIVE_HELP, FRONT_HELP
 
 @dataclass(frozen=True)
 class Row:
-    """``golden``: a line as it is sent or heard. ``use``: a topic, service, parameter or key."""
+    """One command: a ``golden`` line for it, and its ``use`` (a topic, service or parameter)."""
 
     golden: str
     use: str
@@ -116,7 +116,7 @@ HEARD: dict[str, str] = {
 
 
 def listed(text: str) -> tuple[set[str], set[str]]:
-    """Commands and subscriptions of a help list."""
+    """Return the commands and the subscriptions that a help list contains."""
     said, heard = set(), set()
     for line in text.splitlines():
         if not line.startswith("  "):
@@ -131,7 +131,7 @@ def listed(text: str) -> tuple[set[str], set[str]]:
 
 @pytest.mark.parametrize("text", [DRIVE_HELP, FRONT_HELP], ids=["drive", "front"])
 def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
-    """Said or heard."""
+    """Commands have a row in SAID, subscriptions in HEARD."""
     said, heard = listed(text)
     assert said <= SAID.keys()
     assert heard <= HEARD.keys()
@@ -140,7 +140,7 @@ def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
 
 
 def test_no_row_is_of_something_else() -> None:
-    """Each is in one of the lists, or how these are subscribed."""
+    """The rows contain only what a help list contains, and ``sub``, which subscribes."""
     drive, front = listed(DRIVE_HELP), listed(FRONT_HELP)
     assert SAID.keys() - {"sub"} <= drive[0] | front[0]
     assert HEARD.keys() <= drive[1] | front[1]
@@ -148,7 +148,7 @@ def test_no_row_is_of_something_else() -> None:
 
 @pytest.mark.parametrize("keyword", HEARD)
 def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
-    """By a subscription, a poll or with the configuration."""
+    """It is requested by a subscription, by a poll or with the configuration."""
     golden = [text for text in GOLDEN if text.split()[0] == keyword]
     assert golden
     assert parse(golden[0]) is not None
@@ -160,7 +160,7 @@ def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
 
 
 def said_by_the_driver() -> set[str]:
-    """All lines of a session in which everything is asked for."""
+    """Return all lines of a session in which everything is requested."""
     written: dict[Written, tuple[float, ...]] = {
         Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
         Written.STEERING: (0.4, 0.42),
@@ -192,7 +192,7 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """``setid`` is not among them."""
+    """Commands without a use, such as ``setid``, which can erase the board, are never sent."""
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden
     words = {text.split()[0] for text in said}

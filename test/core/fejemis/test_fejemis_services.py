@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is asked of the boards besides motion, and what they keep."""
+"""Requests to the boards besides motion, and the sensor readings."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -31,7 +31,7 @@ def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
 
 
 def test_the_gyro_is_calibrated_by_the_board() -> None:
-    """The offset that is read back has changed."""
+    """The request succeeds because the offset that is read back has changed."""
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
     done = ask(bench, Job.CALIBRATE_GYRO)
     assert done.success
@@ -56,7 +56,7 @@ def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
 
 
 def test_the_accelerometer_is_calibrated_by_the_board() -> None:
-    """On level ground."""
+    """The robot is on level ground, where only gravity acts."""
     bench = nominal(Simulated(accel_bias_mps2=(0.2, -0.1, 0.3)))
     assert ask(bench, Job.CALIBRATE_ACCELEROMETER).success
     bench.events.clear()
@@ -66,7 +66,7 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
 
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
-    """Loading stops it first."""
+    """Only loading a configuration is accepted, and stops the robot first."""
     bench = nominal()
     bench.drive_on()
     if job is not Job.LOAD:
@@ -78,7 +78,7 @@ def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
 
 
 def test_a_job_that_nothing_confirms_fails() -> None:
-    """Within its time, with a sentence; one at a time."""
+    """It fails within its time limit; a second job meanwhile is refused."""
     bench = nominal()
     bench.hears = {FRONT}
     token = object()
@@ -92,7 +92,7 @@ def test_a_job_that_nothing_confirms_fails() -> None:
 
 
 def test_a_job_is_answered_when_the_port_is_lost() -> None:
-    """At once, whether or not it comes back."""
+    """The result comes at once, without waiting for the port to come back."""
     bench = nominal()
     token = object()
     bench.board.services.ask(Job.CALIBRATE_GYRO, token, bench.now)
@@ -104,7 +104,7 @@ def test_a_job_is_answered_when_the_port_is_lost() -> None:
 
 
 def test_a_robot_that_rolls_is_not_calibrated() -> None:
-    """It is commanded to stand, and still moves."""
+    """It is commanded to stop, but still moves."""
     bench = nominal()
     bench.drive_on(0.5)
     bench.drive(0.0)
@@ -113,7 +113,7 @@ def test_a_robot_that_rolls_is_not_calibrated() -> None:
 
 
 def test_a_configuration_is_saved_and_loaded() -> None:
-    """On both boards."""
+    """Both boards save and load it."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     assert bench.robot.drive.saved.confs_m == (0.4, 0.42)
     assert ask(bench, Job.SAVE).success
@@ -123,7 +123,7 @@ def test_a_configuration_is_saved_and_loaded() -> None:
 
 
 def test_power_off_is_called_back_by_a_start() -> None:
-    """Meanwhile nothing is driven."""
+    """Until then motion is refused."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
     done = ask(bench, Job.POWER_OFF)
     assert done.success
@@ -137,7 +137,7 @@ def test_power_off_is_called_back_by_a_start() -> None:
 
 
 def test_power_off_cuts_the_power() -> None:
-    """After the delay that was set."""
+    """The power ends after the configured delay."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=4.0))
     assert ask(bench, Job.POWER_OFF).success
     bench.run(4.0)
@@ -145,7 +145,7 @@ def test_power_off_cuts_the_power() -> None:
 
 
 def test_all_sensors_are_told_in_si_units() -> None:
-    """Battery, magnetometer, orientation, four ranges, the steered wheel."""
+    """They are battery, magnetometer, orientation, four ranges and the steered wheel."""
     bench = nominal(Simulated(front_m=0.3))
     bench.run(1.0)
     battery = bench.extras(BatteryReading)[-1]
@@ -163,7 +163,7 @@ def test_all_sensors_are_told_in_si_units() -> None:
 
 
 def test_a_low_battery_is_told_once_a_minute() -> None:
-    """By the voltage of a cell."""
+    """The voltage per cell decides."""
     bench = nominal(Simulated(volts=20.4))
     bench.run(4.0)
     assert bench.extras(BatteryReading)[-1].low
@@ -172,7 +172,7 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
 
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
-    """An offset that is measured under way would be false."""
+    """An offset that is measured in motion would be wrong."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -187,7 +187,7 @@ def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.LOAD])
 @pytest.mark.parametrize("stop", ["e-stop", "pause"])
 def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: str) -> None:
-    """It is answered at once."""
+    """The job fails at once."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -204,7 +204,7 @@ def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: s
 
 
 def test_loading_stops_the_robot_before_it_loads() -> None:
-    """By the order of the lines."""
+    """The stop is sent first, and the robot gets time to stop before ``eer`` is sent."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -218,7 +218,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
-    """The robot may be driven again."""
+    """So the robot may be driven again."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=100.0))
     assert ask(bench, Job.POWER_OFF).success
     with pytest.raises(CommandRefused, match="power"):
@@ -235,5 +235,8 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """Of `off 300` without its 3 and a 0 the sum is right, and the power off at once."""
+    """If ``off 300`` loses its 3 and a 0, its sum still fits, and the power ends at once.
+
+    So the delay is increased to a number without such a pair.
+    """
     assert whole_seconds(wanted_s) == seconds

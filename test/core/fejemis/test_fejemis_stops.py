@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""E-stop, pause and what else turns: brush, lift, lights; and what is said last."""
+"""Tests of e-stop and pause, of brush, lift and lights, and of the last lines at the exit."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ def without_relays(lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """What was commanded before is zero when ``start`` is said, whatever the firmware does then."""
+    """The old command is set to zero before ``start`` is sent, as some firmware resumes it."""
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
     mark = bench.now
@@ -47,7 +47,7 @@ def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) 
 
 
 def test_the_stop_of_an_estop_is_a_word_alone() -> None:
-    """With its sum, as the hosts send it: a sibling's firmware knows no `stop` with spaces."""
+    """The firmware of a related robot does not accept ``stop`` with spaces after it."""
     bench = nominal()
     mark = bench.now
     bench.estop(True)
@@ -56,7 +56,7 @@ def test_the_stop_of_an_estop_is_a_word_alone() -> None:
 
 
 def test_a_lost_start_after_an_estop_is_said_again() -> None:
-    """Until the heartbeat shows that drive obeys."""
+    """It is repeated until the heartbeat shows that the drive board obeys."""
     bench = nominal()
     bench.estop(True)
     bench.run(1.0)
@@ -72,7 +72,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """It outlives an e-stop, and ends with a start alone."""
+    """The pause outlasts an e-stop, and only a start ends it."""
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)
@@ -92,7 +92,7 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 
 
 def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone() -> None:
-    """By ``auto_start``."""
+    """The parameter ``auto_start`` decides."""
     for run in (True, False):
         bench = Bench(run=run)
         bench.run(0.5)
@@ -108,7 +108,7 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """By the time that goes with its voltage, should the driver die."""
+    """The time is sent with the voltage, so the lift stops even if the driver dies."""
     bench = nominal()
     lift_it(bench)
     bench.hears = {DRIVE}
@@ -121,7 +121,7 @@ def test_the_lift_runs_no_longer_than_a_command() -> None:
 
 
 def test_the_time_of_the_lift_follows_the_timeout() -> None:
-    """It is never longer."""
+    """The time is at most ``command_timeout_s``."""
     bench = nominal(settings=FejemisSettings(command_timeout_s=0.2))
     lift_it(bench, -6.0)
     said = [text for text in bench.lines(FRONT) if text.startswith("motv -")]
@@ -131,7 +131,10 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """Twenty lines a second; to stop never waits, and brings no more of the brush."""
+    """Each is sent at most twenty times a second.
+
+    A stop is sent at once, and the flood does not multiply the lines of the brush.
+    """
     machine = Machine()
     machine.set_brush(True)
     said: list[tuple[float, bytes]] = []
@@ -151,7 +154,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """It is counted from when it is sent; what comes in between ends it."""
+    """Its time begins when it is sent; a stop meanwhile discards it."""
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
     machine.due(0.0)
@@ -183,7 +186,7 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
-    """When all is well again they are still off."""
+    """They are still off when the robot works again."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     lift_it(bench)
@@ -203,7 +206,7 @@ def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]
 
 
 def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
-    """To switch it off is always allowed."""
+    """Switching it off is always allowed."""
     bench = nominal()
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop"):
@@ -219,7 +222,7 @@ def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
 
 
 def test_a_command_that_expires_leaves_the_brush_on() -> None:
-    """A robot that sweeps may stand for a while."""
+    """A sweeping robot may stand still for a while."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.drive_on()
@@ -229,7 +232,7 @@ def test_a_command_that_expires_leaves_the_brush_on() -> None:
 
 
 def test_the_lights_are_given_back_at_the_end() -> None:
-    """Where they were changed."""
+    """The board controls them again, if the driver has changed them."""
     bench = nominal()
     assert not any(b"leds" in data for _, data in bench.board.switch_off())
     bench.board.services.set_led(300, 128, -5, bench.now)
@@ -240,7 +243,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """In each of the three ways."""
+    """The guard has lines for a stop and for a latched e-stop; the exit has its own."""
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
         bench.board.services.set_brush(True, bench.now)
@@ -260,7 +263,7 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
 
 @pytest.mark.parametrize("again", ["e-stop", "pause"])
 def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> None:
-    """After a release ``start`` is repeated for a second."""
+    """After a release, ``start`` is repeated for a second."""
     bench = nominal()
     bench.estop(True)
     bench.run(0.5)
@@ -279,7 +282,10 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
 
 
 def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
-    """The driver was stalled meanwhile, and a brush that turns is said again each second."""
+    """While the driver was stalled, the guard switched the brush off.
+
+    A brush that is on is repeated each second, so the driver must forget it.
+    """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -295,7 +301,7 @@ def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
 
 
 def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
-    """It may have restarted, which shows with its second heartbeat."""
+    """It may have restarted, which only its second heartbeat shows."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -309,7 +315,7 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
 
 
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
-    """A line may be lost, and nothing follows."""
+    """A line may be lost, and the driver cannot repeat it later."""
     bench = nominal()
     front = [data for channel, data in bench.board.switch_off() if channel == FRONT]
     assert b"".join(front).count(b"brush 0") == 3

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stamps of all readings: the clock of a Teensy as the host sees it, and samples of the IMU."""
+"""The stamps of all readings: a Teensy's clock as the host sees it, and samples of the IMU."""
 
 import itertools
 import math
@@ -21,13 +21,13 @@ TRACK_M = 0.4
 
 
 def late(chance: random.Random) -> float:
-    """A read comes 0.36 ms late on average, and one in a hundred by up to 20 ms."""
+    """Return the delay of a read in s: 0.36 ms on average, one in a hundred up to 20 ms more."""
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
 
 
 def within(errors: list[float]) -> float:
-    """Half the narrowest interval that holds 99 % of them."""
+    """Return half the width of the narrowest interval that holds 99 % of the errors, in s."""
     errors = sorted(errors)
     most = int(0.99 * len(errors))
     return min(b - a for a, b in zip(errors, errors[most:], strict=False)) / 2
@@ -36,9 +36,9 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Poses within 0.05 ms, and the IMU, whose lines carry no time, within 0.2 ms.
+    """Poses are right within 0.05 ms; the IMU, whose lines carry no time, within 0.2 ms.
 
-    Three lines in a hundred are lost where one character in a thousand is.
+    If one character in a thousand is lost, so are three lines in a hundred.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu = TeensyClock(), ImuPairing("m/s^2")
@@ -71,7 +71,7 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
 
 
 def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """A lost digit; but three that agree are those of a board that has restarted."""
+    """It has lost a digit; but three or more that agree show that the board has restarted."""
     clock = TeensyClock()
     assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
     assert not clock.see(10.98, 6.0)
@@ -84,7 +84,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """Whatever the clock says."""
+    """Here the clock gives times that go back, and one after the call."""
     stamped = StampedReadings()
     stamped.begin()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -97,7 +97,7 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 @pytest.mark.parametrize("gyro_first", [True, False])
 def test_a_sample_is_a_gyro_line_and_an_acceleration_line(*, gyro_first: bool) -> None:
-    """In any order; where either is lost there is none, and the next is whole again."""
+    """The order is arbitrary; if either line is lost, only that sample is lost."""
     imu = ImuPairing("g")
 
     def say(now: float, *, gyro: bool = True, acceleration: bool = True) -> list[ImuReading]:
@@ -120,7 +120,7 @@ def test_a_sample_is_a_gyro_line_and_an_acceleration_line(*, gyro_first: bool) -
 
 @pytest.mark.parametrize("sums", [True, False])
 def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
-    """With stamps 10 ms apart."""
+    """The stamps are 10 ms apart, within 1.5 ms."""
     bench = nominal(Simulated(firmware=Firmware(sums=sums)))
     bench.events.clear()
     bench.run(3.0)
@@ -132,7 +132,7 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """The clock of a board that restarts goes back; theirs is left behind."""
+    """The times of a restarted board go back; here they only jump ahead."""
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
@@ -146,7 +146,10 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 
 
 def test_what_waited_while_the_host_was_stalled_is_no_restart() -> None:
-    """Late lines of the same board come all at once; those of one that has restarted do not."""
+    """Waiting lines of the same board arrive all at once, and their times do not go back.
+
+    The times of a restarted board do.
+    """
     clock = TeensyClock()
     for n in range(100):
         assert clock.see(5.0 + 0.02 * n, 100.0 + 0.02 * n)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two wheels on one axle, against turns about centres that are worked out by hand."""
+"""Kinematics of two wheels on one axle, checked with turns that are worked out by hand."""
 
 import math
 
@@ -22,24 +22,25 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
 
 
 def test_straight_ahead_both_wheels_roll_alike() -> None:
-    """1 m/s over 0.1 m is 10 rad/s."""
+    """1 m/s at a radius of 0.1 m is 10 rad/s."""
     assert ROBOT.wheel_rates(BodyTwist(1.0, 0.0, 0.0)) == pytest.approx((10.0, 10.0))
 
 
 def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
-    """1 rad/s at 0.2 m from the centre is 0.2 m/s, 2 rad/s."""
+    """1 rad/s at 0.2 m from the centre is 0.2 m/s, which is 2 rad/s of the wheel."""
     assert ROBOT.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == pytest.approx((-2.0, 2.0))
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """At 0.5 rad/s left runs on 0.8 m at 0.4 m/s, right on 1.2 m at 0.6 m/s, the middle at 0.5
-    m/s.
+    """At 0.5 rad/s the left wheel is on a circle of 0.8 m at 0.4 m/s, the right on 1.2 m at 0.6.
+
+    The middle between them moves at 0.5 m/s.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 
 
 def test_about_a_wheel_that_stands() -> None:
-    """Right stands, left at 0.4 m/s: to the right by 0.4 / 0.4 rad/s, the middle at 0.2 m/s."""
+    """The right wheel is at rest, the left at 0.4 m/s: yaw rate -1 rad/s, speed 0.2 m/s."""
     assert triple(ROBOT.body_twist((4.0, 0.0))) == pytest.approx((0.2, 0.0, -1.0))
 
 
@@ -57,7 +58,7 @@ def test_wheels_and_back_is_the_feasible_part(
 def test_body_and_back_is_the_same_wheels(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """Two wheels have two degrees of freedom."""
+    """Two wheels have two degrees of freedom, so nothing is lost."""
     back = robot.wheel_rates(robot.body_twist(wheel_rates))
     assert back == pytest.approx(wheel_rates, rel=1e-9, abs=1e-7)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The wheels' geometry against the manual's equations, typed by hand."""
+"""Kinematics of three omni wheels, checked with the manual's equations, typed by hand."""
 
 import pytest
 from hypothesis import given
@@ -25,7 +25,7 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 
 @given(twists)
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
-    """v = ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, Vy − L Ω for C; over r, in rad/s."""
+    """v = ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, Vy − L Ω for C; divided by r, in rad/s."""
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
     rim_b = 0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -37,7 +37,7 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The matrix with 1/(2 cos 30°), not the expansion that is 4/3 off."""
+    """The matrix is the one with 1/(2 cos 30°), not the expanded one, which is wrong by 4/3."""
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
     expected = (
@@ -66,17 +66,17 @@ def test_body_and_back_is_the_same_wheels(
 
 
 def test_forward_turns_a_back_and_b_forth_and_leaves_c_alone() -> None:
-    """At 1 m/s ahead the rims of A and B run at ∓cos 30°."""
+    """At 1 m/s forward the rims of A and B move at ∓cos 30° m/s."""
     a, b, c = MANUAL.wheel_rates(BodyTwist(1.0, 0.0, 0.0))
     assert (a, b, c) == close((-SQRT3 / 2 / R, SQRT3 / 2 / R, 0.0))
 
 
 def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
-    """1 m/s to the left: Vy at C, −sin 30° Vy at A and B."""
+    """At 1 m/s to the left the rim speed is Vy at C, and −sin 30° Vy at A and B."""
     assert MANUAL.wheel_rates(BodyTwist(0.0, 1.0, 0.0)) == close((-0.5 / R, -0.5 / R, 1.0 / R))
 
 
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
-    """1 rad/s counter-clockwise: −L at every rim; the appendix's «rotate all» turns right."""
+    """At 1 rad/s to the left each rim moves at −L; the appendix's «rotate all» turns right."""
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

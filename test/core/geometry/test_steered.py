@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A steered wheel before a driven axle, against turns about centres that are worked out by hand."""
+"""Kinematics of a steered wheel before a driven axle, checked with turns worked out by hand."""
 
 import math
 
@@ -27,7 +27,7 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
     [
         ((1.0, 0.0, 0.0), 0.0),
         ((-1.0, 0.0, 0.0), 0.0),
-        ((0.5, 0.0, 1.0), 45.0),  # centre 0.5 m to the left, as far as the wheel is ahead
+        ((0.5, 0.0, 1.0), 45.0),  # centre 0.5 m to the left, the same distance as the wheel's
         ((0.5, 0.0, -1.0), -45.0),
         ((-0.5, 0.0, 1.0), -45.0),  # backwards, centre 0.5 m to the right
         ((0.0, 0.0, 1.0), 90.0),
@@ -43,15 +43,16 @@ def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
 
 
 def test_what_the_steered_wheel_does_to_the_body() -> None:
-    """At 45° and 1 m/s its contact point moves 0.707 m/s ahead and 0.707 m/s across, 0.5 m
-    ahead.
+    """At 45° and 1 m/s the wheel moves 0.707 m/s forward and 0.707 m/s to the left.
+
+    It is 0.5 m ahead of the axle.
     """
     twist = ROBOT.steered_twist(1.0, math.pi / 4)
     assert triple(twist) == pytest.approx((math.sqrt(0.5), 0.0, math.sqrt(2.0)))
 
 
 def test_the_driven_wheels_run_on_circles_about_the_same_centre() -> None:
-    """The centre is 0.5 m to the left at 1 rad/s: left on 0.3 m, right on 0.7 m."""
+    """The centre is 0.5 m to the left at 1 rad/s: radii are 0.3 m left and 0.7 m right."""
     assert ROBOT.wheel_rates(BodyTwist(0.5, 0.0, 1.0)) == pytest.approx((3.0, 7.0))
 
 
@@ -64,7 +65,7 @@ def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: B
 
 @given(sizes, twists)
 def test_the_steered_wheel_tells_the_same_twist(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """The twist follows from its angle and the signed speed of its contact point."""
+    """The twist is computed from its angle and the signed speed of its contact point."""
     wanted = robot.feasible(twist)
     speed_mps = math.hypot(wanted.vx_mps, robot.wheelbase_m * wanted.yaw_rate_radps)
     speed_mps = math.copysign(speed_mps, wanted.vx_mps) if wanted.vx_mps else speed_mps

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Biases, calibration and figures, through a session and a simulated board."""
+"""Biases, calibration and figures, tested with a session and a simulated board."""
 
 import math
 
@@ -51,7 +51,7 @@ def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -
 
 
 def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
-    """Refused at once, and given up when the command comes later."""
+    """The request is refused at once, or fails when a command arrives later."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.3, 0.0, 0.0), bench.now)
     with pytest.raises(RequestRefused, match="commanded by cmd_vel; stop the sender"):
@@ -69,7 +69,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
 
 
 def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
-    """It may be pushed, or roll out: its wheels tell."""
+    """It may be pushed, or roll out, which its wheels show."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.0, 0.0, 0.5), bench.now)
     bench.run(0.4)
@@ -93,7 +93,7 @@ def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> No
 
 
 def test_one_calibration_at_a_time() -> None:
-    """The second is refused, the first goes on."""
+    """The second request is refused, and the first continues."""
     bench = running()
     bench.session.calibrate_gyro("first", bench.now)
     with pytest.raises(RequestRefused, match="under way"):
@@ -104,7 +104,7 @@ def test_one_calibration_at_a_time() -> None:
 
 @pytest.mark.parametrize("how", ["silence", "loss"])
 def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
-    """A board that falls silent, a port that is lost."""
+    """The cases are a board that falls silent, and a port that is lost."""
     bench = running()
     bench.session.calibrate_gyro("token", bench.now)
     bench.run(1.0)
@@ -119,7 +119,7 @@ def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
 
 
 def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> None:
-    """No other output is due then, since Stop has been sent for its second."""
+    """No other output is due then, since Stop has already been sent for a second."""
     bench = Bench(BoardSettings(running=True), run=False)
     bench.open()
     bench.run(1.0)
@@ -147,7 +147,7 @@ def test_a_parameter_that_is_set_otherwise_replaces_the_bias_and_others_do_not()
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """Half the way in a quarter of a minute; a robot that drives learns nothing."""
+    """It covers half the distance in 15 s at rest, and keeps its value while the robot drives."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)
@@ -162,7 +162,7 @@ def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
 
 
 def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
-    """A sensor that is set to 4 g says half of gravity at 2 g."""
+    """A sensor that is set to 4 g shows half of gravity if it is read as 2 g."""
     bench = running()
     gravity = bench.session.figures(bench.now).imu.gravity_mps2
     assert gravity == pytest.approx(9.80665, rel=0.01)
@@ -177,7 +177,7 @@ def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
 
 
 def test_the_figures_count_what_happened() -> None:
-    """Losses, restarts, limits, the one who commands, and a sensor that is stuck."""
+    """They count losses, restarts, limited commands and equal readings of a stuck sensor."""
     bench = running(gyro_stuck=(5, 5, 5))
     figures = bench.session.figures(bench.now)
     assert figures.state == "nominal"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The gyro's bias, planted and found; and everything that must not pass for one."""
+"""Calibration of the gyro's bias, and motions that must not be taken for a bias."""
 
 import itertools
 import math
@@ -46,7 +46,7 @@ def stand(
     force: Vector3 = GRAVITY,
     rolling: Vector3 | None = NONE,
 ) -> None:
-    """Readings at 100 Hz; every fourth comes with a displacement, unless that is None."""
+    """Feed readings at 100 Hz; every fourth has a displacement, unless ``rolling`` is None."""
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):
         calibration.hear(rate, force, start_s + number * TICK_S)
@@ -74,7 +74,7 @@ def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
 
 @given(biases, st.integers(0, 2**16))
 def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
-    """Two seconds of noisy readings give it within a tenth of the noise of one reading."""
+    """Two seconds of noisy readings find it to five standard errors of their mean."""
     calibration = GyroCalibration((0.1, 0.1, 0.1), refine=False)
     calibration.measure("token", 0.0)
     stand(calibration, noisy(bias, NOISE_RADPS, seed), 2.1)
@@ -86,7 +86,7 @@ def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
 
 
 def test_without_wheels_the_gyro_alone_tells() -> None:
-    """There are no displacements in IMU-only mode."""
+    """Displacements are missing in IMU-only mode."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     stand(calibration, noisy((0.02, 0.0, 0.0), NOISE_RADPS), 2.1, rolling=None)
@@ -119,7 +119,7 @@ def test_a_robot_that_moves_is_refused_with_what_showed_it(
 
 
 def test_a_shaken_accelerometer_is_motion() -> None:
-    """A person carries the robot gently."""
+    """A person carries the robot gently, so that only the accelerometer shows the motion."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     for number, rate in enumerate(itertools.islice(noisy(NONE, NOISE_RADPS), 210)):
@@ -128,7 +128,7 @@ def test_a_shaken_accelerometer_is_motion() -> None:
 
 
 def test_readings_before_the_request_do_not_count() -> None:
-    """Neither motion nor rest before the request counts."""
+    """Both motion and rest from before the request are ignored."""
     calibration = GyroCalibration(NONE, refine=False)
     stand(calibration, noisy((0.0, 0.0, 2.0), 0.5), 0.9, rolling=(0.01, 0.0, 0.0))
     calibration.measure("token", 0.0)
@@ -138,7 +138,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """Both happen within the time limit of the service."""
+    """The failure is reported within the time limit of the service."""
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)
     for start_s in (100.0, 102.0, 104.0):
@@ -167,7 +167,7 @@ def test_a_measurement_that_is_given_up_says_why_once() -> None:
 @settings(max_examples=25)
 @given(biases)
 def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
-    """The bias moves by a twentieth of the difference each second."""
+    """The bias moves by a twentieth of the difference per second."""
     calibration = GyroCalibration(NONE, refine=True)
     rates = noisy(bias, NOISE_RADPS)
     stand(calibration, rates, 1.05)
@@ -184,7 +184,7 @@ def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
 def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_stand(
     refine: bool, rolling: Vector3 | None
 ) -> None:
-    """Off, without wheels, with wheels that turn."""
+    """The cases are: switched off, without displacements, and wheels that turn."""
     calibration = GyroCalibration(NONE, refine=refine)
     stand(calibration, noisy((0.1, 0.1, 0.1), NOISE_RADPS), 10.0, rolling=rolling)
     assert calibration.bias == NONE
@@ -203,7 +203,7 @@ def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
 
 
 def test_gravity_is_measured_at_rest_alone() -> None:
-    """Gravity is unknown before, and the value stays while the robot moves."""
+    """Gravity is unknown before the first rest, and keeps its value while the robot moves."""
     calibration = GyroCalibration(NONE, refine=False)
     assert calibration.gravity_mps2 is None
     stand(calibration, noisy(NONE, NOISE_RADPS), 1.1, force=(0.0, 6.0, -8.0))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From the MPU6050's counts to SI units."""
+"""Conversion of the MPU6050's counts to SI units."""
 
 import math
 
@@ -67,7 +67,7 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 @pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
 @pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
-    """Its length at rest must fit within a tenth."""
+    """Gravity at rest must fit the range within a tenth."""
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
         assert bool(text) == (actual_g != believed_g)
@@ -76,7 +76,7 @@ def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_
 
 @pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
 def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
-    """The advice names no range."""
+    """The advice does not suggest a range."""
     assert gravity_advice(gravity, 2).endswith(
         "check `accel_range` and `accel_bias`, or the sensor"
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A whole session with a simulated LOIS ECU, in simulated time."""
+"""Test bench: a session with a simulated LOIS ECU, in simulated time."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
 class Bench(AnyBench):
-    """A driver with these settings, and a board with this firmware."""
+    """A driver session with a simulated LOIS ECU, which has been nominal for 1.5 s."""
 
     def __init__(self, firmware: str, settings: LoisEcuSettings | None = None) -> None:
         self.lois = LoisRobot(firmware)
@@ -54,7 +54,7 @@ class Bench(AnyBench):
 
 
 def told(bench: Bench, kind: type) -> list[Any]:
-    """Values of this kind that were passed on."""
+    """Return the values of this type that the session passed on as ``Extra`` events."""
     return [
         event.value
         for event in bench.events
@@ -63,6 +63,6 @@ def told(bench: Bench, kind: type) -> list[Any]:
 
 
 def configure(bench: Bench, settings: LoisEcuSettings) -> None:
-    """As the node does it when parameters change."""
+    """Apply other board settings, as the node does when parameters change."""
     bench.session.configure(SETTINGS, bench.now, board=settings)
     bench.settle()

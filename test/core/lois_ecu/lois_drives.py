@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Drives of a simulated LOIS robot, with the odometry beside it, in simulated time."""
+"""Drives of a simulated LOIS robot, with its odometry and its true pose, in simulated time."""
 
 import math
 from dataclasses import dataclass
@@ -29,11 +29,12 @@ HOST_GAINS = LoisEcuSettings(
         Setting.RIGHT_TD: 0.60868,
     },
 )
-"""With those that the board boots with, the public firmware's right wheel swings and stands."""
+"""Settings with controller gains: with those of the boot, the public firmware's right wheel swings
+and comes to rest."""
 REPEAT_S = 0.05
 
 Program = list[tuple[float, tuple[float, float]]]
-"""Duration, and RPM left and right."""
+"""Steps of a drive: duration in s, and set-points of the left and right wheel in RPM."""
 
 CLASSES: dict[str, Program] = {
     "straight": [(21.0, (20, 20))],
@@ -53,7 +54,7 @@ CLASSES: dict[str, Program] = {
 
 
 MOTIONS = ("straight", "curve", "in place", "reverse", "reverse curve", "jerky", "left", "right")
-"""Of the campaign; the last two are squares."""
+"""Motions of ``test/integrity/lois_odometry.py``; the last two are squares."""
 
 
 VARIED = (
@@ -65,11 +66,12 @@ VARIED = (
     "straight back",
     "curve back",
 )
-"""Of the campaign: 5 m or 80° to 400°, at a speed that the seed gives."""
+"""Motions of ``test/integrity/lois_odometry.py`` over 5 m, or a turn by 80° to 400°; the seed gives
+the speed."""
 
 
 def varied(name: str, seed: int) -> Program:
-    """One of ``VARIED``."""
+    """Return the program of one of ``VARIED``, with a speed that the seed gives."""
     random = Random(f"varied {name} {seed}")
     if name.startswith("place"):
         rpm, angle_rad = random.uniform(7, 20), math.radians(random.uniform(80, 400))
@@ -85,7 +87,7 @@ def varied(name: str, seed: int) -> Program:
 
 
 def jerky(seed: int, seconds: float = 20.0) -> Program:
-    """Other set-points of either sign several times a second."""
+    """Return random set-points of either sign, each for 0.2 to 1.2 s; 15 % of them are Stop."""
     random, program, left_s = Random(f"jerky {seed}"), [], seconds
     while left_s > 0:
         duration_s = random.choice((0.2, 0.3, 0.5, 0.8, 1.2))
@@ -97,7 +99,11 @@ def jerky(seed: int, seconds: float = 20.0) -> Program:
 
 @dataclass(frozen=True)
 class Drive:
-    """``true``: where the robot was at the last estimate, from where the estimates began."""
+    """The outcome of a drive.
+
+    ``true``: true pose at the time of the last estimate, relative to the start of the odometry.
+    ``way_m``, ``turned_rad``: true length of the way, and sum of all turns.
+    """
 
     true: Pose
     way_m: float
@@ -107,19 +113,19 @@ class Drive:
 
     @property
     def error(self) -> Pose:
-        """Estimated less true, in the odometry frame."""
+        """Estimated minus true pose, in the odometry frame."""
         return self.last.pose - self.true
 
     @property
     def nees(self) -> float:
-        """Normalised squared error of x, y, yaw: 3 on average for an honest covariance."""
+        """Normalized squared error of x, y and yaw; 3 on average if the covariance is right."""
         c, e = self.last.covariance, self.error
         rows = [
             [c.xx, c.xy, c.x_yaw, e.x_m],
             [c.xy, c.yy, c.y_yaw, e.y_m],
             [c.x_yaw, c.y_yaw, c.yaw_yaw, e.yaw_rad],
         ]
-        for pivot in range(3):  # Gauss; the covariance is positive
+        for pivot in range(3):  # Gaussian elimination; the covariance is positive definite
             for row in range(pivot + 1, 3):
                 factor = rows[row][pivot] / rows[pivot][pivot]
                 rows[row] = [a - factor * b for a, b in zip(rows[row], rows[pivot], strict=True)]
@@ -131,19 +137,19 @@ class Drive:
 
     @property
     def sigmas(self) -> float:
-        """The largest error of one axis in its standard deviations."""
+        """Largest error along one axis, in standard deviations."""
         c, e = self.last.covariance, self.error
         pairs = ((e.x_m, c.xx), (e.y_m, c.yy), (e.yaw_rad, c.yaw_yaw))
         return max(abs(error) / math.sqrt(variance) for error, variance in pairs)
 
 
 def nominal(firmware: Firmware, seed: int = 0) -> LoisSettings:
-    """Wheels of the right size, on ground that takes a little."""
+    """Return settings with exact wheel sizes, on ground that loads the motors by 1 % of duty."""
     return LoisSettings(quirks=QUIRKS[firmware], seed=seed, load_percent=1.0)
 
 
 def wrong(firmware: Firmware, seed: int) -> LoisSettings:
-    """Wheels that are off by 1 % (standard deviation) and slip."""
+    """Return settings with slip, load, and wheel sizes off by 1 % (standard deviation)."""
     random = Random(f"wrong {seed}")
     return LoisSettings(
         quirks=QUIRKS[firmware],
@@ -155,9 +161,10 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 
 
 class Rig:
-    """A board that is driven, by default with the gains of its own host.
+    """A simulated board and the driver that talks to it, by default with ``HOST_GAINS``.
 
-    ``estimates`` are all that came, each with the truth beside it.
+    ``estimates``: all estimates of the odometry, each with the true pose at that time. ``loss``:
+    chance that a byte is lost, in both directions.
     """
 
     def __init__(
@@ -172,12 +179,12 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated."""
+        """Simulated time in s."""
         return self.board.now_s
 
     @property
     def place(self) -> Pose:
-        """Where the robot truly is."""
+        """True pose of the robot."""
         truth = self.board.truth
         return Pose(truth.x_m, truth.y_m, truth.yaw_rad)
 
@@ -187,12 +194,12 @@ class Rig:
         return bytes(byte for byte in data if self._random.random() >= self._loss)
 
     def say(self, data: bytes) -> None:
-        """These go out now."""
+        """Send these bytes to the board."""
         self.board.receive(self._arrived(data))
         self.driver.wrote(data, self.now)
 
     def run(self, seconds: float) -> None:
-        """The driver writes what is due and reads what comes."""
+        """Run the board; the driver writes what is due and reads what arrives."""
         for _ in range(round(seconds / self.board.tick_s)):
             if self.now >= self.driver.wake_at:
                 self.say(self.driver.due(self.now))
@@ -208,26 +215,29 @@ class Rig:
                     self.estimates.append((reading, self.place))
 
     def order(self, left_rpm: float, right_rpm: float, seconds: float) -> None:
-        """Repeated; zeros are a Stop."""
+        """Repeat set-points in RPM every ``REPEAT_S`` for ``seconds``; zeros are a Stop."""
         for _ in range(round(seconds / REPEAT_S)):
             unit = math.tau / 60
             self.say(self.driver.wheels((left_rpm * unit, right_rpm * unit)))
             self.run(REPEAT_S)
 
     def drive(self, program: Program) -> Drive:
-        """Then stop."""
+        """Drive a program and stop; return the outcome."""
         self.run(4.0)
         for seconds, (left, right) in [*program, (2.0, STOP)]:
             self.order(left, right, seconds)
         return self.outcome()
 
     def outcome(self) -> Drive:
-        """By the last estimate."""
+        """Return the outcome of the drive, judged by the last estimate."""
         last, true = self.estimates[-1]
         return Drive(true, self.way_m, self.turned_rad, last, self.driver)
 
     def square(self, side_m: float, sign: int) -> None:
-        """Steered by the true place, with turns on the spot and stops between."""
+        """Drive a square, steered by the true pose, with stops before and after each turn.
+
+        ``sign``: 1 for turns to the left, -1 for turns to the right.
+        """
         goal_rad = 0.0
         for _ in range(4):
             start = self.place
@@ -251,7 +261,7 @@ class Rig:
 def motion(
     settings: LoisSettings, name: str, ours: LoisEcuSettings | None = None, *, side_m: float = 5.0
 ) -> Drive:
-    """One of ``MOTIONS`` or ``VARIED``, with encoders that begin anywhere between two ticks."""
+    """Drive one of ``MOTIONS`` or ``VARIED``; encoders begin anywhere between two ticks."""
     rig = Rig(settings, ours)
     random = Random(f"encoders {settings.seed}")
     for encoder in rig.board._vehicle.encoders:
@@ -267,5 +277,5 @@ def motion(
 
 
 def drive(settings: LoisSettings, program: Program, *, loss: float = 0.0) -> Drive:
-    """Then stop. Each byte is lost with this chance, both ways."""
+    """Drive a program and stop; each byte is lost with the chance ``loss``, in both directions."""
     return Rig(settings, loss=loss).drive(program)

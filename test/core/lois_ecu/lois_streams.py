@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Streams of a LOIS ECU that drives, as timed pieces, and what is to be found in them."""
+"""Streams of a LOIS ECU that drives, as timed pieces, and the reports that are in them."""
 
 import math
 import struct
@@ -22,13 +22,16 @@ Piece = tuple[float, bytes]
 
 
 def float32(number: float) -> float:
-    """As it comes out of a line."""
+    """Return the number as it comes out of a line: rounded to 32 bits."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", number))
     return float(rounded)
 
 
 def reports(seconds: float, *, firmware: bool) -> list[tuple[float, Report]]:
-    """A drive in a curve at 0.5 m/s; everything that is periodic, once in 0.4 s."""
+    """Return the reports of a drive along a curve at 0.5 m/s, with their times in s.
+
+    Ticks, odometry and headings come every 0.4 s; position, time and date every 1.2 s.
+    """
     said: list[tuple[float, Report]] = []
     for step in range(1, int(seconds / 0.4) + 1):
         at = 0.4 * step
@@ -50,12 +53,12 @@ def reports(seconds: float, *, firmware: bool) -> list[tuple[float, Report]]:
 
 
 def pieces(said: list[tuple[float, Report]]) -> list[Piece]:
-    """As the board sends them."""
+    """Return the lines of each report, as the board sends them."""
     return [(at, encode_report(report)) for at, report in said]
 
 
 def decoded(given: list[Piece], *, sum_required: bool = True) -> tuple[list[Report], LoisDecoder]:
-    """All reports, and the decoder afterwards."""
+    """Return all reports that a new decoder finds, and the decoder."""
     decoder = LoisDecoder(sum_required=sum_required)
     found: list[Report] = []
     for at, data in given:
@@ -65,5 +68,5 @@ def decoded(given: list[Piece], *, sum_required: bool = True) -> tuple[list[Repo
 
 
 def lossy(given: list[Piece], chance: float, random: Random) -> list[Piece]:
-    """Each byte is lost with this chance."""
+    """Return the pieces without the lost bytes; each byte is lost with this chance."""
     return [(at, bytes(byte for byte in data if random.random() >= chance)) for at, data in given]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How late ticks were read, by the time in them."""
+"""Delay with which ticks were read, estimated from the board's time in them."""
 
 from random import Random
 
@@ -13,7 +13,7 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 
 @pytest.mark.parametrize("lost", [0.0, 0.067], ids=["goes on", "stands while it sends"])
 def test_a_read_that_is_late_is_told(lost: float) -> None:
-    """Whether the clock stands while eleven lines of 1.2 ms are sent in 0.2 s, or not."""
+    """Every 0.2 s the board sends eleven lines of 1.2 ms; its clock may stop meanwhile."""
     board = BoardTime()
     found = []
     for step in range(60):
@@ -27,7 +27,7 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """Also where the first of them is so late that its time is not believed."""
+    """The dates stay in order even if the delay of the first group is implausible (over 0.25 s)."""
     board = BoardTime()
     taken_s = []
     for step in range(60):
@@ -40,7 +40,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """Reads that are late by up to 30 ms leave an error of about half of it."""
+    """Random delays of up to 30 ms give a standard deviation of about half of that."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -49,7 +49,7 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """A clock that jumps back is a new one."""
+    """While the clock is unknown, the delay is 0 and its standard deviation is 12 ms."""
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
     for step in range(20):
@@ -59,7 +59,7 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
 
 
 def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
-    """They say nothing of the clock's rate; the groups after them are timed as before."""
+    """They show nothing of the clock's rate, so later groups are timed as before the stall."""
     board = BoardTime()
     found = []
     for step in range(90):
@@ -78,7 +78,7 @@ def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
 def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
     reads: list[tuple[float, int]],
 ) -> None:
-    """Reads of any length of time, and clocks of any rate."""
+    """The reads may be 0 to 4 s apart, and the clock may run at any rate."""
     board, now, counts, taken_s = BoardTime(), 10.0, 0, 0.0
     for seconds, passed in reads * 3:
         now, counts = now + seconds, counts + passed

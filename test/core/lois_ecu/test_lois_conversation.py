@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU as the rest of the driver sees it, against the simulated board."""
+"""The conversation with a simulated LOIS ECU, as the rest of the driver uses it."""
 
 import math
 from dataclasses import replace
@@ -33,7 +33,7 @@ RPM = math.tau / 60
 
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
-    """The low-pass, the periods and what the user set arrive in spite of what the board misses."""
+    """Low pass, periods and the user's gains arrive although the board loses single lines."""
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
     rig.run(5.0)
@@ -48,7 +48,7 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
 
 @pytest.mark.slow
 def test_a_restarted_board_is_configured_again() -> None:
-    """Else its wheels would not turn."""
+    """After a boot the firmware's low pass has gain 0, so the wheels would not turn."""
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
     rig.order(20, 20, 4.0)
@@ -66,7 +66,7 @@ def test_a_restarted_board_is_configured_again() -> None:
 
 
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
-    """Ticks that begin anew."""
+    """A board that boots at once is hardly silent, but its ticks begin at zero."""
     rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
     rig.run(5.0)
     rig.order(20, 20, 6.0)
@@ -85,7 +85,7 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
 def test_a_board_that_was_left_in_another_mode_is_fetched_back(
     firmware: Firmware, before: TerminalMode
 ) -> None:
-    """Whatever a program before us has set; also with the checksum of what we say turned off."""
+    """An earlier program may have set any mode, even one without checksums in commands."""
     rig = Rig(nominal(firmware))
     rig.run(2.1)
     for _ in range(6):
@@ -100,7 +100,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """0x11 value 4, and the left short correction that it overwrites."""
+    """Value 4 of 0x11 selects this and overwrites the left short correction, which is restored."""
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     for _ in range(140):
         rig.run(0.1)
@@ -113,7 +113,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 
 @BOTH
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
-    """After driving forward; the public firmware tells nothing after driving backward."""
+    """After backward motion the public firmware does not count ticks, so standstill is unknown."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 4.0)
@@ -135,7 +135,7 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """Also slower, in the same direction, at once: the firmware remembers the old speed."""
+    """The firmware keeps the old speed of a wheel at rest, which prevents a slower start."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     for _ in range(3):
@@ -147,7 +147,7 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """Why RPM 0/0 stands before the first set-points; without feed-forward."""
+    """This is why RPM 0/0 precedes the first set-points after a Stop; here without feed-forward."""
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
     rig.order(-30, -30, 4.0)
@@ -162,7 +162,7 @@ def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
 @pytest.mark.slow
 @BOTH
 def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
-    """Latching is the driver's affair."""
+    """The board cuts the motors by itself; latching the e-stop is left to the session."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -176,7 +176,7 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """While the wheels turn; its unit is that of the firmware, known by the board's clock."""
+    """It arrives while the wheels turn; the board's clock reveals the time unit of the record."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -191,7 +191,7 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 
 
 def test_a_record_that_lost_a_line_is_given_up() -> None:
-    """It is dropped whole."""
+    """The driver reports a failure and discards all samples."""
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
     rig.driver.record(RecordKind.TORQUE, 100)
@@ -217,7 +217,7 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_no_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """The message is withdrawn when it is one after all."""
+    """The advice names the cause, and the first valid line clears it."""
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []
     assert ecu.advice is not None

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS decoder on whole and damaged streams."""
+"""The LOIS decoder on undamaged and damaged streams."""
 
 from random import Random
 
@@ -30,13 +30,13 @@ GROUPS: dict[str, list[Report]] = {"0x20": [*ODOMETRY], "0x12": [*TICKS], "0x0d"
 
 
 def rounded(found: list[Report]) -> list[bytes]:
-    """Comparable although floats were rounded on the wire."""
+    """Encode the reports, so that they can be compared although floats are rounded."""
     return [encode_report(report) for report in found]
 
 
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> None:
-    """At once, byte by byte, and cut at random."""
+    """The stream is fed in pieces of one report, byte by byte, and cut at random."""
     said = reports(20.0, firmware=firmware)
     sent = [report for _, report in said]
     stream = pieces(said)
@@ -54,7 +54,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 
 
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
-    """From the second on: the first could be anything."""
+    """This holds from the second group of a kind on; the first has none to be compared with."""
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
         for group in (odometry, ticks):
@@ -68,7 +68,7 @@ def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() 
 
 
 def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -> None:
-    """One of them could stand twice."""
+    """Equal lines may be one line received twice, so the next line or 50 ms of silence decides."""
     alike = encode_report(Ticks(1000, 5, 5))
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Ticks(600, 4, 3)), 0.0) == []
@@ -84,9 +84,10 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
 @pytest.mark.parametrize("name", GROUPS)
 @pytest.mark.parametrize("damage", ["lost", "doubled", "foreign", "cut", "foreign of its kind"])
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """Whichever of its lines it is; the last one twice harms nothing.
+    """Any line may be damaged; a second copy of the last line never makes a false group.
 
-    A line of another group of odometry may pass for one of this, but no damage moves lines.
+    A line of another odometry group could pass for one of this group. Damage does not move lines,
+    so this case is left out.
     """
     if (name, damage) == ("0x20", "foreign of its kind"):
         return
@@ -121,7 +122,7 @@ def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damag
 
 
 def test_a_doubled_marker_costs_nothing() -> None:
-    """The empty group before it is counted."""
+    """The empty group between the two markers is counted as damaged."""
     marker, *values = encode_report(TICKS[0]).splitlines(keepends=True)
     decoder = LoisDecoder()
     found = decoder.feed(marker + marker + b"".join(values), 0.0) + decoder.flush(0.0)
@@ -131,7 +132,7 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """One group of the pair is dropped, the other and all later ones come out right."""
+    """Only the group that lost the line is discarded; the other and all later ones are right."""
     decoder = LoisDecoder()
     found: list[Report] = []
     sent: list[bytes] = []
@@ -151,7 +152,7 @@ def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> Non
 
 @pytest.mark.parametrize("kind", RecordKind)
 def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKind) -> None:
-    """A lost, doubled, cut or foreign line anywhere in it."""
+    """Anywhere in it, a line is lost, doubled or cut, or a foreign line is inserted."""
     samples = tuple(range(20, 31))
     record = Record(kind, samples, () if kind is RecordKind.HEADING else samples[:5])
     whole = encode_report(record)
@@ -170,22 +171,22 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
             again = decoder.feed(whole, 1.0)
             found = [report for report in found if isinstance(report, Record)]
             if at == len(lines) - 1 and harmed == lines[: at + 1] + lines[at:]:
-                assert found == [record]  # its end stands twice: it is whole
+                assert found == [record]  # its end came twice, so it is complete
             elif found:
-                assert found == [record]  # the foreign line stood before it
+                assert found == [record]  # the foreign line came before it
                 assert at == 0
             assert again == [record]
 
 
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
-    """Nothing says how long it should be."""
+    """Its expected length is unknown, so lost lines could not be detected."""
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
     assert decoder.group_statistics.damaged_groups == 1
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """So a restart of the board costs one group."""
+    """A single leap is an error; two groups that fit each other are a restart, which costs one."""
     decoder = LoisDecoder()
     said = [
         Ticks(400, 1000, 1001),
@@ -215,7 +216,7 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """Out of its range, or of an unknown kind; whatever its checksum, nothing comes out."""
+    """It is out of range or of an unknown kind, so it gives no report in spite of its checksum."""
     total = 0
     for character in line[:11]:
         total ^= character
@@ -233,7 +234,7 @@ def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
 
 
 def test_a_line_that_lost_its_end_costs_no_other() -> None:
-    """The next colon begins a line."""
+    """The decoder begins a new line at the next colon."""
     heading = encode_report(Heading(5))
     decoder = LoisDecoder()
     assert decoder.feed(b"x:\xff:12" + heading[:9] + heading, 0.0) == [Heading(5)]
@@ -241,7 +242,7 @@ def test_a_line_that_lost_its_end_costs_no_other() -> None:
 
 
 def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required() -> None:
-    """A checksum that is there must be right in any case."""
+    """A checksum that is present must be right, even where none is required."""
     heading = encode_report(Heading(5))
     for sum_required in (True, False):
         decoder = LoisDecoder(sum_required=sum_required)
@@ -251,7 +252,7 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
 
 
 def test_lines_of_a_sensor_come_out_where_they_are_expected() -> None:
-    """Elsewhere they are damage."""
+    """They are expected in a terminal mode only; elsewhere they are counted as damage."""
     data = b"$HEHDT,12.3,T*1F\r\n\xff\xfe\n" + encode_report(Heading(5))
     decoder = LoisDecoder()
     assert decoder.feed(data, 0.0) == [Heading(5)]

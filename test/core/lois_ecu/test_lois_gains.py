@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Gains that the user has not set are the board's own: the driver says so, and what follows."""
+"""Notice about controller gains that are not set, so that the board uses its own."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def opened(settings: LoisEcuSettings) -> AnyBench:
-    """A session of ten seconds."""
+    """Return a session that was opened ten seconds ago."""
     bench = AnyBench(LoisEcuBoard(settings), LoisRobot("firmware"))
     bench.open()
     bench.run(10.0)
@@ -22,13 +22,13 @@ def opened(settings: LoisEcuSettings) -> AnyBench:
 
 
 def told(bench: AnyBench) -> list[str]:
-    """Notices on gains."""
+    """Return the notices about the board's own gains."""
     notices = [event.text for event in bench.events if isinstance(event, Notice)]
     return [sentence for sentence in notices if "board's own" in sentence]
 
 
 def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
-    """In the log, and as long as it is so in the diagnostics."""
+    """The log has one notice, and the diagnostics name the gains as long as they are not set."""
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)
     assert "in a few drives 0.2 to 2 m: run calibrate step" in sentence
@@ -38,7 +38,7 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
 
 
 def test_gains_that_are_set_need_no_words() -> None:
-    """One that is missing is named."""
+    """If a single gain is not set, the notice names it."""
     assert told(opened(HOST_GAINS)) == []
     written = {name: one for name, one in HOST_GAINS.written.items() if name != Setting.RIGHT_TN}
     (sentence,) = told(opened(replace(HOST_GAINS, written=written)))
@@ -46,5 +46,5 @@ def test_gains_that_are_set_need_no_words() -> None:
 
 
 def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
-    """Duty is open loop."""
+    """Duty bypasses the speed controllers."""
     assert told(opened(LoisEcuSettings(drive_mode="duty"))) == []

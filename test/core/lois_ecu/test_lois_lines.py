@@ -85,7 +85,7 @@ REPORTS: list[tuple[bytes, Report]] = [
 
 
 def in_capitals(lines: bytes) -> bytes:
-    """Upper case throughout; the checksum is of the characters as they are."""
+    """Return the lines in upper case, with checksums of the upper-case characters."""
     said = b""
     for line in lines.upper().splitlines():
         total = 0
@@ -96,13 +96,13 @@ def in_capitals(lines: bytes) -> bytes:
 
 
 def sum_in_capitals(lines: bytes) -> bytes:
-    """The checksum alone."""
+    """Return the lines with only their checksums in upper case."""
     return b"".join(line[:11] + line[11:].upper() + b"\n" for line in lines.splitlines())
 
 
 @pytest.mark.parametrize(("line", "command"), COMMANDS, ids=lambda value: str(value)[:32])
 def test_a_command_is_its_line_both_ways(line: bytes, command: Command) -> None:
-    """As the manual has it; in either case of letters, and with a carriage return."""
+    """The lines are the manual's; upper case and a carriage return are accepted too."""
     assert encode_command(command) == line
     for form in (line, in_capitals(line), sum_in_capitals(line), line[:-1] + b"\r\n"):
         decoded = decode_command(form)
@@ -117,7 +117,7 @@ def test_a_command_is_its_line_both_ways(line: bytes, command: Command) -> None:
 def test_a_command_without_checksum_is_two_characters_shorter(
     line: bytes, command: Command
 ) -> None:
-    """As the board expects it after 0x11 value 4."""
+    """The board expects such lines after 0x11 with value 4."""
     short = line[:11] + b"\n"
     assert encode_command(command, with_sum=False) == short
     assert type(decode_command(short, with_sum=False)) is type(command)
@@ -127,7 +127,7 @@ def test_a_command_without_checksum_is_two_characters_shorter(
 
 @pytest.mark.parametrize(("lines", "report"), REPORTS, ids=lambda value: str(value)[:32])
 def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
-    """The last line may wait for what follows; upper case is read like lower case."""
+    """The decoder may hold a report until the next call; upper case is read like lower case."""
     assert encode_report(report) == lines
     for form in (lines, in_capitals(lines), sum_in_capitals(lines), lines.replace(b"\n", b"\r\n")):
         decoder = LoisDecoder()
@@ -136,7 +136,7 @@ def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
 
 
 def test_odometry_behind_ticks_is_told_by_its_length() -> None:
-    """The public firmware sends it under the ticks' command byte."""
+    """The public firmware sends both under 0x12: ticks in 3 lines, odometry in 6."""
     decoder = LoisDecoder()
     ticks = b":12ffffffff39\n:120000019031\n:120000000a68\n:120000000930\n"
     odometry = encode_report(BoardOdometry(0.5, 0.25, 0.125, 0.0, 0.0, 0.0, appended=True))
@@ -148,7 +148,7 @@ def test_odometry_behind_ticks_is_told_by_its_length() -> None:
 
 
 def test_a_velocity_that_is_no_number_is_reported_as_such() -> None:
-    """The pose beside it stands."""
+    """The pose in the same report stays valid."""
     decoder = LoisDecoder()
     lines = encode_report(BoardOdometry(1.0, 2.0, 3.0, math.nan, math.inf, -math.inf))
     (report,) = decoder.feed(lines, 0.0) + decoder.flush(0.0)
@@ -159,7 +159,7 @@ def test_a_velocity_that_is_no_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """The shorter channel is padded with 10, which is not part of it."""
+    """The board pads the shorter channel with 10, which is removed."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 2, 1)
     data = b":04000a000b3d\n" + encode_report(Record(RecordKind.RPM, (10, 12), (11,)))[14:]
@@ -178,7 +178,7 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 
 
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
-    """The record ends with two of them."""
+    """Two paddings end the record, and a third one fills up an odd number of headings."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)
     data = b":0c0005fffb68\n:0c0003016a3c\n:0c016a016a69\n"
@@ -208,6 +208,6 @@ def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
 
 @given(st.binary(max_size=20))
 def test_what_is_no_line_is_refused_by_name(data: bytes) -> None:
-    """Never by another exception."""
+    """Any bytes are decoded or raise FrameError, never another exception."""
     with suppress(FrameError):
         decode_command(data)

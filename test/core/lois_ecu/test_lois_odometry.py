@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The odometry of a LOIS robot against the truth, on both kinds of firmware.
+"""Odometry of a LOIS robot, compared with its true pose, on both kinds of firmware.
 
-``test/integrity/lois_odometry.py`` prints the figures of many drives; a few run here.
+``test/integrity/lois_odometry.py`` prints the figures of many drives; a few of them run here.
 """
 
 import math
@@ -33,23 +33,23 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
 def off_m(one: Drive) -> float:
-    """Distance of the estimate from the truth."""
+    """Return the distance in m between the estimated and the true position."""
     return math.hypot(one.error.x_m, one.error.y_m)
 
 
-# What is promised
+# Promised accuracy
 
 
 @cache
 def driven(firmware: Firmware, name: str, seed: int = 1) -> Drive:
-    """With wheels of the right size."""
+    """Return the outcome of a drive with exact wheel sizes."""
     return drive(nominal(firmware, seed), CLASSES[name])
 
 
 @BOTH
 @pytest.mark.parametrize("name", ["straight", "curve"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
-    """With wheels of the right size."""
+    """This accuracy is promised for wheels of the right size."""
     one = driven(firmware, name)
     assert one.way_m > 5.0
     assert off_m(one) < max(0.02, 0.02 * one.way_m)
@@ -58,7 +58,7 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
 
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
-    """One wheel turns backward: the public firmware counts nothing of it."""
+    """One wheel turns backward, and the public firmware does not count its ticks."""
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
     assert abs(one.error.yaw_rad) < 0.03 * one.turned_rad
@@ -66,8 +66,11 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """The public firmware counts nothing, and tells whole RPM: the heading drifts. Eight drives are
-    off by 4.9 % on average; the first of these three is the worst of them, with 13 %."""
+    """The public firmware counts no ticks and reports integer RPM, so the heading drifts.
+
+    Eight drives are off by 4.9 % of the way on average. The first of these three is the worst of
+    them, with 13 %.
+    """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
         assert one.way_m > 5.0
@@ -80,7 +83,7 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With them the public firmware's right wheel swings and rests, and keeps its last speed."""
+    """With the boot gains the firmware's right wheel swings, rests, and keeps its last speed."""
     one = motion(wrong("firmware", 1000), name, LoisEcuSettings())
     assert one.nees < 21.1
     assert one.sigmas < 3.5
@@ -89,23 +92,23 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> Non
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place", "reverse", "jerky"])
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
-    """Wheels of wrong sizes that slip, on uneven ground: one in 10,000 is further off.
+    """Wheels of wrong sizes slip on uneven ground; by chance, one drive in 10,000 exceeds 21.1.
 
-    ``test/integrity/lois_odometry.py`` judges by the mean of many.
+    ``test/integrity/lois_odometry.py`` judges by the mean of many drives.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
 
 @pytest.mark.parametrize("name", ["left", "right"])
 def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -> None:
-    """Each turn has a wheel of which the public firmware counts nothing."""
+    """In each turn one wheel turns backward, and the public firmware does not count its ticks."""
     one = motion(nominal("firmware", 1000), name, side_m=1.0)
     assert off_m(one) < 0.15
     assert one.sigmas < 3.0
 
 
 def test_hard_steering_to_both_sides_is_followed() -> None:
-    """Wheels that reverse several times a second, as documented: each tick is reported."""
+    """Wheels reverse several times a second; a documented board reports each tick."""
     one = motion(nominal("documented", 1001), "jerky")
     assert off_m(one) < 0.05
     assert abs(one.error.yaw_rad) < math.radians(5.0)
@@ -116,25 +119,25 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """Three of five groups are lost then; the counters tell what was missed."""
+    """Three of five groups are lost, but the counters in the others show the missed ticks."""
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)
     assert abs(one.error.yaw_rad) < math.radians(10.0)
     assert one.sigmas < 4.0
 
 
-# How
+# How the pose is estimated
 
 
 def settled(firmware: Firmware) -> Rig:
-    """A rig whose board is configured."""
+    """Return a rig whose board is configured."""
     rig = Rig(nominal(firmware))
     rig.run(4.0)
     return rig
 
 
 def test_the_boards_own_odometry_would_be_wrong() -> None:
-    """Why it is not simply passed on: it misses a good part of a straight drive."""
+    """It misses more than 15 % of a straight drive, so it is not passed on as it is."""
     rig = settled("firmware")
     rig.order(20, 20, 8.0)
     board = rig.board.odometry.pose
@@ -146,7 +149,7 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """Forward by ticks; backward by commands on the public firmware."""
+    """The public firmware counts no ticks backward, so commands and heading replace them there."""
     rig = settled(firmware)
     rig.order(20, 20, 4.0)
     assert rig.estimates[-1][0].source == "ticks"
@@ -164,7 +167,7 @@ def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
 
 @BOTH
 def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
-    """Whatever stale velocity 0x20 repeats."""
+    """Report 0x20 repeats an old velocity, which must not move the pose."""
     rig = settled(firmware)
     rig.order(20, 25, 4.0)
     rig.order(0, 0, 2.0)
@@ -179,7 +182,7 @@ def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
 
 @BOTH
 def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
-    """With a covariance that grows, at 20 Hz between groups."""
+    """At 20 Hz between groups, their covariance grows and their mean error is below 3 cm."""
     rig = settled(firmware)
     rig.order(20, 24, 6.0)
     misses = []
@@ -204,7 +207,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """Displacements add up to the pose, and no step is impossible."""
+    """The displacements add up to the way, and each step stays below 1 m/s plus 3 cm."""
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
     rig.order(*STOP, 2.0)
@@ -216,7 +219,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 
 
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
-    """Neither its ticks nor its heading; what it rolled on meanwhile is a few centimetres."""
+    """Its counters restart at zero, which is not motion; rolling out adds at most 5 cm."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
     for step in range(1, 11):
@@ -235,7 +238,7 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
 def test_a_board_that_restarts_ends_the_motion_in_odom(
     firmware: Firmware, pair: tuple[int, int]
 ) -> None:
-    """Although set-points go on, until it is heard again: the robot stands."""
+    """Set-points that continue during the restart move the pose no further than the robot."""
     rig = settled(firmware)
     rig.order(*pair, 4.0)
     first = rig.driver.predicted(rig.now)
@@ -258,7 +261,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
-    """The way until then stays."""
+    """The way until then is not scaled again."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -278,8 +281,10 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
-    """Nothing was heard of the last half second, in which they should have rolled; what they roll
-    on when they are stopped is not counted.
+    """Ticks after a silence of half a second correct a prediction that was too far ahead.
+
+    The wheels should have rolled on in that time. How far they roll after they are stopped is not
+    counted.
     """
     ours = LoisEcuSettings()
     odometry = LoisOdometry(ours)
@@ -298,7 +303,7 @@ def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_sa
 
 
 def test_a_velocity_that_is_no_number_is_no_speed() -> None:
-    """The heading beside it is used."""
+    """The velocity is ignored, and the heading in the same report is used."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(-20, -20), 0.0)
     found: list[FusedOdometry] = []
@@ -314,7 +319,7 @@ def test_a_velocity_that_is_no_number_is_no_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """The estimate is poor, and the covariance says so."""
+    """The estimate is poor, and its standard deviation exceeds 20 % of the way."""
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
     found: list[FusedOdometry] = []
@@ -328,7 +333,7 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
 
 @BOTH
 def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
-    """Its left wheel is our right one; the estimate is still right."""
+    """The board's left wheel is the robot's right one; the estimate is still right."""
     rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
     rig.run(4.0)
     rig.order(15, 20, 5.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The odometry of a LOIS robot over what happens to its line."""
+"""Odometry of a LOIS robot across a new connection."""
 
 import math
 
@@ -10,7 +10,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def test_odometry_before_the_first_ticks_of_a_new_line_leaves_the_covariance_finite() -> None:
-    """While a wheel is commanded backward: when the group before came is not forgotten."""
+    """A wheel is commanded backward; the time of the last group before the connection is kept."""
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     for step in range(3):

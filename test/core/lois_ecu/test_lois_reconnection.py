@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The odometry of a LOIS ECU over lines that come and go, at any moment and in any order."""
+"""Odometry of a LOIS ECU with reports, commands, restarts and new connections in any order."""
 
 import math
 
@@ -45,7 +45,7 @@ def happen(odometry: LoisOdometry, what: object, now: float) -> None:
 
 @given(st.lists(st.tuples(WAITS_S, HAPPENINGS), max_size=30))
 def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, object]]) -> None:
-    """Also where a group comes at once after a new connection."""
+    """This includes a group that arrives at once after a new connection."""
     odometry, now = LoisOdometry(LoisEcuSettings()), 1000.0
     for wait_s, what in events:
         now += wait_s
@@ -58,7 +58,7 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """Ticks come between two groups of 0x20, and the robot starts backward before the second."""
+    """Between two groups of 0x20 the robot starts backward, and the covariance stays finite."""
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.1, 0.1, 0.3, 0.0, 0.0, 0.0, appended=True)
     odometry.heard_ticks(Ticks(0, 16, 35), 9.1)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Records as files, with units; abandoned ones are not saved."""
+"""Records as CSV files with units; a record that is abandoned leaves no file."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def read(path: Path, record: Record, count_s: float | None = 1e-4) -> str:
 
 
 def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
-    """20 RPM are 50 ms from tick to tick of 60; what a word cannot tell is left empty."""
+    """At 20 RPM, 60 ticks a turn are 50 ms apart; a count of 65535 is an overflow: empty."""
     assert read(tmp_path / "new" / "rpm.csv", RPM).splitlines() == [
         "sample,left_tick_s,right_tick_s,left_rpm,right_rpm,left_counts,right_counts",
         "0,0.0500000,0.0250000,20.00,40.00,500,250",
@@ -30,13 +30,13 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
 
 
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:
-    """A message explains it."""
+    """Times and speeds stay empty, and a remark explains why."""
     assert read(tmp_path / "rpm.csv", RPM, None).splitlines()[1] == "0,,,,,500,250"
     assert "unit" in remark(RecordReading(RPM, None, 60))
 
 
 def test_torque_and_headings_have_their_columns(tmp_path: Path) -> None:
-    """The ADC's counts, whose scale is not known; degrees."""
+    """Torque is in counts of the ADC, whose scale is unknown; headings are in degrees."""
     torque = Record(RecordKind.TORQUE, (200, 300), (400, 500))
     assert read(tmp_path / "t.csv", torque).splitlines() == [
         "sample,left_adc_counts,right_adc_counts",
@@ -49,7 +49,7 @@ def test_torque_and_headings_have_their_columns(tmp_path: Path) -> None:
 
 
 def test_a_record_that_nobody_waits_for_leaves_no_file(tmp_path: Path) -> None:
-    """A file that cannot be written is not left either."""
+    """A write that fails leaves no file either."""
     assert not save(RecordReading(RPM, 1e-4, 60), tmp_path / "rpm.csv", lambda: False)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OSError, match="taken"):
@@ -58,5 +58,5 @@ def test_a_record_that_nobody_waits_for_leaves_no_file(tmp_path: Path) -> None:
 
 
 def test_names_tell_what_and_when() -> None:
-    """In UTC, to the microsecond."""
+    """The time is in UTC, to the microsecond."""
     assert file_name(RecordKind.TORQUE, 0.25) == "torque_19700101T000000_250000.csv"

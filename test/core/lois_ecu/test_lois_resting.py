@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether a wheel stands of which the public firmware tells the same speed again and again."""
+"""Detection of a wheel at rest for which the public firmware keeps reporting the same speed."""
 
 import pytest
 
@@ -10,7 +10,7 @@ GROUP_S = 0.1
 
 
 def told(*speeds_rpm: float) -> RestingWheel:
-    """One after the other."""
+    """Return an estimator to which these speeds were reported, one in each group."""
     wheel = RestingWheel()
     for rpm in speeds_rpm:
         wheel.tell(rpm, GROUP_S)
@@ -18,14 +18,14 @@ def told(*speeds_rpm: float) -> RestingWheel:
 
 
 def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands() -> None:
-    """As with the gains of the boot: 31 RPM, 12 RPM, and no tick any more."""
+    """With the boot gains a wheel falls from 31 to 12 RPM, and then its ticks end."""
     assert told(31, 28, 19, 12).chance == 0.0
     assert 0.0 < told(31, 28, 19, 12, 12).chance < 1.0
     assert told(31, 28, 19, 12, 12, 12).chance == 1.0
 
 
 def test_a_wheel_that_fell_steeply_rests_from_a_higher_speed() -> None:
-    """From 51 to 21 RPM within a second, and no tick any more."""
+    """This wheel falls from 51 to 21 RPM within a second, and then its ticks end."""
     assert told(51, 47, 31, 26, 21).chance == 0.0
     assert 0.0 < told(51, 47, 31, 26, 21, 21).chance < 1.0
     assert told(51, 47, 31, 26, 21, 21, 21).chance == 1.0
@@ -33,28 +33,28 @@ def test_a_wheel_that_fell_steeply_rests_from_a_higher_speed() -> None:
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """However often it is repeated."""
+    """This does not depend on the number of repetitions."""
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """The tick after it seems to be early, and the board reports a high speed once."""
+    """The tick after it seems to be early, so the board reports a high speed once."""
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 
 @pytest.mark.parametrize("rpm", [1, 3, 25, 40])
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
-    """The last speed before a rest is neither so low nor so high."""
+    """The last speed before a rest is between 4.5 and 19.5 RPM (23.5 RPM after a steep fall)."""
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
 
 def test_another_speed_ends_the_rest() -> None:
-    """Whatever it is."""
+    """A change of the reported speed shows another tick of the wheel."""
     assert told(31, 28, 12, 12, 12, 2).chance == 0.0
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels have the same speed the board tells none."""
+    """While both wheels have the same speed the board reports none; estimates replace it."""
     wheel = told(12)
     for rpm in (30.0, 28.0):
         wheel.note(rpm, GROUP_S)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""GPS, clock and compass of a LOIS ECU as the rest of the driver sees them."""
+"""Readings of GPS, clock and compass of a LOIS ECU."""
 
 import math
 from datetime import date
@@ -21,7 +21,7 @@ from omnibot_driver.simulator.lois_ecu import DOCUMENTED, LoisSettings
 
 
 def test_gps_and_compass_come_in_si_units_and_enu() -> None:
-    """East is 0; without a date there is no time, and 0/0 is not a fix."""
+    """East is yaw 0; without a date the time is unknown, and position 0/0 is not a fix."""
     rig = Rig(
         LoisSettings(quirks=DOCUMENTED),
         LoisEcuSettings(periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000}),
@@ -55,14 +55,14 @@ def test_gps_and_compass_come_in_si_units_and_enu() -> None:
     ids=str,
 )
 def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
-    """As `date -u +%s` has them."""
+    """The expected seconds are those of ``date -u +%s``."""
     ecu = LoisConversation(LoisEcuSettings())
     found = ecu.receive(encode_report(day) + encode_report(GpsTime(0, 0, 1)), 0.0)
     assert found == [TimeReading(utc_s + 1)]
 
 
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
-    """Else it would be a day late."""
+    """With the old date the time would be one day behind."""
     ecu = LoisConversation(LoisEcuSettings())
     said = [GpsDate(26, 11, 22), GpsTime(23, 59, 59), GpsTime(0, 0, 1), GpsDate(26, 11, 23)]
     found: list[object] = []
@@ -75,14 +75,14 @@ def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
 
 
 def test_declination_turns_the_heading() -> None:
-    """East positive: yaw = pi/2 - (heading + declination)."""
+    """It is positive to the east: yaw = pi/2 - (heading + declination)."""
     ecu = LoisConversation(LoisEcuSettings(declination_rad=0.1))
     found = ecu.receive(encode_report(Heading(90)) * 3, 0.0)
     assert found[-1] == HeadingReading(pytest.approx(-0.1))
 
 
 def test_false_headings_at_north_are_refused() -> None:
-    """A robot that turns through north on the public firmware."""
+    """The public firmware averages headings around north wrongly: 359, 1 and 1 give 120."""
     rig = Rig(nominal("firmware"))
     rig.run(4.0)
     rig.readings.clear()

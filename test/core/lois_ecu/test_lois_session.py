@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A whole session with a simulated LOIS ECU: what stops it, what is advised, what a reset shows."""
+"""Sessions with a simulated LOIS ECU: e-stop button, advice, resets, records, late reads."""
 
 import pytest
 from any_board import TICK_S
@@ -19,7 +19,7 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The board itself would obey set-points while it is held."""
+    """The board itself would obey set-points while its button is held."""
     bench = Bench(firmware)
     bench.drive_on()
     bench.presses(True)
@@ -36,7 +36,7 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """It names none of another board's; without a ~/start the e-stop's release ends the refusal."""
+    """Only this board's parameters are named; releasing the e-stop replaces a missing ~/start."""
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
         with pytest.raises(CommandRefused, match="motion monitor"):
@@ -58,7 +58,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """Also by a few ticks, where the wheels stood before."""
+    """A few ticks (the drive of 1.2 s) are enough, because the wheels were at rest before."""
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
     bench.run(3.0)
@@ -71,7 +71,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """The counters were zero before; it is still sent more than once."""
+    """The counters were zero before, so the reset is sent at least twice and stays unconfirmed."""
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
@@ -84,7 +84,7 @@ def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
-    """Although there were fewer than twenty ticks."""
+    """Fewer than twenty ticks do not prove a reset by themselves."""
     bench = Bench(firmware)
     bench.drive_on(0.2, 1.2)
     bench.run(3.0)
@@ -103,7 +103,7 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
-    """It takes 1.2 s, in which nothing else comes; the robot is driven on."""
+    """For 1.2 s nothing but the record arrives, and the robot is driven meanwhile."""
     bench = Bench(firmware)
     bench.drive_on(0.6, 2.0)
     board = bench.session.board
@@ -119,7 +119,7 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
 
 
 def test_a_long_record_is_not_taken_for_damage() -> None:
-    """Its lines are right, although none of them is a report."""
+    """Its lines are valid although they are not reports, so they must not lead to advice."""
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -133,7 +133,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The rest of a line is not a sign of a wrong baud rate."""
+    """The driver reports missing data; the rest of a line does not suggest a wrong baud rate."""
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)
@@ -147,8 +147,11 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 
 @pytest.mark.parametrize("count", range(1, 13))
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
-    """A round of them may take as long as the board takes from group to group: then the same line
-    was lost in each of five rounds."""
+    """Each of the five rounds writes the settings in another order.
+
+    A round may take as long as the board takes from one group to the next. In a fixed order, the
+    board would then be deaf for the same line in every round.
+    """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
     bench = Bench("firmware")
@@ -161,7 +164,7 @@ def test_every_setting_arrives_however_many_there_are(count: int) -> None:
 
 @FIRMWARE
 def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> None:
-    """They have one arrival time; the robot is driven on, and odometry goes on."""
+    """All groups of 0.6 s arrive at one time, and odometry stays within 0.15 m of the truth."""
     bench = Bench(firmware, HOST_GAINS)
     for _ in range(8):
         late: list[bytes] = []
@@ -179,7 +182,7 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
 
 @FIRMWARE
 def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
-    """Settings are said again for some seconds after the port was opened: not behind the Stop."""
+    """Settings are repeated for some seconds after a connection, but not after the Stop."""
     bench = Bench(firmware)
     bench.close()
     bench.open()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Set-points of a LOIS ECU by hand: what a motion is in its lines."""
+"""Motions encoded as set-points of a LOIS ECU, against lines that are typed by hand."""
 
 import math
 
@@ -18,14 +18,14 @@ RPM = math.tau / 60
 
 
 def started(settings: LoisEcuSettings | None = None) -> LoisConversation:
-    """Past the first set-points after a Stop."""
+    """Return a conversation that has sent the three RPM 0/0 which are due after a Stop."""
     ecu = LoisConversation(LoisEcuSettings() if settings is None else settings)
     ecu.wrote(CLEAR * 3, 0.0)
     return ecu
 
 
 def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
-    """So both kinds of zero alternate under the e-stop."""
+    """While the e-stop is latched, both kinds of zero alternate."""
     ecu = LoisConversation(LoisEcuSettings())
     assert ecu.stop() == STOP
     assert ecu.emergency_stop() == CLEAR
@@ -43,7 +43,7 @@ def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
     ],
 )
 def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: bytes) -> None:
-    """Both are slowed alike; what rounds to nothing is Stop."""
+    """Both wheels are slowed by the same factor; rates that round to zero are a Stop."""
     ecu = started()
     total = 0
     for character in line[:11]:
@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """0.2723 m/s forward are 20 RPM; turning left speeds up the right wheel."""
+    """20 RPM are 0.2723 m/s; ``meaning`` returns the twist of a line within its rounding."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -65,7 +65,7 @@ def test_a_twist_is_said_and_understood() -> None:
 
 
 def test_an_inverted_board_has_its_wheels_exchanged() -> None:
-    """In what is said and in what is meant by it."""
+    """This holds for the line of a twist, and for the twist that a line means."""
     ecu = started(LoisEcuSettings(inverted=True))
     left = ecu.velocity(BodyTwist(0.0, 0.0, 0.5))
     assert left == started().velocity(BodyTwist(0.0, 0.0, -0.5))
@@ -73,7 +73,7 @@ def test_an_inverted_board_has_its_wheels_exchanged() -> None:
 
 
 def test_duty_is_limited_and_belongs_to_its_mode() -> None:
-    """In percent, both slowed alike."""
+    """Duty is in percent, and both wheels are slowed by the same factor."""
     with pytest.raises(CommandRefused, match="drive_mode is rpm"):
         started().duty((10, 10))
     ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
@@ -84,12 +84,12 @@ def test_duty_is_limited_and_belongs_to_its_mode() -> None:
 
 
 def encode_command_duty(left: int, right: int) -> bytes:
-    """By the codec, which has golden lines of its own."""
+    """Return the line of a duty from the codec, which has tests of its own."""
     return encode_command(SetDuty(left, right))
 
 
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
-    """Three times, as one may be lost: a wheel that stands would never start otherwise."""
+    """A wheel at rest might never start without RPM 0/0, which is sent three times against loss."""
     ecu = started()
     drive = b":020014001438\n"
     for now in (1.0, 1.1):
@@ -103,7 +103,7 @@ def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
 
 
 def test_a_record_that_cannot_complete_is_refused() -> None:
-    """More than 1024 samples never end."""
+    """The board never ends a record of more than 1024 samples."""
     ecu = started()
     for samples in (0, 1025):
         with pytest.raises(RequestRefused, match="1 to 1024"):
@@ -119,7 +119,7 @@ def test_a_record_that_cannot_complete_is_refused() -> None:
     ],
 )
 def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
-    """As a line may be lost; in a third of a second, as each makes the board begin anew."""
+    """A line may be lost; all three go out within 0.3 s, as each makes the board start anew."""
     ecu = started()
     ecu.record(kind, samples)
     sent = b"".join(ecu.due(0.01 * step) for step in range(100))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Set-points that change their sign soon after each other, of which the board tells little."""
+"""Covariance after set-points that change sign in quick succession, when reports show little."""
 
 import pytest
 from lois_drives import HOST_GAINS
@@ -11,7 +11,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def variance(settings: LoisEcuSettings, holds_s: float) -> float:
-    """Of the yaw, after three changes of sign, each set-point holding for this time."""
+    """Return the yaw variance in rad² after three changes of sign, ``holds_s`` apart."""
     odometry = LoisOdometry(settings)
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     now, rpm, turned_s = 0.0, 20, 1.0
@@ -29,11 +29,11 @@ def variance(settings: LoisEcuSettings, holds_s: float) -> float:
 
 
 def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own_gains() -> None:
-    """With those of the public firmware a wheel swings."""
+    """With the public firmware's gains a wheel still swings when the sign changes again."""
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 
 
 def test_a_wheel_that_has_settled_is_not_doubted() -> None:
-    """What it did before the sign changed is known."""
+    """Its motion before the change of sign is known, whatever the gains."""
     own, host = variance(LoisEcuSettings(), 15.0), variance(HOST_GAINS, 15.0)
     assert own == pytest.approx(host, rel=0.02)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A line that is lost while the robot drives: the board has no watchdog, so the wheels go on."""
+"""Loss of the line while a LOIS robot drives: without a watchdog its wheels keep turning."""
 
 import math
 
@@ -11,7 +11,10 @@ FIRMWARES = ("lois_ecu", "lois_ecu as documented")
 
 
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
-    """The robot drives, the line is lost in both directions, and comes back; the robot stands."""
+    """Return a bench whose line was lost for ``seconds`` in both directions during a drive.
+
+    ``reopened``: the port was closed and opened again. The robot is at rest at the end.
+    """
     bench = nominal(firmware)
     bench.drive_on(vx, 4.0)
     bench.speaks = bench.hears = False
@@ -28,7 +31,7 @@ def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> An
 
 
 def off_by(bench: AnyBench) -> tuple[float, float]:
-    """Error of the position in m, and its standard deviation by the covariance."""
+    """Return the error of the position in m, and its standard deviation by the covariance."""
     estimate, truth = bench.odometry[-1], bench.robot.board.truth  # type: ignore[attr-defined]
     error_m = math.hypot(estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m)
     return error_m, math.sqrt(estimate.covariance.xx + estimate.covariance.yy)
@@ -41,7 +44,7 @@ def off_by(bench: AnyBench) -> tuple[float, float]:
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
     firmware: str, vx: float, seconds: float, reopened: bool
 ) -> None:
-    """The stop did not reach the board either, so the robot went on by metres."""
+    """The Stop did not reach the board either, so the robot drove on by metres."""
     error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
     assert error_m <= 3.0 * sigma_m
 
@@ -52,7 +55,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """Forward, where both firmwares count."""
+    """Forward, both firmwares count, so the error is at most a tenth of the way."""
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)
     assert error_m <= 0.1 * bench.robot.way_m
@@ -60,7 +63,7 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
-    """By the speed at which the robot may still drive."""
+    """It grows by the speed at which the robot may still be driving."""
     bench = nominal(firmware)
     bench.drive_on(0.3, 4.0)
     bench.speaks = bench.hears = False

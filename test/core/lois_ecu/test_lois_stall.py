@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A wheel that stands although it is commanded: the public firmware may hold it."""
+"""Detection of a commanded wheel that stands still, as the public firmware may hold it."""
 
 import math
 
@@ -15,8 +15,10 @@ def pose(x_m: float) -> BoardOdometry:
 
 
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
-    """When a wheel looked stalled in six seconds, with these ticks and this distance in each 0.2
-    s."""
+    """Return the times in s, out of six seconds, at which a wheel looked stalled.
+
+    ``ticks``, ``ways_m``: ticks of both wheels, and distance in m by 0x20, in each 0.2 s.
+    """
     watch = StallWatch()
     watch.wrote(command, 0.0)
     found = []
@@ -31,23 +33,23 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
 
 
 def test_a_wheel_that_is_to_turn_forward_and_does_not_tick_looks_stalled() -> None:
-    """Again and again, as long as it stands."""
+    """This is reported every 2 s as long as the wheel stands still."""
     assert watched(SetRpm(20, 10), ticks=(3, 0), ways_m=0.1) == [2.0, 4.0, 6.0]
 
 
 def test_wheels_that_tick_do_not() -> None:
-    """Both forward."""
+    """Both wheels are commanded forward, so ticks show their motion."""
     assert watched(SetRpm(20, 10), ticks=(3, 1), ways_m=0.0) == []
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """Its ticks are not counted."""
+    """The public firmware does not count its ticks."""
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
 
 
 def looks_stalled(rpm: list[tuple[int, int]]) -> bool:
-    """Whether a wheel does whose set-points are -9 and 9 RPM, with these speeds in 0x20."""
+    """Return whether a wheel looks stalled at -9 and 9 RPM, with these speeds in 0x20."""
     watch, unit = StallWatch(0.47, UNIT_MPS), UNIT_MPS
     watch.wrote(SetRpm(-9, 9), 0.0)
     found = False
@@ -64,30 +66,30 @@ def looks_stalled(rpm: list[tuple[int, int]]) -> bool:
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The pose changes, as the firmware integrates the speed that the left wheel had."""
+    """The pose proves nothing: the firmware integrates the speed that the left wheel had."""
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """It gets no power, so if it rolled it would become slower."""
+    """The controller gives it no power, so it would slow down if it rolled."""
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
-    """Backward they are up to 10 % too fast, and integer speeds repeat."""
+    """A wheel that rolls backward is up to 10 % too fast, and integer speeds repeat."""
     assert not looks_stalled([(-9, 9)] * 14)
     assert not looks_stalled([(-10, 9)] * 14)
 
 
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    """The velocity in the earth frame."""
+    """Return the velocity in the earth frame, by the speeds of both rims, in m/s."""
     speed = (left + right) / 2
     return speed * math.cos(yaw_rad), speed * math.sin(yaw_rad)
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
-    """A set-point below 2 RPM may well stand."""
+    """A wheel may well stand still below 2 RPM, and duty bypasses the controller."""
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []

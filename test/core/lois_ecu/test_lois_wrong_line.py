@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is not this board's on the port: a sentence each, no motion, and recovery by itself."""
+"""Foreign data on the port of a LOIS ECU: one sentence of advice, no motion, recovery."""
 
 from random import Random
 
@@ -29,7 +29,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("data", "sentence"), WRONG.values(), ids=WRONG)
 def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, sentence: str) -> None:
-    """Once, and the board is driven as soon as it is there."""
+    """The notice comes once, and the robot can be driven as soon as the board is there."""
     board, robot = MAKERS["lois_ecu"]()
     bench = AnyBench(board, robot)
     bench.speaks = False
@@ -55,7 +55,7 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
 def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
     firmware: str, *, checks: bool
 ) -> None:
-    """It drives without a restart of anything."""
+    """The driver restores the setting by itself, without a restart."""
     _, robot = MAKERS[firmware]()
     robot.board._reader.checks = not checks
     bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=checks)), robot)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How far odometry is off, measured by its own covariance (NEES), on networks of all kinds.
+"""The normalised error squared (NEES) of odometry, by its covariance, on networks of all kinds.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50``: 50 drives for each
-network; docs/boards/mart.md has the figures. Of an honest covariance the mean is 3, and 0.1 % is
-beyond 16.3; less than 3 is more careful than need be.
+``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50`` makes 50 drives for each
+network; docs/boards/mart.md has the figures. With an honest covariance the mean is 3, and 0.1 % of
+the values exceed 16.3. A mean below 3 shows a covariance that is larger than necessary.
 """
 
 import math
@@ -20,7 +20,7 @@ from mart_campaign import FIRMWARES, TWISTS
 from omnibot_driver.simulator.common.network import NetworkFaults
 
 RARE = 16.3
-"""0.1 % of the squares of three honest normal errors are beyond it."""
+"""The value that 0.1 % of the squares of three honest normal errors exceed."""
 NETWORKS = {
     "good": NetworkFaults(),
     "late by up to 0.3 s": NetworkFaults(delay_s=0.3),
@@ -35,7 +35,7 @@ MOTIONS = 6
 
 
 def nees(bench: MartBench) -> float:
-    """Of the pose published last, against the truth of now."""
+    """Return the NEES of the last published pose against the present true pose."""
     told, truth = bench.odometry[-1], bench.truth
     yaw_rad = math.remainder(told.pose.yaw_rad - truth.yaw_rad, math.tau)
     error = np.array([told.pose.x_m - truth.x_m, told.pose.y_m - truth.y_m, yaw_rad])
@@ -45,7 +45,7 @@ def nees(bench: MartBench) -> float:
 
 
 def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[float]:
-    """NEES all along a random drive, and at its end last."""
+    """Yield the NEES during a random drive; the last value is that at its end."""
     random = Random(seed)
     unequal = random.uniform(-0.04, 0.04)
     bench = MartBench(FIRMWARES[seed % 3], faults, seed=seed, motor_inequality=unequal).ready()
@@ -73,7 +73,7 @@ def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[
 
 
 def main() -> None:
-    """One row for each network, without and with goals."""
+    """Print one row for each network, without and with goals."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print(
         "| Network | Motions | Mean at the end | Mean | Median | Beyond 16.3 |\n" + "|---" * 6 + "|"

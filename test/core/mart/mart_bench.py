@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A session with a simulated MART controller in simulated time, and a bad network in between."""
+"""A session and a simulated MART controller in simulated time, with a bad network between them."""
 
 import math
 from collections.abc import Callable
@@ -56,7 +56,7 @@ class NetworkRobot(MartRobot):
 
 
 def sleeps(board: SimulatedMart) -> bool:
-    """Whether nothing happens in the next five ticks; they have passed then."""
+    """Return whether nothing happens in the next five ticks; if so, skip them."""
     if board.server.wake_at <= (board.ticks + 5) * TICK_S:
         return False
     board.ticks += 5
@@ -64,7 +64,7 @@ def sleeps(board: SimulatedMart) -> bool:
 
 
 class MartBench(AnyBench):
-    """``server``: the simulated one."""
+    """A session with a simulated controller; ``server`` is the simulated MART server."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class MartBench(AnyBench):
         self._wake_s = -math.inf
 
     def ready(self) -> "MartBench":
-        """Nominal, and seen to stand."""
+        """Connect, until the session is nominal and the robot is seen to stand still."""
         self.open()
         self.run_until(lambda: self.session.state == "nominal", 30.0)
         self.run(1.5)
@@ -102,7 +102,7 @@ class MartBench(AnyBench):
         self._wake_s = self.session.wake_at
 
     def run(self, seconds: float) -> None:
-        """As every bench, but what has nothing to do is not asked."""
+        """Let the time pass, and call the session only when it has something to do."""
         for _ in range(round(seconds / BENCH_TICK_S)):
             self.now += BENCH_TICK_S
             packets = self.robot.advance()
@@ -115,13 +115,13 @@ class MartBench(AnyBench):
                 self.settle()
 
     def command(self, vx: float, yaw_rate: float, seconds: float) -> None:
-        """Ten times a second; what is refused is refused."""
+        """Command the twist ten times a second; ignore refusals."""
         for _ in range(round(seconds / 0.1)):
             self.try_command(vx, yaw_rate)
             self.run(0.1)
 
     def try_command(self, vx: float, yaw_rate: float) -> str:
-        """Once; why it was refused, if it was."""
+        """Command the twist once; return why it was refused, or empty."""
         try:
             self.session.command_twist(BodyTwist(vx, 0.0, yaw_rate), self.now)
         except CommandRefused as error:
@@ -131,7 +131,7 @@ class MartBench(AnyBench):
         return ""
 
     def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
-        """As soon as it is not refused."""
+        """Command the goal pose, again every 0.1 s while it is refused."""
         for _ in range(50):
             try:
                 self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
@@ -143,7 +143,7 @@ class MartBench(AnyBench):
                 self.settle()
 
     def until_it_stands(self, limit_s: float = 20.0) -> float:
-        """How long it takes."""
+        """Wait until the robot stands still; return how long that takes, in s."""
         began_s = self.now
         self.run_until(lambda: self.robot.stands, limit_s)
         return self.now - began_s
@@ -155,15 +155,15 @@ class MartBench(AnyBench):
 
     @property
     def error(self) -> Pose:
-        """Of the odometry."""
+        """Error of the odometry: its last pose relative to the true one."""
         return self.odometry[-1].pose - self.truth
 
     def said(self, since: int = 0) -> list[bytes]:
-        """What went out, but for polls."""
+        """Return the datagrams sent so far, from index ``since`` on, without polls."""
         return [data for _, data in self.written[since:] if data not in POLLS]
 
     def job(self, job: Job, *arguments: object, limit_s: float = 95.0) -> JobDone:
-        """Ask for it, and wait for its answer."""
+        """Request a job, wait for its result and return it."""
         seen = len(self.events)
         self.board.ask(job, "token", self.now, *arguments)
 
@@ -182,7 +182,7 @@ class MartBench(AnyBench):
 
 
 def steer_along(bench: MartBench, corners: list[tuple[float, float]], near_m: float = 0.04) -> None:
-    """As a ROS program would: by odometry, turning on the spot at each corner."""
+    """Steer along the corners by odometry, as a ROS program would, turning at each corner."""
     for x_m, y_m in corners:
         for _ in range(600):
             way = bench.odometry[-1].pose.way_to(Pose(x_m, y_m, 0.0))

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random drives on networks of all kinds, in simulated time: does the robot stand in the end?
+"""Random drives on networks of all kinds, in simulated time: is the robot at rest at the end?
 
-``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60``: that many drives for each
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60`` makes 60 drives for each
 network; docs/boards/mart.md has the figures.
 """
 
@@ -32,7 +32,11 @@ FIRMWARES: tuple[Firmware, ...] = ("documented", "firmware", "source")
 
 
 class Outcome(NamedTuple):
-    """``stop_s``: the longest from a stop to standstill; ``ended``: as it should."""
+    """The result of one drive.
+
+    ``ended``: the robot stands still, and the server still answers; ``stop_s``: longest time from a
+    stop to standstill, in s; ``way_m``: driven distance in m.
+    """
 
     ended: bool
     stop_s: float
@@ -40,7 +44,7 @@ class Outcome(NamedTuple):
 
 
 def drive(faults: NetworkFaults, seed: int) -> Outcome:
-    """Motions, goals, e-stops and stalls of the driver, then its end."""
+    """Make random motions, goals, e-stops and stalls of the driver, then shut it down."""
     random = Random(seed)
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     longest_s = 0.0
@@ -71,7 +75,7 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
 
 
 def main() -> None:
-    """One row for each network."""
+    """Print one row for each network."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print("| Network | Robot stood, server answers | Longest stop | Mean way |\n|---|---|---|---|")
     for name, faults in NETWORKS.items():

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Any driver that keeps to the tables of ``states``, before a model of the MART server.
+"""A search model of any driver that obeys the tables of ``states``, and of a MART server.
 
-The driver says whatever the tables allow, in any order, so it does more than the real one ever
-does. Each datagram may arrive, be lost, be late, or come twice; the IMU may die at any step. All
-states that can be reached are searched, so there is no limit to the number of wishes. Time is
-abstract: a late copy is on its way until it arrives, or is lost, or the network delay has passed,
-and what waits for that delay can be said only when no such copy is left.
+The modelled driver sends whatever the tables allow, in any order, so it does more than the real
+driver ever does. Each datagram may arrive, be lost, be late, or come twice; the IMU may die at any
+step. All reachable states are searched, so the number of commands from the user is unlimited. Time
+is abstract: a late copy is on its way until it arrives, or is lost, or the network delay is over. A
+command that waits for that delay is allowed only when such copies have arrived or are lost.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,20 +28,20 @@ from omnibot_driver.core.mart.words import WORDS, Kind
 
 BY_TEXT: Final = {("CHECK" if word.kind is Kind.CHECK else word.text): word for word in WORDS}
 COPIED: Final = frozenset(SAID)
-"""Of these a copy may come late; one of any other changes nothing here."""
+"""Commands of which a copy may come late; copies of all others change nothing here."""
 MOVES: Final = ("TF", "MCR")
 MOST_COPIES: Final = 2
 UNANSWERED: Final = 3
-"""Stops without an answer, before the stop port is used as the last resort."""
+"""Number of unanswered stops after which the stop port is used as the last resort."""
 
 
 class Driver(NamedTuple):
-    """``proved``: the IMU was, just now. ``pending``: what is to be answered. ``unanswered``: the
-    number of stops.
+    """The modelled driver.
 
-    ``moved``: the last motion that was begun was a controlled move; ``counted``: the encoder was
-    answered since the robot stands, and since no harmful copy can come any more; ``greeted``: the
-    server has been stopped once.
+    ``proved``: the IMU was just proved alive. ``pending``: the command that awaits a reply.
+    ``unanswered``: number of stops without an answer. ``moved``: the last motion was a controlled
+    move. ``counted``: the encoder was read since the robot stands still, and since a harmful copy
+    can no longer come. ``greeted``: the server has been stopped once.
     """
 
     state: State = State.UNKNOWN
@@ -55,7 +55,10 @@ class Driver(NamedTuple):
 
 
 class World(NamedTuple):
-    """``copies``: commands on their way; ``replies``: those on theirs."""
+    """One state of server, driver and network.
+
+    ``copies``: late commands that are on their way; ``replies``: late replies that are on theirs.
+    """
 
     server: Server = Server()
     driver: Driver = Driver()
@@ -68,7 +71,7 @@ Step = tuple[str, World]
 
 
 def allowed(world: World, word: str, rules: Rules) -> bool:
-    """Whether the tables, and the rules about time, let the driver say it now."""
+    """Return whether the tables, and the rules about time, let the driver send ``word`` now."""
     driver = world.driver
     row = BY_TEXT[word]
     if not rules(driver.state, word, driver.motion):
@@ -88,17 +91,17 @@ def allowed(world: World, word: str, rules: Rules) -> bool:
             return driver.unanswered <= UNANSWERED
         return driver.unanswered >= UNANSWERED and halts.isdisjoint(world.copies)
     if driver.state is State.ASKING:
-        return {"SRM", "SM"}.isdisjoint(world.copies)  # it is said again 3 s later
+        return {"SRM", "SM"}.isdisjoint(world.copies)  # it is sent again 3 s later
     return True
 
 
 def table(state: State, word: str, motion: Motion) -> bool:
-    """The rules of the real driver."""
+    """Return whether the rules of the real driver allow ``word``."""
     return may_say(state, BY_TEXT[word], motion)
 
 
 def steps(world: World, rules: Rules = table) -> Iterator[Step]:
-    """All that may happen next."""
+    """Yield everything that may happen next, each with the world after it."""
     server, driver = world.server, world.driver
     if server.imu:
         yield "the IMU dies", world._replace(server=server._replace(imu=False))
@@ -127,8 +130,10 @@ def steps(world: World, rules: Rules = table) -> Iterator[Step]:
 
 
 def _ends(world: World) -> Iterator[Step]:
-    """A controlled move is over. It took longer than a copy of it can be late, so a copy has been
-    lost, or is in the queue, and begins at once.
+    """Yield the ways in which a controlled move ends.
+
+    It took longer than a copy of it can be late. So a copy of it has been lost, or is in the
+    server's queue and begins at once.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -142,7 +147,7 @@ def _ends(world: World) -> Iterator[Step]:
 
 
 def _waits(world: World) -> Iterator[Step]:
-    """What the driver does of itself: a wish to stop, patience that ends, a poll."""
+    """Yield what happens without a command: a stop is requested, a wait ends, a poll comes back."""
     server, driver = world.server, world.driver
     state = driver.state
     if state in (State.STARTING, State.DRIVING, State.REVERSING, State.TURNING, State.MOVING):
@@ -174,14 +179,17 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Whether the stop port was used for a motion that the driver has never known."""
+    """Return whether the stop port was used, but the driver never knew the motion."""
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
 
 
 def _asked(world: World) -> Step:
-    """The server tells its name, so no earlier datagram is on its way; then whether a motion is in
-    progress, and the encoder whether the robot moves. Replies that are lost change nothing.
+    """Return the step in which the driver, after the stop port, asks the server what moves.
+
+    The server returns its name, so earlier datagrams have arrived or are lost. Then the driver asks
+    whether a motion is in progress, and reads the encoder to see whether the robot moves. Lost
+    replies change nothing.
     """
     _, reply = execute(world.server, "CHECK")
     driver = Driver(State.STOPPING, Motion.UNKNOWN)
@@ -193,7 +201,7 @@ def _asked(world: World) -> Step:
 
 
 def _said(word: str, world: World) -> Iterator[Step]:
-    """Said, and the fates of the datagram."""
+    """Yield the possible fates of a datagram that the driver sends."""
     driver = world.driver
     row = BY_TEXT[word]
     if row in STARTS:
@@ -225,7 +233,7 @@ def _said(word: str, world: World) -> Iterator[Step]:
 
 
 def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
-    """The fates of a reply."""
+    """Yield the possible fates of a reply: lost, late or received."""
     if reply is None:
         yield what, world
         return
@@ -236,7 +244,10 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 
 
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
-    """What the driver makes of it. A check and a move take longer than any reply is late."""
+    """Yield what the driver concludes from a reply that it receives.
+
+    A check and a move take longer than any reply can be late.
+    """
     driver = world.driver
     state = driver.state
     if state is State.CHECKING and not late:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every world of ``mart_model`` that can be reached, and what must not be in any.
+"""The search of all reachable worlds of ``mart_model`` for a state that must not occur.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``, with 3 copies on
-their way; docs/boards/mart.md has the figures.
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3`` searches with up to 3
+copies on their way; docs/boards/mart.md has the figures.
 """
 
 import sys
@@ -18,7 +18,10 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 
 
 def trouble(world: World) -> str:
-    """What must never be, with a living IMU and a driver that has not given up."""
+    """Return what must never be; empty if nothing is wrong.
+
+    A dead IMU, or a driver that has given up, excuses all but a crash of the server.
+    """
     server, driver = world.server, world.driver
     if server.crashed:
         return "the server has crashed"
@@ -38,7 +41,7 @@ def trouble(world: World) -> str:
 
 
 def _can_stop(world: World) -> bool:
-    """Whether what the driver says of itself, when it is delivered, leaves the robot standing."""
+    """Return whether the stops that the driver would send, if they arrive, stop the robot."""
     server, driver = world.server, world.driver
     if driver.state is State.STILL:
         motion = Motion.UNKNOWN
@@ -53,15 +56,17 @@ def _can_stop(world: World) -> bool:
             words = LAST_HALTS[driver.motion]
     for word in words:
         server, _ = execute(server, word.text)
-    if server.moving and server.port == "free":  # the belief was wrong: a poll finds out, and
+    if server.moving and server.port == "free":  # a poll shows that the belief was wrong, and
         for word in HALTS[Motion.UNKNOWN]:
             server, _ = execute(server, word.text)
     return not server.moving and server.port != "hung"
 
 
 class Found(NamedTuple):
-    """``worlds``: how many can be reached; ``steps``: between them; ``bad``: the way to the first
-    that must not be, step by step.
+    """The result of a search.
+
+    ``worlds``: number of reachable worlds; ``steps``: number of steps between them; ``bad``: the
+    steps to the first world that must not occur, and the reason; empty if none was found.
     """
 
     worlds: int
@@ -74,11 +79,11 @@ FOUND_MOVING: Final = (
     *(Server(motion, True) for motion in (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)),
     *(Server(motion, True, "busy") for motion in (Motion.STRAIGHT, Motion.TURN)),
 )
-"""A driver that is started again may find any of these."""
+"""The states in which a restarted driver may find the server."""
 
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
-    """Everything that can happen, breadth first; ends at the first trouble."""
+    """Search everything that can happen, breadth first, up to the first trouble."""
     row = [World(server) for server in FOUND_MOVING]
     came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
     count = 0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A small model of the MART server: what each word does in each state of motion.
+"""A small model of the MART server: the effect of each command in each state of motion.
 
 ``test_mart_search`` replays each transition on the simulated firmware.
 """
@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from omnibot_driver.core.mart.states import Motion
 
 START_WORDS: Final = ("RM", "B", "R", "L", "TF", "MCR")
-"""TB is like TF, and MCL like MCR, in all that is modelled."""
+"""Commands that start a motion. In this model TB behaves as TF, and MCL as MCR."""
 SAID: Final = (*START_WORDS, "CHECK", "SRM", "SM", "SL", "SS")
 KIND: Final = {
     "RM": Motion.REFERENCE,
@@ -23,8 +23,11 @@ KIND: Final = {
 
 
 class Server(NamedTuple):
-    """``port``: free, busy (a move runs), waits (for the IMU), hung. ``released``: the stop port
-    has stopped an uncontrolled motion, which the server still believes in.
+    """The state of the server.
+
+    ``port``: the command port is free, busy (a controlled move runs), waits (for a dead IMU) or
+    hung. ``released``: the stop port has stopped an uncontrolled motion, but the server still
+    regards that motion as in progress.
     """
 
     motion: Motion = Motion.NONE
@@ -39,13 +42,13 @@ Reply = str | None
 
 
 def execute(server: Server, word: str) -> tuple[Server, Reply]:
-    """One datagram arrives, on either port; what the server then is, and answers."""
+    """Let one datagram arrive, on its port; return the new state of the server and its reply."""
     if server.crashed:
         return server, None
     if word in ("SL", "SS"):
         return _stop_port(server, word)
     if server.port != "free":
-        return server, None  # it waits in the queue, and is another late copy in effect
+        return server, None  # it waits in the queue, which has the effect of a late copy
     motion = server.motion
     if word == "CHECK":
         if motion is not Motion.NONE:
@@ -98,7 +101,7 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 
 
 def servers() -> dict[Server, tuple[str, ...]]:
-    """Every state of a server to which all datagrams are delivered, and the way there."""
+    """Return all states of a server that receives every datagram, and the steps to each."""
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}
     while row:

@@ -1,12 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A bounded search that drives the real pilot and conversation against the simulated firmware.
+"""A bounded search that runs the real pilot and conversation against the simulated firmware.
 
-``mart_model`` searches without a bound, but with a driver of its own. Here what runs is what is
-searched: every pair of wishes, and rows of eight in which each wish follows each, with one datagram
-of either way lost, late or doubled, or the IMU dead from it on, whichever it is; and every driver
-that begins, whatever the robot does then, with a network that is away for any time.
-``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` does all of it.
+``mart_model`` searches without a bound, but models the driver. Here the real driver runs. There are
+three sets of trials. ``pairs``: every pair of wishes (what a user may want, such as "forward").
+``eights``: rows of eight wishes in which each wish follows each other one. In both sets, one
+datagram of either direction is lost, late or duplicated, or the IMU is dead from that datagram on;
+each datagram has its turn. ``beginnings``: a driver starts while the robot may already be in a
+motion, and the network is away for various times.
+
+``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all of them.
 """
 
 import copy
@@ -28,7 +31,7 @@ from omnibot_driver.core.packets import Packet
 Fate = Literal["lost", "late", "twice", "the IMU dies"]
 FATES: Final[tuple[Fate, ...]] = ("lost", "late", "twice", "the IMU dies")
 LATE_S: Final = 0.29
-"""The network delay that the driver assumes, less a tick."""
+"""Delay of a late datagram in s: the delay that the driver assumes, less a tick."""
 WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "forward": lambda bench: bench.command(0.3, 0.1, 0.7),
     "backward": lambda bench: bench.command(-0.2, 0.1, 0.8),
@@ -39,23 +42,30 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""Each way, for each wish, without the polls; what follows is an e-stop that is repeated."""
+"""Most datagrams per wish in each direction that meet a fate, without polls.
+
+Those that follow belong to an e-stop, which is repeated.
+"""
 PROOF_S: Final = 0.25
-"""A motion that begins later than this after the death of the IMU was not proved."""
+"""Time in s after the death of the IMU from which a motion that begins was not proved."""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
-"""What starts the motors without a look at the IMU."""
+"""Commands that start the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
-"""What a driver may meet that begins."""
+"""Commands that the server may be obeying when a driver starts."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Times after which the network comes back."""
+"""Times in s after which the network comes back."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times after which it is away again, for a second."""
+"""Times in s after which the network is away again, for 1 s."""
 ENDS_S, SETTLED_S = 16.0, 1.5
 
 
 class Trial(NamedTuple):
-    """``met``, ``away_s``, ``back_s``, ``ways`` of a driver that begins; else the ``wishes``, and
-    which datagram of which way meets which fate. The polls are not counted.
+    """One run of the search.
+
+    Either ``wishes``, and the datagram that meets a ``fate``: number ``number`` (from 0, without
+    polls) in the direction ``way`` (0: to the server, 1: from it). Or a driver that starts: ``met``
+    is the command that the server obeys at that time; the network is away until ``away_s``, and
+    again for 1 s after a further ``back_s``, in the directions ``ways``.
     """
 
     wishes: tuple[str, ...] = ()
@@ -69,7 +79,7 @@ class Trial(NamedTuple):
 
 
 class Carrier:
-    """In place of the robot's network: what it does to each datagram is known before."""
+    """A network, in place of the robot's, that does to each datagram what the trial prescribes."""
 
     def __init__(self, bench: MartBench, trial: Trial) -> None:
         self.bench, self.robot, self.trial = bench, bench.robot, trial
@@ -137,20 +147,20 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Every pair of wishes, with each fate of each datagram."""
+    """Yield every pair of wishes, with each fate of each datagram."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 
 
 def eights() -> Iterator[Trial]:
-    """Rows of eight, one for each step from wish to wish, with each fate of each datagram."""
+    """Yield rows of eight wishes, one for each step from wish to wish, with each fate."""
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """None, and each of each datagram."""
+    """Yield a trial for each fate of each datagram that a run without faults carries."""
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
         for n, fate in product(range(most), FATES):
@@ -158,7 +168,7 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
 
 
 def beginnings() -> Iterator[Trial]:
-    """Every driver that begins while the network is away."""
+    """Yield a trial for each motion that a starting driver meets, and each network outage."""
     for met, away_s, back_s in product(MET, AWAY_S, BACK_S):
         for ways in ((0, 1), (0,), (1,)):
             yield Trial(met=met, away_s=away_s, back_s=back_s, ways=ways)
@@ -170,7 +180,7 @@ def _ready() -> MartBench:
 
 
 def ran(trial: Trial) -> Carrier:
-    """To its end."""
+    """Run the trial to its end."""
     bench = copy.deepcopy(_ready()) if trial.wishes else MartBench("firmware", seed=3)
     carrier = bench.robot = Carrier(bench, trial)
     if trial.wishes:
@@ -180,7 +190,7 @@ def ran(trial: Trial) -> Carrier:
         bench.run(0.5)
         carrier.counting = False
         bench.run(1.5)
-        bench.estop(True)  # a goal goes on without anybody
+        bench.estop(True)  # a goal continues without further commands
         bench.run(3.0)
         return carrier
     if trial.met:
@@ -198,7 +208,7 @@ def ran(trial: Trial) -> Carrier:
 
 
 def trouble(trial: Trial) -> str:
-    """What must not be; empty where it is not."""
+    """Return what went wrong in the trial; empty if nothing did."""
     carrier = ran(trial)
     bench, server = carrier.bench, carrier.bench.server
     lost = any(notice.startswith("lost") for notice in bench.notices)
@@ -222,14 +232,14 @@ SETS: Final[dict[str, Callable[[], Iterator[Trial]]]] = {
 
 
 def search(trials: list[Trial]) -> list[tuple[Trial, str]]:
-    """Those that end badly."""
+    """Return the trials that end badly, each with the reason."""
     with Pool(os.cpu_count()) as pool:
         found = pool.map(trouble, trials, chunksize=8)
     return [(trial, why) for trial, why in zip(trials, found, strict=True) if why]
 
 
 def main() -> None:
-    """All, or those named: ``pairs``, ``eights``, ``beginnings``."""
+    """Run all sets of trials, or those named: ``pairs``, ``eights``, ``beginnings``."""
     for name in sys.argv[1:] or SETS:
         began_s = time.monotonic()
         trials = list(SETS[name]())

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Replies, and which request each belongs to. Texts as the running server was seen to send them."""
+"""Tests of replies, and of which request each belongs to.
+
+The reply texts are those that the running server was seen to send.
+"""
 
 import math
 
@@ -35,18 +38,18 @@ GOLDEN = {
 
 @pytest.mark.parametrize("data", GOLDEN)
 def test_a_reply_is_read(data: bytes) -> None:
-    """Each form, by its text."""
+    """Each text is parsed to the form of reply that it has."""
     assert parse(data) == GOLDEN[data]
 
 
 @given(st.binary(max_size=600))
 def test_no_datagram_raises(data: bytes) -> None:
-    """Whatever comes is a reply, or something else; an empty one is nothing."""
+    """Any bytes give one message; an empty datagram gives none."""
     assert len(MartDecoder().feed(data, 0.0)) == bool(data)
 
 
 def test_a_request_fits_the_servers_buffer() -> None:
-    """One to 49 bytes of ASCII; an empty datagram would end the server."""
+    """A request has 1 to 49 bytes of ASCII; an empty datagram would shut the server down."""
     assert words.RMCS.request(5, -5).data == b"RMCS 5 -5"
     assert words.CHECK.request(0).data == b"MCR SLOW 0"
     assert words.TF.request("SLOW", 24).data == b"TF SLOW 24"
@@ -59,7 +62,7 @@ def conversation() -> Conversation:
 
 
 def test_a_reply_answers_the_pending_request() -> None:
-    """It also gives the time that it took."""
+    """The answer contains the command and the time from request to reply."""
     talk = conversation()
     assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
     answer = talk.hear(parse(b"ok 123"), 1.01)
@@ -82,7 +85,7 @@ def test_a_reply_answers_the_pending_request() -> None:
     ],
 )
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
-    """It has another form, or a reason that this command never has."""
+    """A late reply is recognised by another form, or a failure that this command never returns."""
     talk = conversation()
     talk.ask(word.request(), 1.0)
     assert talk.hear(parse(late), 1.4) is None
@@ -91,7 +94,7 @@ def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, la
 
 
 def test_no_late_ok_proves_the_imu() -> None:
-    """The check takes half a second; a reply to what came before is later by 0.3 s at most."""
+    """The check takes at least 0.32 s, but a reply to an earlier command is at most 0.3 s late."""
     talk = conversation()
     talk.ask(words.CHECK.request(0), 1.0)
     assert talk.hear(parse(b"ok"), 1.3) is None
@@ -100,7 +103,10 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """A copy of the last ``ok``, or the one that was given up, is 0.3 s late at most."""
+    """RST IMU answers too soon to distinguish its reply from a late one by time.
+
+    A copy of the last ``ok``, or the reply that was given up, is at most 0.3 s late.
+    """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
     assert talk.hear(parse(b"ok"), 1.1) is not None
@@ -114,7 +120,7 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """The query that the robot is driven by is sent at once, and marked."""
+    """A query that driving needs, as ENC, is sent at once, but its answer is marked doubtful."""
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
     assert talk.overdue(1.1) is None
@@ -132,7 +138,7 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 
 
 def test_every_motion_is_stopped_by_its_own_word() -> None:
-    """As seen on the running server; the stop port is for controlled moves."""
+    """The running server obeys these alone; the stop port (SL, SS) is for controlled moves."""
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
         Motion.NONE: [],
@@ -153,7 +159,7 @@ def stopping(motion: Motion, *, started_s: float = 0.0, owed: int = 0) -> Stoppi
 
 
 def test_a_stop_is_repeated_until_it_is_answered() -> None:
-    """A second one fails with no motion, which tells as much."""
+    """The repeated stop fails with "no motion", which proves the stop as well as an ok."""
     stop = stopping(Motion.REFERENCE)
     assert stop.due(10.0) == (words.SRM,)
     assert stop.due(10.1) == ()
@@ -162,7 +168,10 @@ def test_a_stop_is_repeated_until_it_is_answered() -> None:
 
 
 def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
-    """The start was sent 0.1 s before: one of the replies must be to a later stop."""
+    """The start was sent 0.1 s before the stop, so it may still arrive later.
+
+    Only a reply to a later stop proves that the robot is stopped.
+    """
     stop = stopping(Motion.REFERENCE, started_s=9.9)
     assert stop.due(10.0) == (words.SRM,)
     assert not stop.hear(parse(b"fail no motion in progress"), 10.1)
@@ -171,7 +180,7 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """Both are a bare ok, which may come twice; the second stop is answered otherwise."""
+    """Both are a bare ok, which may come twice; the second stop brings an unambiguous reply."""
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
     assert not stop.hear(parse(b"ok"), 10.05)
@@ -180,7 +189,10 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """It answers a stop that the start has overtaken; no copy of it is later than 0.6 s."""
+    """Both may answer the first stop, which the start may have overtaken.
+
+    Such a copy comes at most 0.6 s after that stop was sent.
+    """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
     assert stop.due(10.3) == (words.SM,)
@@ -190,7 +202,7 @@ def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
 
 
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
-    """After three stops without an answer, and all the time that they may take."""
+    """It is used after three stops without an answer, and the longest time that they may take."""
     stop = stopping(Motion.REVERSE)
     said = [word for tick in range(60) for word in stop.due(10.0 + 0.1 * tick)]
     before = said.index(words.SL)
@@ -201,7 +213,7 @@ def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
 
 
 def test_a_count_below_zero_may_come_without_its_sign() -> None:
-    """A server of 64 bits writes the 32 of the count."""
+    """A 64-bit server prints the 32 bits of a negative count as an unsigned number."""
     assert [signed(n) for n in (0, 5, -5, 4294967295, 4294966872)] == [0, 5, -5, -1, -424]
 
 
@@ -210,7 +222,7 @@ def at(at_s: float, spread_s: float = 0.01) -> Moment:
 
 
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
-    """The way goes on from the count before."""
+    """The distance is continued from the plausible count before it."""
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
@@ -219,7 +231,7 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 
 
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
-    """A late reply, and the count of a server to which the start did not come."""
+    """Such a count is a late reply, or that of a server that did not receive the start."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -236,7 +248,7 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 
 @pytest.mark.parametrize("stale", [300, 0, -1])
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
-    """On a network of which it is known that it delays and doubles."""
+    """The network is known to delay and duplicate, so a smaller count is an old one."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -246,7 +258,7 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """A late count was taken for the angle."""
+    """A reported turn of 3° does not fit the wheel, as a late count was taken for the angle."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)
@@ -258,7 +270,7 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """RM sets it to zero, and was late."""
+    """RM sets the heading to zero, so an unchanged heading is a late reply from before RM."""
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -271,7 +283,7 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """An IMU that does not answer on its bus takes no time."""
+    """A missing IMU, or an unknown command, is reported sooner than a check can succeed."""
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)
     assert talk.hear(parse(f"fail {reason}".encode()), 1.001) is not None

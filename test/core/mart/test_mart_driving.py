@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver's half against the simulated controller: what is commanded is driven."""
+"""The driver against the simulated controller: the robot moves as commanded."""
 
 import math
 import re
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     volts: float, unequal: float, firmware: Firmware
 ) -> None:
-    """By its mean over the next two."""
+    """The means over the two seconds after that are compared with the command."""
     bench = MartBench(firmware, volts=volts, motor_inequality=unequal).ready()
     for vx, yaw_rate in STEPS:
         if firmware == "documented" and not vx:
@@ -45,7 +45,10 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
 
 @pytest.mark.parametrize(("left", "firmware"), [(True, "source"), (False, "firmware")])
 def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmware) -> None:
-    """In both directions, within 5 % of its side; odometry knows where to 6 cm of 8 m."""
+    """The robot returns to within 5 % of the side, to the left as to the right.
+
+    The odometry is off by less than 6 cm after 8 m.
+    """
     bench = MartBench(firmware, motor_inequality=0.05).ready()
     side = 2.0 if left else -2.0
     steer_along(bench, [(2.0, 0.0), (2.0, side), (0.0, side), (0.0, 0.0)])
@@ -57,7 +60,10 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_quiet_gyro_on_a_straight_way_is_no_dead_imu(firmware: Firmware) -> None:
-    """Nothing turns the robot but the driver, which does so to see it."""
+    """A heading that does not change for long is a sign of a dead IMU.
+
+    On a straight way without gyro noise it changes only because the driver steers a little.
+    """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
     assert bench.notices == []
@@ -66,7 +72,7 @@ def test_a_quiet_gyro_on_a_straight_way_is_no_dead_imu(firmware: Firmware) -> No
 
 
 def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
-    """Each after a check of the IMU, and with as few exchanges as that takes."""
+    """Each has one IMU check, one start and one stop; a turn on the spot also needs SSP."""
     bench = MartBench().ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.17, 0.0), (0.0, 0.5), (0.3, 0.0)):
         bench.command(vx, yaw_rate, 2.0)
@@ -85,7 +91,7 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """By what the server has received, on a slow network too."""
+    """The age is taken from what the server received, on a slow network that loses datagrams."""
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:
         bench.command(vx, yaw_rate, 3.0)
@@ -104,7 +110,10 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """The relative heading is that of the motion before, then: it was not set to zero."""
+    """The lost RM did not set the relative heading to zero.
+
+    So the heading still belongs to the motion before, and must not turn the odometry.
+    """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
     bench.run(2.0)
@@ -125,7 +134,7 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 
 
 def test_a_goal_and_a_job_show_how_far_they_are() -> None:
-    """In /diagnostics."""
+    """The progress is shown in /diagnostics, under "Goal" and "Job"."""
     bench = MartBench().ready()
     shown = set()
     bench.go_to(0.6, 0.4, 0.0)
@@ -147,7 +156,7 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
-    """Within 10 cm and 5 degrees; the newest authority wins."""
+    """A goal is reached within 10 cm and 6 degrees; a twist command then replaces the next goal."""
     bench = MartBench(firmware).ready()
     for x_m, y_m, yaw_rad in ((0.8, 0.4, 1.0), (0.0, 0.0, 0.0)):
         bench.go_to(x_m, y_m, yaw_rad)
@@ -163,7 +172,7 @@ def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
 
 
 def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> None:
-    """Until the encoder is answered again."""
+    """The server is silent during a controlled move, so the encoder is unknown until its end."""
     bench = MartBench().ready()
     bench.go_to(1.5, 0.0, 0.0)
     bench.run_until(lambda: bench.server.chassis.x_m > 0.6, 15.0)
@@ -175,7 +184,7 @@ def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> Non
 
 
 def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() -> None:
-    """The rest at a slower pace."""
+    """A sonar query takes 55 ms, which driving cannot spare; infinity means nothing is near."""
     bench = MartBench(front_m=3.0).ready()
     seen = len(bench.odometry)
     bench.run(2.0)
@@ -194,7 +203,7 @@ def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() ->
 
 
 def test_inverted_encoder_and_gyro_are_parameters() -> None:
-    """Forward counts down."""
+    """With a negative ``metres_per_count``, an encoder that counts down drives forward."""
     settings = MartSettings(metres_per_count=-0.0004)
     bench = MartBench("source", settings=settings, encoder_sign=-1).ready()
     bench.command(0.3, 0.2, 3.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A dead IMU, an obstacle, a motor that is stuck, a server that fails: no motion goes on."""
+"""Tests of failures: with a dead IMU, an obstacle or a stuck motor, each motion is stopped."""
 
 import pytest
 from mart_bench import MartBench
@@ -16,7 +16,11 @@ pytestmark = pytest.mark.slow
 def test_a_dead_imu_refuses_motion_until_it_is_back(
     firmware: Firmware, wish: tuple[float, float] | str
 ) -> None:
-    """Nothing is sent that would start the motors; a server with RST IMU is asked again."""
+    """Commands that would start the motors are not sent.
+
+    A server with RST IMU is checked again by itself; one without it stays refused, as its check may
+    move the robot.
+    """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
     if isinstance(wish, str):
@@ -35,7 +39,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 
 
 def test_one_failed_reset_of_the_imu_is_no_dead_imu() -> None:
-    """It leaves the IMU closed, so it is said again; the third one would count."""
+    """A failed RST IMU leaves the IMU closed, so it is repeated; the third failure is believed."""
     bench = MartBench("source").ready()
     bench.server.imu.alive = False
     bench.try_command(0.3, 0.0)
@@ -48,7 +52,7 @@ def test_one_failed_reset_of_the_imu_is_no_dead_imu() -> None:
 
 
 def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
-    """The server's count goes on from a stop of 0.56 s to 0.6 s."""
+    """After a stop of 0.56 s to 0.6 s the server's sample count makes the next RM fail at once."""
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
     bench.command(0.3, 0.0, 4.0)
@@ -58,7 +62,7 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server gives the reason of the last B; the front sonar sees nothing."""
+    """The server gives the reason of the last B; the front sonar does not see an obstacle."""
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -69,7 +73,7 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 
 
 def test_a_dead_imu_is_told_when_a_command_comes() -> None:
-    """No word is sent that starts."""
+    """The command is refused with the reason, and RM is never sent."""
     bench = MartBench().ready()
     bench.server.imu.alive = False
     bench.command(0.3, 0.0, 3.0)
@@ -91,8 +95,9 @@ def test_a_dead_imu_is_told_when_a_command_comes() -> None:
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The heading is frozen: half a second, and the time of a stop. By the source it moves in RM
-    alone, so nothing tells of it elsewhere.
+    """The frozen heading shows it: half a second, plus the time of a stop.
+
+    In the public source the heading changes during RM only, so other motions cannot show it there.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -112,7 +117,7 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 
 
 def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
-    """The controller stops by itself, and says nothing until it is asked."""
+    """The controller stops by itself without a report; backward motion remains possible."""
     bench = MartBench(front_m=1.4).ready()
     bench.command(0.3, 0.0, 6.0)
     assert bench.robot.stands
@@ -124,7 +129,7 @@ def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
 
 @pytest.mark.parametrize("bits", [4, 8, 16, 32])
 def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
-    """Until the motor board is well again."""
+    """Motion is refused until the motor board no longer reports the fault."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.server.chassis.motor_status = bits
@@ -137,7 +142,7 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 
 @pytest.mark.parametrize("stuck", ["left", "right", "both"])
 def test_a_stuck_motor_is_no_motion_that_goes_on(stuck: str) -> None:
-    """Whichever it is; RM may hang by it, and then the server is lost."""
+    """Both motors are off in the end; RM may hang because of it, and then the server is lost."""
     bench = MartBench(stuck=stuck).ready()
     bench.command(0.3, 0.0, 8.0)
     bench.run(3.0)
@@ -146,7 +151,7 @@ def test_a_stuck_motor_is_no_motion_that_goes_on(stuck: str) -> None:
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """SRM finds no motion there; a controlled turn takes the motors over, and ends."""
+    """SRM finds no motion to stop, so a controlled turn takes over the motors, and ends."""
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)
     assert bench.robot.stands
@@ -160,7 +165,7 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,
 ) -> None:
-    """It has forgotten the one that SSP has set, and L without a speed never starts."""
+    """The restart erased the speed set by SSP, and L without a speed never starts."""
     bench = MartBench(firmware).ready()
     for _ in range(3):
         bench.command(0.0, 0.5, 3.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is asked of the controller besides motion: bias, dock, log, files, clock."""
+"""Requests to the controller besides motion: gyro bias, dock, log, files, clock."""
 
 import pytest
 from mart_bench import MartBench
@@ -11,14 +11,14 @@ from omnibot_driver.simulator.mart import Firmware
 
 
 def test_the_gyro_is_calibrated_at_rest() -> None:
-    """SB, and its reply."""
+    """The job sends SB, and succeeds with its reply."""
     done = MartBench().ready().job(Job.BIAS)
     assert (done.token, done.success) == ("token", True)
 
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
-    """SB would never answer, and nothing else would either."""
+    """With a dead IMU the server would never answer SB, nor any later command."""
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
     done = bench.job(Job.BIAS)
@@ -29,7 +29,7 @@ def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
 
 
 def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
-    """TF DOCK; a command meanwhile cancels it."""
+    """The job sends TF DOCK; an e-stop meanwhile cancels it."""
     bench = MartBench(dock_m=0.3).ready()
     assert bench.job(Job.DOCK, "DOCK", 20).success
     bench.run(2.0)
@@ -45,7 +45,7 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
 
 
 def test_the_last_move_and_turn_are_downloaded_whole() -> None:
-    """In pieces of 512 bytes of Latin-1."""
+    """A file comes in pieces of 512 bytes, in Latin-1."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.command(0.0, 0.5, 2.0)
@@ -57,7 +57,7 @@ def test_the_last_move_and_turn_are_downloaded_whole() -> None:
 
 
 def test_nothing_to_download_is_told() -> None:
-    """As the controller words it."""
+    """The job fails with the controller's own reason."""
     done = MartBench().ready().job(Job.LAST_MOVE)
     assert not done.success
     assert "no file available" in done.message
@@ -65,7 +65,7 @@ def test_nothing_to_download_is_told() -> None:
 
 @pytest.mark.parametrize("spoil", ["lose", "double"])
 def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None:
-    """It is noticed, and nothing is saved."""
+    """The job reports the damage and returns a failure instead of a damaged file."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -87,7 +87,10 @@ def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None
 
 
 def test_only_a_log_that_was_started_ends_the_server() -> None:
-    """EXIT is said by nothing else; the answer says that the controller must be started again."""
+    """Only the download of a log sends EXIT, which ends the server.
+
+    The result says that the controller must be started again.
+    """
     bench = MartBench().ready()
     with pytest.raises(RequestRefused, match="start_log"):
         bench.board.ask(Job.LOG_FILE, "token", bench.now)
@@ -102,7 +105,7 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 
 
 def test_the_clock_is_set_while_the_robot_stands() -> None:
-    """Six numbers, in UTC."""
+    """TIME gets six numbers, in UTC; it is not sent while the robot is driven."""
     bench = MartBench().ready()
     assert bench.job(Job.TIME, 11, 22, 2026, 20, 15, 30).success
     assert b"TIME 11 22 2026 20 15 30" in bench.said()
@@ -114,7 +117,7 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 
 
 def test_another_server_is_refused_by_its_name() -> None:
-    """It answers HELLO, but not as this controller does."""
+    """It answers HELLO with a name that is not this controller's."""
     bench = MartBench()
     bench.open()
     bench.run(0.5)
@@ -126,7 +129,7 @@ def test_another_server_is_refused_by_its_name() -> None:
 
 
 def test_nobody_answers() -> None:
-    """One sentence, and no motion."""
+    """The silence is reported once, and motion is refused."""
     bench = MartBench()
     bench.speaks = False
     bench.open()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What odometry makes of replies that are lost, late, doubled or another query's."""
+"""Odometry from replies that are lost, late, duplicated or the answer to another query."""
 
 import pytest
 from honesty import nees
@@ -18,7 +18,7 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packet
 
 WRONG_NEES = 28.0
-"""1 in 270,000 squares of three honest normal errors is beyond it."""
+"""The value that 1 in 270,000 squares of three honest normal errors exceeds."""
 
 
 def at(at_s: float, *, doubtful: bool = False) -> Moment:
@@ -31,8 +31,9 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     twist: tuple[float, float], quiet_s: float
 ) -> None:
-    """Two motions alike, so the count after the second is that after the first: not one of a
-    robot whose start was lost.
+    """Two equal motions end with equal counts, and all replies to the second were lost.
+
+    The equal count must not be taken for that of a robot whose start was lost.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     for _ in range(2):
@@ -54,8 +55,10 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
 
 
 def test_a_copy_of_an_ok_is_no_turn_where_the_start_was_lost() -> None:
-    """The ok of RST IMU comes twice, and L and all queries behind it are lost: the count is still
-    that of the motion before, and no turn.
+    """The ok of RST IMU comes twice; L and all queries after it are lost.
+
+    The copy seems to acknowledge L, but the count is still that of the motion before: the robot did
+    not turn.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
@@ -84,7 +87,10 @@ def test_a_copy_of_an_ok_is_no_turn_where_the_start_was_lost() -> None:
 
 
 def reversed_by_1000() -> MartOdometry:
-    """Moved once, and begun again; the encoder still reports the first motion."""
+    """Return odometry that has reversed by 1000 counts and begun another motion.
+
+    The encoder still reports the first motion.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REVERSE, 1.0)
@@ -98,7 +104,7 @@ def reversed_by_1000() -> MartOdometry:
 
 
 def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
-    """Its stop was answered by no motion."""
+    """The stop was answered by "no motion", so the unchanged count is certain."""
     odometry = reversed_by_1000()
     before = odometry.doubt.total([]).xx
     odometry.wheel.refused()
@@ -110,7 +116,10 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """Before its end is counted for certain, and from then on."""
+    """The unchanged count may also be that of an equal second motion.
+
+    The covariance covers it before the end is counted for certain, and from then on.
+    """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
     odometry.counted(-1000, at(8.5, doubtful=True))
@@ -121,7 +130,7 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 
 
 def test_a_count_that_stays_while_the_robot_is_driven_is_no_motion() -> None:
-    """The reply to the start was a copy of another ok."""
+    """The acknowledgement of the start was a copy of another ok."""
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
     for at_s in (5.2, 5.3, 5.4):
@@ -134,7 +143,10 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_no_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """What the replies to stops at 10 s and 10.3 s tell of a start at 8 s."""
+    """Return whether a motion had begun, by the replies to its stops; None if unknown.
+
+    The start was sent at 8 s, the stops at 10 s and 10.3 s.
+    """
     stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
     stop.due(10.0)
     for at_s, data in replies:
@@ -145,7 +157,10 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 
 
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """Unless it may be that to a second stop, and the reply to the first was lost."""
+    """It remains unknown if the reply may be that to the second stop.
+
+    The reply to the first stop may then have been lost.
+    """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
     assert stopped((10.2, b"fail insufficent clearence")) is True
@@ -160,7 +175,7 @@ def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: flo
 
 
 def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
-    """A count came twice: its copy is not the range, and the range is not the next count."""
+    """A copy of the count is not taken for the range, and the range is not marked doubtful."""
     talk = Conversation(0.3)
     asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
     asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
@@ -172,7 +187,7 @@ def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
 
 
 def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
-    """A robot that has not moved yet, and a motor board without a fault."""
+    """A robot that has not moved yet, and a motor board without a fault, both report 0."""
     talk = Conversation(0.3)
     for n in range(3):
         asked(talk, words.MCSTAT, b"ok 0", 1.0 + 0.1 * n, 0.01)
@@ -180,7 +195,7 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """RMCS reports what RMRA has reported."""
+    """RMCS returns the same angle that RMRA has just returned, so it is not a copy."""
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)
     asked(talk, words.RMRA, b"ok 2.00", 1.0, 0.01)
@@ -188,7 +203,7 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """That one may still come."""
+    """The missing reply may still come, so a query of its form still waits."""
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
     talk.ask(words.SFC.request(), 1.1)
@@ -200,7 +215,7 @@ def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
 
 
 def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
-    """Both report -1 where nothing is near: a copy could not be recognised."""
+    """Both report -1 if nothing is near, so a copy could not be recognised by its value."""
     polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
     for tick in range(1000):
         now = tick * 0.01
@@ -213,7 +228,7 @@ def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -
 
 
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
-    """It may be the reply of a sonar; what comes three times is so."""
+    """It may be the reply of a sonar; the third doubtful count in a row is believed."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(1167, at(1.0))
     assert odometry.counted(152, at(1.1, doubtful=True)) is None
@@ -225,7 +240,7 @@ def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """A change that came twice is in the gain that was learned, and not in the motor."""
+    """A change that came twice is learned as a gain, although the motors do not differ so far."""
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)
     for tick in range(100):
@@ -235,7 +250,7 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 
 
 def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
-    """Its motors take 50 ms, and no speed was counted yet."""
+    """Before the first measured speed, the covariance includes the speed the robot may have."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)
@@ -249,7 +264,10 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """In B the heading may be unknown."""
+    """A change that arrives twice acts twice, and the heading can show that.
+
+    In B the heading may be unknown, so there a change is at most 5 units instead of 15.
+    """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05
     loop.begin(20, reverse, 0.0)

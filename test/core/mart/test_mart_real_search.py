@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A sample of the bounded search that drives the real pilot; ``real_search`` has all of it."""
+"""A sample of the bounded search that runs the real pilot; ``real_search`` runs all of it."""
 
 from collections.abc import Callable
 from random import Random
@@ -22,20 +22,20 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(12))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """Any of them, in any pair of wishes."""
+    """The datagram may be any one of any pair of wishes."""
     trial = Random(seed).choice(list(real_search.pairs()))
     assert trouble(trial) == ""
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> None:
-    """Whatever the robot does then, and whenever the network comes back."""
+    """The robot may be in any motion then, and the network may come back at any time."""
     trial = Random(seed).choice(list(real_search.beginnings()))
     assert trouble(trial) == ""
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """SL ends RM then; SRM behind it would hang the server, and is not said."""
+    """SL then ends RM; SRM after it would hang the server, and is not sent."""
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
 
@@ -44,7 +44,7 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Behind the stop port, without asking first what moves."""
+    """Patch the pilot to send SRM and SM after the stop port, without asking what moves."""
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 
 
@@ -59,7 +59,7 @@ def says_sl_before_sm(patch: Patch) -> None:
 
 
 def turns_within_rm(patch: Patch) -> None:
-    """L, where SRM belongs in between."""
+    """Patch the pilot to send L during RM, without SRM in between."""
     agrees, act = Pilot._agrees, Pilot._act
 
     def spins(pilot: Pilot, now: float) -> bool:
@@ -77,7 +77,7 @@ def turns_within_rm(patch: Patch) -> None:
 
 
 def starts_without_proof(patch: Patch) -> None:
-    """As if the IMU had been proved just now."""
+    """Patch the proof of the IMU to be always fresh."""
     patch(ImuProof, "fresh", lambda imu, now: True)
 
 
@@ -98,7 +98,7 @@ TRAPS = {
 def test_a_trap_that_is_planted_in_the_pilot_is_found(
     trap: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without it the same trial ends well."""
+    """It shows that the search finds such defects: without the trap the same trial ends well."""
     plant, trial, found = TRAPS[trap]
     assert trouble(trial) == ""
     plant(monkeypatch.setattr)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""No sequence of wishes, losses, copies and delays leads to a server that hangs or is orphaned."""
+"""No sequence of wishes, losses, copies and delays hangs the server or leaves it moving."""
 
 from collections.abc import Callable
 from typing import Final
@@ -17,7 +17,7 @@ from omnibot_driver.simulator.mart import FIRMWARE, Kind, MartServer, MartSettin
 pytestmark = pytest.mark.slow
 
 SETTLES_S: Final = 0.9
-"""Longer than any answer but those of controlled moves, which are chosen to last."""
+"""Time in s that is longer than any reply takes, except those of the (long) controlled moves."""
 ON_THE_WIRE: Final = {
     "RM": b"RM 30",
     "TF": b"TF 200",
@@ -38,7 +38,7 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """With up to two copies on their way, a late reply, and an IMU that may die at any step."""
+    """Up to two copies and a late reply are on their way, and the IMU may die at any step."""
     found = search()
     assert found.bad == ()
     assert found.worlds > 10_000
@@ -62,7 +62,7 @@ TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
 
 @pytest.mark.parametrize("trap", TRAPS)
 def test_a_planted_trap_is_found(trap: str) -> None:
-    """A table that allows one word too many."""
+    """A table that allows one command too many must lead to trouble."""
     more, trouble = TRAPS[trap]
     found = search(lambda *asked: model.table(*asked) or more(*asked))
     assert trouble in found.bad[-1]
@@ -72,7 +72,7 @@ def test_a_planted_trap_is_found(trap: str) -> None:
 def test_a_driver_that_does_not_wait_for_late_copies_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Without the rule about what is harmful late."""
+    """Without the commands in HARMFUL_LATE, a late copy of one does harm."""
     monkeypatch.setattr(model, "HARMFUL_LATE", frozenset())
     assert search().bad
 
@@ -80,7 +80,7 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Without asking what moves: SL has ended RM, and SRM hangs the server."""
+    """If the driver does not ask what moves: SL has ended RM, and SRM then hangs the server."""
 
     def sweeps(world: World) -> model.Step:
         return "sweeps", world._replace(driver=model.Driver(State.STOPPING))
@@ -90,7 +90,7 @@ def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
 
 
 class Desk:
-    """The simulated firmware, to which every datagram is delivered."""
+    """The simulated firmware, which receives every datagram."""
 
     def __init__(self) -> None:
         self.server = MartServer(MartSettings(quirks=FIRMWARE))
@@ -117,7 +117,7 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """What can be seen of it: a port that is silent for good does not tell why."""
+    """Return what is visible of the state: a port that is silent for good hides the reason."""
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
     return server
@@ -125,7 +125,10 @@ def compared(server: Server) -> Server:
 
 @pytest.mark.parametrize("word", [*SAID, "the IMU dies"])
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
-    """In every state of the server that answers; one that is busy keeps what comes for later."""
+    """Every state in which the server answers is compared.
+
+    A busy server queues commands, so there only the stop port is compared.
+    """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):
             continue

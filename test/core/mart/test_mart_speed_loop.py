@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is learned of motors that have no regulator."""
+"""Tests of what is learned about motors that do not have a speed regulator."""
 
 import pytest
 from hypothesis import given
@@ -15,13 +15,13 @@ STEP_S = 0.1
 
 
 def test_before_anything_is_measured_a_motor_is_taken_for_ideal() -> None:
-    """Units and speed are the same number."""
+    """For an ideal motor, the command units equal the speed in nominal units."""
     assert MotorLine().units(12.0) == 12.0
 
 
 @given(SLOPES, DEAD)
 def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
-    """Of a drive and of a turn."""
+    """Two speeds, as of a drive and of a turn, determine the motor's line."""
     line = MotorLine()
     for units in (40.0, 40.0, 16.0, 40.0, 16.0):
         line.learn(units, slope * (units - dead))
@@ -32,7 +32,7 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
     slope: float, dead: float, rate_radps: float
 ) -> None:
-    """Within one unit, on a robot whose motors need some before they turn."""
+    """The error is at most one unit, even if the motors need some units before they turn."""
     settings = MartSettings()
     per_unit_mps = settings.speed_per_unit * slope
     loop, now = SpeedLoop(settings), 0.0
@@ -52,7 +52,7 @@ def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
 def test_whatever_is_measured_the_units_rise_with_the_speed(
     measured: list[tuple[float, float]],
 ) -> None:
-    """They stay finite and positive."""
+    """The units also stay positive and below 200."""
     line = MotorLine()
     for units, speed in measured:
         line.learn(units, speed)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whatever moves the simulated controller is stopped, on any network, and by whom it may be."""
+"""Every motion of the simulated controller is stopped, whatever has started it, on any network."""
 
 import pytest
 from mart_bench import MartBench
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 def test_a_stop_leaves_the_robot_standing_within_half_a_second(
     firmware: Firmware, motion: tuple[float, float]
 ) -> None:
-    """From the e-stop to standstill."""
+    """The time is that from the e-stop to standstill, for each kind of motion."""
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
     assert not bench.robot.stands
@@ -34,7 +34,7 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
-    """While the IMU is checked, while RM is on its way, while its reply is outstanding."""
+    """The stop comes while the IMU is checked, while RM is on its way or while its reply is due."""
     bench = MartBench(firmware, faults=NetworkFaults(delay_s=0.02), seed=1).ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)):
         bench.try_command(vx, yaw_rate)
@@ -63,7 +63,7 @@ def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
 def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
     faults: NetworkFaults, seed: int
 ) -> None:
-    """Motions of all kinds, one after the other, then an end."""
+    """Motions of all kinds follow each other directly, then the driver shuts down."""
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.1), (0.2, -0.4)):
         bench.command(vx, yaw_rate, 2.5)
@@ -81,7 +81,7 @@ def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
 
 
 def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
-    """The driver believes that the robot stands."""
+    """The driver believes that the robot stands still, so only its polls show the motion."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -94,7 +94,7 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """It keeps the command port silent, so nothing else tells of it."""
+    """The copy keeps the command port silent, which is its only sign."""
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
     bench.run_until(lambda: b"TF" in bench.server.executed[-1].encode(), 10.0)
@@ -109,7 +109,7 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
-    """Ten times a second, and a motion that another program starts does not get far."""
+    """It is sent ten times a second, so a motion that another program starts is stopped soon."""
     bench = MartBench(firmware).ready()
     bench.estop(True)
     bench.run(1.0)
@@ -126,7 +126,7 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """Right behind SM or SRM it would race with them, and hang a port."""
+    """Directly after SM or SRM it would race with them, and hang a port."""
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)
     bench.server.imu.alive = False
@@ -139,7 +139,7 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 
 
 def test_a_restarted_driver_stops_what_it_meets() -> None:
-    """A motion by RM, and a controlled move that keeps the port silent."""
+    """It meets an uncontrolled motion, or a controlled move, which keeps the port silent."""
     for begun in (b"RM 30", b"B SLOW", b"L SLOW", b"TF 200", b"MCR 300"):
         bench = MartBench()
         bench.server.receive(begun, 0, None, 0.0)
@@ -155,7 +155,7 @@ def test_a_restarted_driver_stops_what_it_meets() -> None:
 def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops_the_robot(
     wish: str,
 ) -> None:
-    """In every state: the guard repeats the words it had before the last datagram, for a second."""
+    """In every state, the guard repeats the stops that the driver gave it last, for a second."""
     twists = {"forward": (0.3, 0.2), "backward": (-0.2, 0.0), "left": (0.0, 0.5)}
     seen = set()
     for tenths in [*range(2, 16), 25, 40]:

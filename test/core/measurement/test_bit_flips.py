@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One bit of one payload changes on the line, anywhere: what is published, and for how long."""
+"""One changed bit in one frame: which wrong values are published, and for how long."""
 
 import math
 import struct
@@ -24,11 +24,11 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
         st.just(kind), st.integers(0, PAYLOADS[kind] - 1), st.integers(0, 7), st.integers(0, 40)
     )
 )
-"""Kind of frame, byte of its payload, bit of the byte, ticks to wait for the next such frame."""
+"""Kind of frame, byte of its payload, bit of the byte, ticks until the next such frame."""
 
 
 class Drive:
-    """A second of curves on a board that has driven before; then a bit flips."""
+    """A board that drives curves for two seconds before a bit changes; it had a pose before."""
 
     def __init__(self, frame: str = "earth") -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)
@@ -53,7 +53,7 @@ class Drive:
         return Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau))
 
     def run(self, seconds: float) -> None:
-        """The worst errors are those right after a displacement."""
+        """Drive curves, and keep the worst error after each displacement since the changed bit."""
         for _ in range(round(seconds / TICK_S)):
             t, count = self.bench.now, len(self.bench.odometry)
             if self.bench.session.state == "nominal" and round(t / TICK_S) % 5 == 0:
@@ -65,7 +65,7 @@ class Drive:
                 self.worst_rad = max(self.worst_rad, abs(self.last.yaw_rad))
 
     def arm(self, kind: bytes, byte: int, bit: int) -> None:
-        """The next frame of this kind is changed."""
+        """Change one bit in the next frame of this kind."""
 
         def flip(data: bytes) -> bytes:
             at = begins(data, kind)
@@ -80,7 +80,7 @@ class Drive:
 
 
 def begins(data: bytes, kind: bytes) -> int:
-    """Position of this kind's frame in the bytes of a tick; -1 if there is none."""
+    """Return the position of this kind's frame in the bytes of a tick, or -1 without one."""
     lengths = {14: (IMU,), 23: (IMU, DELTA), 29: (IMU, POSE), 38: (IMU, DELTA, POSE)}
     at = 0
     for found in lengths.get(len(data), ()):
@@ -101,7 +101,7 @@ def begins(data: bytes, kind: bytes) -> int:
 def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """odom is off by 17 mm and 0.052 rad at the most, and a second later it is the board's pose."""
+    """The error of odom is at most 17 mm and 0.052 rad, and gone a second later."""
     kind, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)
@@ -122,10 +122,10 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """The limit for a rate is 0.6 rad/s: a third bit from the top may pass while the robot shakes,
-    larger ones do not.
+    """The limit of a rate is 0.6 rad/s.
 
-    Every other reading is there.
+    Changes up to the third bit from the top may pass while the robot shakes; larger ones do not.
+    All other readings are published.
     """
     _, byte, bit, ticks = flip
     drive = Drive()
@@ -167,7 +167,7 @@ def test_what_is_refused_is_counted_and_told() -> None:
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("byte", range(4))
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
-    """Any bit of the heading: the next two poses agree, and are believed."""
+    """This holds for any bit of the heading: the next two poses agree and are accepted."""
     start = BoardPose(3000.0, -2000.0, 700.0)
     drive = Drive.__new__(Drive)
     drive.bench = Bench(BoardSettings(running=True, initial_pose=start))

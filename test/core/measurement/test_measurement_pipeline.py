@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements of a whole session: SI units, stamps, and a pose that goes on."""
+"""Measurements of a complete session: SI units, stamps, and a continuous pose."""
 
 import itertools
 import math
@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 
 def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
-    """Upside down and at rest: minus one g on z. One may have been in doubt before."""
+    """The sensor is upside down: z shows minus one g. One reading may have been held before."""
     start = bench.now
     bench.run(1.0)
     imu = [
@@ -39,7 +39,7 @@ def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
 
 
 def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
-    """A tick is 10 ms again after both."""
+    """After both, ticks are 10 ms again."""
     bench.board.reboot()
     bench.run_until_state("paused")
     bench.run_until_state("nominal")
@@ -56,7 +56,7 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """The readings that come out for each one."""
+    """The only error is the last displacement before the reset, at most 20 mm."""
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)
@@ -72,7 +72,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 
 
 def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench) -> None:
-    """A hundred lost frames are not a hundred lines."""
+    """A hundred lost frames do not make a hundred log lines."""
     for _ in range(30):
         bench.speaks = False
         bench.run(0.08)
@@ -84,7 +84,7 @@ def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench)
 
 
 def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> None:
-    """The kernel counted an overrun."""
+    """The kernel has counted an overrun of the port."""
     bench.run(0.4)
     bench.session.overran(1)
     bench.speaks = False
@@ -96,7 +96,7 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> None:
-    """The robot rolled to a halt unreported; afterwards it stands."""
+    """The robot rolled out without reports; its twist is unknown once, then zero."""
     bench.drive(0.5)
     bench.run(0.4)
     bench.ask(Request.PAUSE, 5.0)
@@ -115,7 +115,7 @@ def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> N
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     signs: tuple[int, int, int], frame: str
 ) -> None:
-    """A curve to the left, on a board whose own heading is something else."""
+    """The robot curves to the left, on a board with another initial heading."""
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
         axis_signs=signs,
@@ -132,7 +132,7 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
 
 
 def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
-    """The cable is out for three seconds while the board carries out its last command."""
+    """The cable is out for three seconds, while the board carries out its last command."""
     bench = Bench(BoardSettings(initial_pose=BoardPose(4000.0, 0.0, 1571.0), running=True))
     bench.open()
     bench.run(1.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a robot that the motion monitor has stopped needs before it may move again."""
+"""Rules by which a robot may move again after the motion monitor has stopped it."""
 
 import pytest
 from disobedient_robots import (
@@ -18,7 +18,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """A calibration needs that, since it measures wrong settings."""
+    """A calibration needs it switched off, since it measures wrong settings."""
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
     bench.configure(motion_monitor=False)
@@ -38,7 +38,7 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """A zero command does, once; after the second time within a minute only ~/start."""
+    """A zero command does so once; after the second trip within a minute only ~/start does."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 3.0) == 0
@@ -57,7 +57,7 @@ def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
 
 
 def test_silence_for_the_timeout_lets_it_move_again() -> None:
-    """The sender has let go."""
+    """The sender has stopped sending."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 2.0) == 0

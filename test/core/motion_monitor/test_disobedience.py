@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot that does not do what it is commanded, on a whole session: stopped, and said why."""
+"""Robots that do not move as commanded, in a complete session: stopped, with the reason."""
 
 import pytest
 from disobedient_robots import (
@@ -59,7 +59,7 @@ DISOBEYING = {
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """The log says what was measured, and what to check."""
+    """The log contains the measured velocity, and what to check."""
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -75,7 +75,7 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """Two of them, and the one that began before; whenever they come."""
+    """Two displacements are needed, and the one that began before, at any phase."""
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
         bench.run(phase * TICK_S)
@@ -87,7 +87,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """Its loss in the long displacement explained up to 0.46 s of driving back."""
+    """The loss in the long displacement must not explain the driving back as wind-up."""
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)
@@ -103,7 +103,7 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """It drives back to its origin, 3 m away; it gets 5 cm far."""
+    """The robot drives towards its origin, 3 m away, and gets less than 5 cm far."""
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m
     assert stopped_after_s(bench, SLOWLY) <= WITHIN_S
@@ -116,7 +116,7 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
 
 @pytest.mark.parametrize("board", [FAST, A_AND_B])
 def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
-    """The twist of all wheels together counts."""
+    """The twist of all wheels together is compared."""
     bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S
 
@@ -132,7 +132,7 @@ def test_wheel_commands_that_are_obeyed_are_not_noticed() -> None:
 
 
 def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
-    """Forward is forward, whatever goes over the wire."""
+    """The log uses the robot's axes, although the board's differ."""
     bench = started(BoardSettings(running=True, **FAST), axis_signs=(-1, 1, -1))  # type: ignore[arg-type]
     stopped_after_s(bench, FORWARD)
     assert "commanded 0.50, 0.00 m/s" in bench.notices[0]
@@ -140,7 +140,7 @@ def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
 
 
 def test_a_wrong_delta_frame_is_among_what_to_check() -> None:
-    """The robot obeys, but its displacements are read in the other frame; it was not named."""
+    """The robot obeys, but its displacements are read in the wrong frame."""
     bench = Bench(BoardSettings(running=True, initial_pose=BoardPose(0.0, 0.0, 1571.0)))
     bench.read_deltas_as("body")
     bench.open()
@@ -151,7 +151,7 @@ def test_a_wrong_delta_frame_is_among_what_to_check() -> None:
 
 
 def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> None:
-    """Every velocity is too large where deltas come more rarely than the settings have it."""
+    """If deltas come more rarely than ``delta_period``, every velocity is computed too large."""
     bench = Bench(BoardSettings(running=True))
     bench.board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     bench.open()
@@ -162,7 +162,7 @@ def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> N
 
 
 def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
-    """Signs that are wrong for commands and displacements alike show in neither."""
+    """Signs that are wrong for commands and displacements alike are not visible in either."""
     bench = started(BoardSettings(running=True, axis_signs=(-1, 1, 1)))
     for _ in range(10):
         bench.drive(0.3)
@@ -172,7 +172,7 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """A sender of goals must not restart it in jerks."""
+    """Otherwise a sender of goals could restart it again and again."""
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)
@@ -182,7 +182,7 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
 
 
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped() -> None:
-    """None of its displacements is believed, and so none is compared."""
+    """All its displacements are rejected as implausible, so they cannot be compared."""
     bench = driving()
     for _ in range(5):
         bench.drive(0.4)

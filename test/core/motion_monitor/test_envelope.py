@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which velocities recent set-points explain, and which of them are recent."""
+"""The envelope of velocities that recent set points explain, and how set points fade."""
 
 import math
 
@@ -30,7 +30,7 @@ def plain(twist: BodyTwist) -> tuple[float, float, float]:
 def test_what_lies_between_rest_and_the_set_points_is_inside(
     setpoints: list[tuple[BodyTwist, float]],
 ) -> None:
-    """Any mean of them and of standstill is inside."""
+    """Any mean of the set points and standstill is inside."""
     weight = max(1.0, sum(part for _, part in setpoints))
     motion = BodyTwist(
         sum(part * each.vx_mps for each, part in setpoints) / weight,
@@ -51,7 +51,7 @@ near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
 def test_what_is_on_the_way_is_inside(
     setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
 ) -> None:
-    """The short cut tells nothing else than the whole way."""
+    """The shortcut agrees with the full computation."""
     one, other = setpoints[0], setpoints[-1]
     x, y, yaw = off
     motion = BodyTwist(
@@ -67,7 +67,7 @@ def test_what_is_on_the_way_is_inside(
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 1.0, math.pi, -2.0])
 def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> None:
-    """Less the margin; the direction matters little."""
+    """The margin is subtracted; the direction has little influence."""
     away = BodyTwist(-0.3 * math.cos(angle), -0.3 * math.sin(angle), 0.0)
     way_mps, turn_radps = outside(
         away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True
@@ -77,7 +77,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """It counts in full at first, and not at all after a second."""
+    """It has its full weight at first, and none after a second."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -91,7 +91,7 @@ def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
 
 
 def test_a_set_point_that_was_short_counts_as_well() -> None:
-    """It lasts a single tick between two displacements."""
+    """The set point lasts for a single tick between two displacements."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -102,7 +102,7 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """The same holds for a while after it, and on the way to a goal."""
+    """The same holds for a while after it, and while the robot moves to a goal."""
     history = SetpointHistory()
     assert not history.known(0.0)
     history.add(AT_REST, 10.0)
@@ -115,7 +115,7 @@ def test_nothing_is_known_before_the_first_set_point() -> None:
 
 
 def test_the_history_does_not_grow_without_end() -> None:
-    """A ramp of an hour, a frame in each tick."""
+    """The case is a long ramp, with a new set point in each tick."""
     history = SetpointHistory()
     for tick in range(10_000):
         history.add(BodyTwist(1e-6 * tick, 0.0, 0.0), 0.01 * tick)
@@ -123,7 +123,7 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """It winds up by 1.2 times the loss, up to the integrator's limit; normal motion unwinds it."""
+    """It grows by 1.2 times the loss, up to the integrator's limit; normal motion reduces it."""
     wind_up = WindUp()
     for _ in range(10):
         wind_up.follow(AT_REST, 0.04, [FORWARD], heading_known=True)
@@ -137,14 +137,14 @@ def test_a_held_robot_winds_up_by_what_it_loses() -> None:
 
 
 def test_a_robot_that_speeds_up_is_not_held() -> None:
-    """It has not reached the set-point yet, and it was at rest a moment ago."""
+    """It has not reached the set point yet, and rest was commanded a moment ago."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
     assert wind_up.way_m == 0.0
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """It may be the one in which the robot turned round; a second one counts for both."""
+    """The robot may have turned round within it; a second one confirms both."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
     assert wind_up.way_m == 0.0
@@ -156,7 +156,7 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """Afterwards it is gone."""
+    """It is subtracted until the wind-up is zero."""
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)
     assert wind_up.pay(0.5, 0.0, 0.1)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the motion monitor makes of displacements, by hand; board time runs in steps of 40 ms."""
+"""The motion monitor, fed with displacements by hand; board time runs in steps of 40 ms."""
 
 import math
 from collections import deque
@@ -18,7 +18,7 @@ Triple = tuple[float, float, float]
 
 
 class Drive:
-    """A monitor that has seen its robot stand for two seconds."""
+    """A monitor whose robot has been at rest for two seconds."""
 
     def __init__(self) -> None:
         self.monitor, self.now = MotionMonitor(), 100.0
@@ -31,7 +31,7 @@ class Drive:
     def move(
         self, motion: Triple, seconds: float, *, heading_known: bool = True
     ) -> list[tuple[float, Fault]]:
-        """The faults that are found while it moves so, and how long after the beginning."""
+        """Move like this; return each fault with its time after the beginning, in s."""
         begun, found = self.now, []
         for _ in range(round(seconds / PERIOD_S)):
             self.now += PERIOD_S
@@ -66,7 +66,7 @@ DISOBEYING = {
 def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
     commanded: Triple, motion: Triple, fault: Fault
 ) -> None:
-    """Whether it does so from the beginning, or after it has obeyed for a while."""
+    """This holds for a robot that never obeyed, and for one that obeyed for a while."""
     for obeyed_s in (0.0, 2.0):
         drive = Drive()
         drive.command(*commanded)
@@ -83,8 +83,11 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """Of the moment in which it does 0.05 m/s. It was taken for one that is held, whose controllers
-    wind up, and that explained its motion for up to 0.4 s."""
+    """The time is counted from the moment at which it moves at 0.05 m/s.
+
+    Such a robot must not be taken for one that is held, whose wound-up controllers would explain
+    its motion for up to 0.4 s.
+    """
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
     wrong_s = -time_constant_s * math.log(1.0 - 0.05 / speed_mps)
@@ -101,7 +104,7 @@ def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
 def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_s(
     motion: Triple,
 ) -> None:
-    """Somebody pushes it, or the board obeys something that was not said."""
+    """The robot is pushed, or the board obeys a command that was not sent."""
     found_s, fault = first(Drive().move(motion, 1.0))
     assert fault is Fault.UNCOMMANDED
     assert found_s <= 0.28
@@ -110,7 +113,7 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """They are found by hand; slower is never too fast."""
+    """Scales are found by hand; a robot that is too slow is never a fault of speed."""
     drive = Drive()
     drive.command(*commanded)
     x, y, yaw = (scale * value for value in commanded)
@@ -119,7 +122,7 @@ def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: 
 
 @given(motions=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=2, max_size=2))
 def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -> None:
-    """Their size does not matter."""
+    """This holds for any size of the displacements."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -128,7 +131,7 @@ def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -
 
 
 def test_a_new_command_may_be_followed_late() -> None:
-    """A reversal: 0.3 s of nothing, then with a time constant of 0.15 s."""
+    """A reversal begins 0.3 s late, with a time constant of 0.15 s."""
     drive = Drive()
     drive.command(0.5, 0.0, 0.5)
     drive.move((0.5, 0.0, 0.5), 1.0)
@@ -140,7 +143,7 @@ def test_a_new_command_may_be_followed_late() -> None:
 
 
 def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
-    """It was to go at a fifth of the speed, and goes on as before."""
+    """The robot is commanded to slow down to a fifth, but keeps its speed."""
     drive = Drive()
     drive.command(0.5, 0.0, 0.0)
     drive.move((0.5, 0.0, 0.0), 1.0)
@@ -151,7 +154,7 @@ def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
 
 
 def test_two_senders_in_turn_do_not_trip() -> None:
-    """The robot does what lies between them."""
+    """The robot moves at a speed between both commands."""
     drive = Drive()
     for step in range(100):
         drive.command(*((0.4, 0.0, 0.0) if step % 2 else REST))
@@ -162,7 +165,7 @@ def test_two_senders_in_turn_do_not_trip() -> None:
 
 
 def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None:
-    """A way in the earth's axes says nothing of forward and backward."""
+    """A velocity in the earth's axes contains no forward or backward."""
     drive = Drive()
     drive.command(0.2, 0.0, 0.0)
     assert drive.move((-0.2, 0.0, 0.0), 2.0, heading_known=False) == []
@@ -170,7 +173,7 @@ def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None
 
 
 def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
-    """The way is the board's own."""
+    """The board itself chooses the way."""
     drive = Drive()
     drive.monitor.set_point(None, drive.now)
     assert drive.move((-1.5, 0.0, 3.0), 5.0) == []
@@ -188,7 +191,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """The wheel controllers integrate: held for a second at 0.4 m/s, it may be 0.4 m too fast."""
+    """Held for 1 s at 0.4 m/s, its wheel controllers integrate and may catch up 0.4 m."""
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
     drive.move((0.4, 0.0, 0.0), 1.0)
@@ -199,7 +202,7 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """A command that arrived meanwhile moves it back."""
+    """After the next command, wound-up wheel controllers may move it back."""
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)
@@ -208,14 +211,14 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """It stood, so it has heard the Stop before."""
+    """The robot was at rest, so it has received Stop before."""
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """The board does not hear: it may hear again."""
+    """The board does not receive just now, but may do so again."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -228,7 +231,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_no_second_fault() -> None:
-    """Its motion until Stop can have reached it is not a fault either."""
+    """Its motion until Stop can have arrived is not a fault either."""
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)
     assert first(drive.move((-0.3, 0.0, 0.0), 0.2))[1] is Fault.WRONG_WAY
@@ -239,7 +242,7 @@ def test_how_a_stopped_robot_rolls_out_is_no_second_fault() -> None:
 
 
 def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -> None:
-    """One that can be true among them begins the count anew."""
+    """A plausible displacement in between restarts the count."""
     drive = Drive()
     assert [drive.monitor.count_refused(count, drive.now) for count in range(4)] == [None] * 4
     drive.move(REST, PERIOD_S)
@@ -250,7 +253,7 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """After that, a new fault is reported."""
+    """After that, the same fault is reported again."""
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
     assert not drive.monitor.is_news(Fault.BLOCKED)
@@ -276,7 +279,7 @@ orders = st.lists(
 def test_a_robot_that_obeys_late_and_with_slip_never_trips(
     given_orders: list[tuple[Triple, int]], late_ticks: int, constant_s: float, scale: Triple
 ) -> None:
-    """The commands are random, the robot is up to 0.1 s late with a time constant of 0.2 s."""
+    """Commands are random; the robot is up to 0.1 s late, with a time constant of up to 0.2 s."""
     drive, tick_s = Drive(), 0.01
     x = y = yaw = 0.0
     way = [0.0, 0.0, 0.0]

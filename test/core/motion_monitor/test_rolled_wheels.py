@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the wheels have rolled: from displacements and back, over losses, restarts and resets."""
+"""Angles of the wheels: from displacements and back, over losses, restarts and resets."""
 
 import math
 
@@ -37,7 +37,7 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """For all signs and frames, the sum of all tangents in the board's own axes is right."""
+    """For all signs and frames, the sum of the tangents in the board's own axes is right."""
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
         odometry.settle(PoseReading(board.x_m, board.y_m, board.yaw_rad))
@@ -65,7 +65,7 @@ def test_wheels_from_the_bodys_displacements_and_back(
 
 @given(st.lists(st.tuples(*[st.integers(-300, 300)] * 3), min_size=1, max_size=20))
 def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int, int]]) -> None:
-    """Through the body and back nothing is lost."""
+    """The conversion to the body's motion and back loses nothing."""
     translation = Translation(OmniBotSettings(delta_frame="wheel_counts"))
     odometry = Odometry(OdometrySettings())
     estimates: list[OdometryEstimate] = []
@@ -85,8 +85,9 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """They are right within a few degrees; after seconds of curves only the shortest way is
-    known.
+    """They are right within a few degrees.
+
+    After seconds of curves only the shortest way is known.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)
@@ -100,7 +101,7 @@ def test_over_a_gap_the_angles_are_those_of_the_encoders(
 
 
 def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_board() -> None:
-    """No wheel jumps back to zero."""
+    """The angles of the wheels do not jump back to zero."""
     line = Line(BoardSettings(running=True))
     line.run(3.0)
     before = angles(line.estimates[-1].rolled)
@@ -118,7 +119,7 @@ def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_boar
 
 
 def test_what_took_an_unknown_time_has_no_rate() -> None:
-    """The first displacement after a pause; its way still counts."""
+    """This is the first displacement after a pause; its way is still added."""
     odometry = Odometry(OdometrySettings())
     (estimate,) = odometry.displace(DisplacementReading(0.1, 0.0, 0.0, "body", None, 0), 1.0)
     assert estimate.rolling is None

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot that does not move when it is commanded, or moves when it is not."""
+"""Robots that do not move when commanded, or move without a command."""
 
 import pytest
 from disobedient_robots import (
@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
-    """Blocked wheels, no motor power, or a switch that stands on position; it is not stopped."""
+    """The cause may be blocked wheels, missing motor power, or a switch on position control."""
     bench = started(BoardSettings(running=True, control="position"), control="velocity")
     for _ in range(10):
         drive_on(bench)
@@ -49,7 +49,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """The cable to it was cut twice."""
+    """The line to the board is cut twice."""
     bench = standing()
     for hears in (False, True, False):
         bench.hears = hears
@@ -74,7 +74,7 @@ def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> No
 
 
 def test_in_imu_only_mode_nothing_is_found() -> None:
-    """There are no displacements to compare."""
+    """Displacements to compare with the commands are missing."""
     bench = Bench(BoardSettings(running=True, imu_only=True, linear_scale=70 / 2.38))
     bench.open()
     bench.run_until_state("imu_only")
@@ -86,7 +86,7 @@ def test_in_imu_only_mode_nothing_is_found() -> None:
 
 
 def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
-    """The cut outlasts the first Stops; its deltas show that it drives on."""
+    """The cut lasts longer than the first Stops; the deltas show that the robot still drives."""
     bench.hears = False
     bench.run(20.0)
     assert not bench.still()
@@ -101,7 +101,7 @@ def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench:
 
 
 def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> None:
-    """Stopping takes a moment, and a bump is not a drive."""
+    """Stopping takes a moment, and a short bump is not a drive."""
     bench.run(4.0)
     for _ in range(5):
         push(bench, 0.005, 0.0, 0.0)
@@ -110,7 +110,7 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
 
 
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """Stop at once, then ever more rarely; nothing is refused afterwards."""
+    """Stop is sent at once, then ever more rarely; later commands are accepted."""
     bench = standing()
     bench.board.grip(0.3, 0.0, 0.2)
     start = len(bench.written)

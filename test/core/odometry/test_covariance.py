@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The covariance of the odometry: its form, its growth, and the truth of it."""
+"""The covariance of odometry: its form, its growth, and whether real errors agree with it."""
 
 import math
 from random import Random
@@ -28,7 +28,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def minors(c: Covariance) -> Triple:
-    """The leading principal minors: all positive exactly for a positive definite matrix."""
+    """Return the leading principal minors; they are positive if the matrix is positive definite."""
     first = c.xx
     second = c.xx * c.yy - c.xy**2
     third = (
@@ -41,7 +41,7 @@ def minors(c: Covariance) -> Triple:
 
 @given(st.lists(displacements("body"), max_size=60))
 def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
-    """Neither its volume nor the variance of yaw shrinks, as nothing corrects slip."""
+    """Neither its determinant nor the variance of yaw shrinks, since slip is not corrected."""
     odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0, wheel_slip=0.0)))
     before = Covariance()
     for reading in readings:
@@ -54,7 +54,7 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """1 % of one wheel is 0.01 / 0.4 rad after a metre, and half a centimetre of way."""
+    """One wheel wrong by 1 % gives 0.01 / 0.4 rad per metre, and 5 mm of distance."""
     noise = OdometryNoise(
         wheel_drift=0.0,
         wheel_scale=0.01,
@@ -68,7 +68,7 @@ def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
 
 
 def test_a_robot_at_rest_grows_no_less_sure() -> None:
-    """Without motion there is no slip."""
+    """A robot at rest has no slip."""
     odometry = Odometry(SETTINGS)
     for _ in range(100):
         (estimate,) = odometry.displace(body(0.0, 0.0), 0.0)
@@ -76,7 +76,7 @@ def test_a_robot_at_rest_grows_no_less_sure() -> None:
 
 
 def test_the_covariance_is_a_random_walk_over_the_way() -> None:
-    """Straight ahead, A and B roll 0.87 m to a metre, whatever the step; their errors add up."""
+    """Over 1 m, A and B roll 0.87 m, in any number of steps; the variances add up."""
     noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
     for steps in (10, 100):
         odometry = Odometry(OdometrySettings(noise=noise))
@@ -88,7 +88,7 @@ def test_the_covariance_is_a_random_walk_over_the_way() -> None:
 
 
 def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
-    """The sample is 2000 robots with random wheel errors, through the manual's matrix."""
+    """The sample is 2000 robots with random wheel errors, computed with the manual's matrix."""
     random, deviation, n, steps = Random(1), 0.003, 2000, 25
     noise = OdometryNoise(wheel_drift=deviation, wheel_scale=0.0, wheel_slip=0.0)
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -119,7 +119,7 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """After 10 m it is ten times that after 1 m, and zero back at the start."""
+    """After 10 m it is ten times that after 1 m; back at the start it is zero."""
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -134,10 +134,10 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 
 @pytest.mark.slow
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
-    """Wheels of wrong size (1 %) that slip (2 %): 40 drives, squared errors by their covariance.
+    """Wheels of wrong size (1 %) slip (2 %) in 40 drives; errors are compared to the covariance.
 
-    Their mean is 3 (x, y, yaw) for a true covariance, and with 40 of them within 2.29 and 3.80
-    nineteen times out of twenty (chi-squared of 120).
+    The mean squared error over covariance is 3 (x, y, yaw) for a true covariance. With 40 drives it
+    is within 2.29 and 3.80 in nineteen cases out of twenty (chi-squared of 120).
     """
     total = 0.0
     for seed in range(40):
@@ -153,7 +153,7 @@ def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None
 
 
 def squared(off: Pose, estimate: OdometryEstimate) -> float:
-    """The error squared over its covariance, by elimination."""
+    """Return the squared error over its covariance (NEES), by elimination."""
     c = estimate.covariance
     rows = [
         [c.xx, c.xy, c.x_yaw, off.x_m],
@@ -171,7 +171,7 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """Drift is what the wheels do not tell, and the board's pose tells no more than they do."""
+    """Drift is not visible to the wheels, and the board's pose is computed from the wheels."""
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):
@@ -184,7 +184,7 @@ def test_settling_removes_nothing_but_the_gap() -> None:
 
 
 def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
-    """The errors are 0.02 m/s and 0.025 rad/s for robots that slip, speed up and brake."""
+    """The errors of robots that slip, speed up and brake are below 0.02 m/s and 0.025 rad/s."""
     linear, angular, n = 0.0, 0.0, 0
     for seed in range(8):
         random = Random(seed)

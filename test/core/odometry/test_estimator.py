@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry: displacements from a made-up board, and from the simulated one."""
+"""Odometry from the displacements of a synthetic board and of the simulated one."""
 
 import math
 from random import Random
@@ -32,7 +32,7 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, Simulated
 
 
 def test_straight_ahead_is_x() -> None:
-    """A second of 0.5 m/s."""
+    """The robot drives at 0.5 m/s for 1 s."""
     odometry = Odometry(SETTINGS)
     for _ in range(25):
         estimates = odometry.displace(body(0.02, 0.0), 0.0)
@@ -41,7 +41,7 @@ def test_straight_ahead_is_x() -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
-    """The radius is 1 m in 50 steps, exactly."""
+    """The radius is exactly 1 m, in 50 steps."""
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
     step = math.pi / 2 / 50
@@ -51,7 +51,7 @@ def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
 
 
 def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
-    """Yaw is unwrapped."""
+    """Yaw is not wrapped."""
     odometry = Odometry(SETTINGS)
     for _ in range(100):
         estimates = odometry.displace(body(0.0, 0.0, 0.2), 0.0)
@@ -75,7 +75,7 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 
 @given(st.lists(small_moves, min_size=1, max_size=40), axis_signs)
 def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
-    """Each comes out at once, along the true way."""
+    """Each estimate is published at once, and its pose is the true one."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(1.0, signs)
     for move in moves:
         estimates = odometry.displace(trip.move(*xyyaw(move), "body"), 0.0)
@@ -86,7 +86,7 @@ def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]
 
 @given(small_moves, headings, st.sampled_from(["earth", "body"]))
 def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: str) -> None:
-    """A constant twist is exact, in the body's axes, at any past."""
+    """A constant twist is measured exactly, in the body's axes, after any earlier motion."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     for _ in range(3):
@@ -111,7 +111,7 @@ def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
 
 
 def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odometry]:
-    """Twelve seconds of smooth curves and a stop, through the wire."""
+    """Drive smooth curves for 12 s and stop, through the protocol; return the estimates."""
     settings_ = board.settings
     bot = OmniBot(OmniBotSettings(delta_frame=settings_.frame))
     odometry, estimates, random = Odometry(SETTINGS), [], Random(seed)
@@ -143,7 +143,7 @@ def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odo
 def test_the_odometry_is_the_truth_of_the_simulated_robot(
     frame: str, initial: BoardPose, seed: int
 ) -> None:
-    """Metres of curves end within 5 mm and 3 mrad, also on a board that has driven before."""
+    """The error after metres of curves is below 5 mm and 3 mrad, also with an initial pose."""
     board = SimulatedBoard(
         BoardSettings(seed=seed, frame=frame, initial_pose=initial, running=True)
     )
@@ -160,7 +160,7 @@ def test_the_odometry_is_the_truth_of_the_simulated_robot(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_twist_is_the_velocity_of_the_simulated_robot(frame: str) -> None:
-    """Forward, left and turning at once, on a board whose heading is a quarter turn."""
+    """The robot drives forward, left and turns at once; the board's heading is a quarter turn."""
     board = SimulatedBoard(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 1571.0), running=True)
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a gap is taken to have held, by the displacements on both sides of it."""
+"""Motion during a gap, estimated from the displacements before and after it."""
 
 import pytest
 from synthetic_board import PERIOD_S, Trip, body, xyyaw
@@ -11,12 +11,12 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:
-    """Straight ahead, after so many that were lost."""
+    """Return a displacement straight ahead after ``lost`` missing ones."""
     return DisplacementReading(dx_m, 0.0, 0.0, "body", duration_s, lost)
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four displacements are missing, from 0.5 to 1 m/s."""
+    """Four displacements are missing between 0.5 and 1 m/s."""
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)
@@ -25,7 +25,7 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """A robot that is not heard for longer has been stopped."""
+    """The driver stops a robot from which it receives nothing for longer."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     lost, _ = bridge.tangents(after(250, 0.02), None)
@@ -34,7 +34,7 @@ def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
 
 @pytest.mark.parametrize("missing", [0, 1, 7])
 def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
-    """Earth displacements are turned by the heading that the robot has after the gap."""
+    """Earth displacements are turned by the heading after the gap."""
     bridge, trip = GapInterpolation(), Trip(0.7)
     bridge.tangents(trip.move(0.02, 0.01, 0.1), 0.7)
     before = trip.board
@@ -50,7 +50,7 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 
 
 def test_what_took_an_unknown_time_is_no_side_of_a_gap() -> None:
-    """It may hold all motion of a pause; the gap after it is like what follows."""
+    """It may include all motion of a pause; the gap is filled from the displacement after it."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     assert bridge.tangents(after(0, 0.5, None), None) == (Pose(), Pose(0.5))

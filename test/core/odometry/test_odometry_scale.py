@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board that takes its wheels and its base for others than they are, put right."""
+"""Odometry scales: they correct a board with wrong sizes of its wheels and base."""
 
 import math
 
@@ -33,7 +33,7 @@ def bench(odometry: OdometrySettings, **settings: object) -> Bench:
 
 
 def drive(on: Bench) -> None:
-    """Curves for ten seconds, then a stop."""
+    """Drive curves for ten seconds, then stop."""
     for tick in range(200):
         t = tick / 20
         on.drive(0.3 * math.cos(t), 0.25 * math.sin(1.4 * t), 0.5 * math.cos(0.4 * t))
@@ -44,7 +44,7 @@ def drive(on: Bench) -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """The error is below 5 mm and 3 mrad after metres of curves, and larger without the scales."""
+    """The error after metres of curves is below 5 mm and 3 mrad, and larger without the scales."""
     on = bench(TRUE, frame=frame, initial_pose=BoardPose(4000.0, -1000.0, 2000.0))
     drive(on)
     truth, pose = on.board.truth, on.odometry[-1].pose
@@ -73,7 +73,7 @@ def test_the_twist_is_the_true_one() -> None:
 
 
 def test_what_has_rolled_is_the_true_way() -> None:
-    """The joints' angles come of it, by the wheels' true radius."""
+    """The joints' angles are computed from it with the wheels' true radius."""
     on = bench(TRUE)
     on.drive(0.2, 0.0, 0.0)
     on.run(3.0)
@@ -84,7 +84,7 @@ def test_what_has_rolled_is_the_true_way() -> None:
 
 
 def test_a_goal_in_odom_is_reached_in_truth() -> None:
-    """The board is sent to where it takes that place to be."""
+    """The board receives the place at which its own odometry will have it then."""
     on = bench(TRUE, control="position")
     on.go_to(0.6, -0.4, 0.0)
     on.run(8.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Hypothesis strategies of frames and lines of the OmniBot."""
+"""Hypothesis strategies for frames, commands and byte streams of the OmniBot."""
 
 import struct
 
@@ -16,7 +16,7 @@ from omnibot_driver.core.omnibot import (
 )
 from omnibot_driver.core.omnibot.frames import Frame
 
-# Words the board's bytes are hard to tell apart by: header look-alikes, FF in either byte, edges.
+# Words that make framing hard: look-alikes of headers, FF in either byte, and extreme values.
 TREACHEROUS_WORDS = [-6, -5, -4, -1, 0, 255, -256, 0x5061, 32767, -32768]
 
 words = st.one_of(st.sampled_from(TREACHEROUS_WORDS), st.integers(-32768, 32767))
@@ -32,7 +32,11 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 
 
 def believable(frame: Frame) -> bool:
-    """No pose at the end of the world; no IMU frame below 0.5 g with -6 among its accelerations."""
+    """Return whether an undamaged board may send this frame.
+
+    A coordinate of a pose is at most 1e7 (mm or mrad). An IMU frame with -6 among its accelerations
+    shows at least 0.5 g.
+    """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7
     if isinstance(frame, ImuFrame):
@@ -48,7 +52,7 @@ believable_frames = st.one_of(
     pose_frames.filter(believable),
     paused_frames,
 )
-"""What an undamaged board may send; damage makes frames that it may not."""
+"""Frames that an undamaged board may send; damage can make others too."""
 
 any_streams = st.lists(
     st.one_of(
@@ -59,7 +63,7 @@ any_streams = st.lists(
     ),
     max_size=25,
 ).map(b"".join)
-"""Frames, broken frames, noise and the beginnings of frames in a row."""
+"""Streams of frames, broken frames, noise and beginnings of frames."""
 
 
 @st.composite
@@ -82,14 +86,14 @@ def _calm_frames(draw: st.DrawFn) -> list[Frame]:
 
 
 calm_frames = _calm_frames()
-"""In any order, but each near the one of its kind before it, and counted on."""
+"""Frames in any order, each close to the last one of its kind, with consecutive counters."""
 
 commands = st.builds(CommandFrame, st.integers(0, 255), triples)
 byte_orders = st.sampled_from(["big", "little"])
 
 
 def float32(value: float) -> float:
-    """The nearest value that four bytes can hold."""
+    """Return the nearest value that four bytes can hold."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", value))
     assert isinstance(rounded, float)
     return rounded

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An IMU frame comes out with the packet that completes it, however the adapter parts the line.
+"""An IMU frame is returned with the packet that completes it, however the adapter splits the line.
 
-Times tell that a last byte like 0xFF is not the first of the next frame: that one is not due yet.
+Arrival times show that a last byte like 0xFF does not begin the next frame, because that frame is
+not due yet.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,23 +19,26 @@ from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICKS = 1200
 SETTLED = 300
-"""Readings after which the decoder knows the adapter."""
+"""Number of readings after which the decoder knows the adapter."""
 IMU_LENGTH = 14
 DRIFT = 1.0002
-"""Of the adapter's clock: its packets end at every moment of a tick."""
+"""Rate of the adapter's clock: its packets end at every moment of a tick."""
 
 Handed = Iterator[tuple[float, bytes]]
 
 
 def ticks() -> Iterator[tuple[float, bytes]]:
-    """A robot at rest, whose gyro says -1 more often than anything but 0."""
+    """Yield time in s and bytes of each tick of a robot at rest.
+
+    Its gyro reads -1 more often than any value but 0.
+    """
     board = SimulatedBoard(BoardSettings(seed=1, running=True))
     for tick in range(TICKS):
         yield tick * 0.01, board.step()
 
 
 def pieces() -> Handed:
-    """1 to 16 bytes at the pace of the line."""
+    """Yield pieces of 1 to 16 bytes at the pace of the line."""
     random = Random(1)
     for at, data in ticks():
         start = 0
@@ -45,7 +49,7 @@ def pieces() -> Handed:
 
 
 def behind_timer(timer_s: float) -> Handed:
-    """Whatever has come when the timer runs out."""
+    """Yield the bytes that have arrived each time the adapter's timer runs out."""
     held, out = b"", 0.0
     for at, data in ticks():
         for number in range(len(data)):
@@ -65,7 +69,7 @@ def behind_timer(timer_s: float) -> Handed:
 def test_hardly_a_frame_waits_for_the_next_packet(
     adapter: Callable[[], Handed], waits: float
 ) -> None:
-    """Only what is in doubt waits: a delta may follow, or the frame is parted by the adapter."""
+    """Only an uncertain frame waits: a delta may follow it, or the adapter splits it."""
     board = OmniBot(OmniBotSettings())
     ends: list[int] = []
     sent = 0
@@ -85,7 +89,7 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
-    """There a frame waits until it is sure that its last byte is not the next header's."""
+    """On such a line a frame waits until its last byte is surely not the next header's."""
     decoder = FrameDecoder()
     lost_s, calm = 1.0, {}
     for at, data in ticks():

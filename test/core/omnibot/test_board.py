@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's bytes as readings in SI units, its letters, and what a new line means."""
+"""Readings of the OmniBot in SI units, the letters that it is sent, and a new connection."""
 
 import math
 
@@ -41,14 +41,14 @@ def bot(**settings: object) -> OmniBot:
 
 
 def readings(board: OmniBot, *sent: Frame) -> list[Reading]:
-    """What the board reads in frames on the line, behind two that bring it into step."""
+    """Return the board's readings of these frames, after two frames that synchronize it."""
     board.receive(encode(REST) * 2, 0.0)
     found = [reading for frame in sent for reading in board.receive(encode(frame), 0.0)]
     return found + board.flush(0.0)
 
 
 def in_mode(mode: Mode) -> OmniBot:
-    """A board that is believed in this mode, for what was heard."""
+    """Return a board that is in this mode according to the data it received."""
     board = bot()
     if mode is Mode.PAUSED:
         board.receive(TEXT, 0.0)
@@ -68,7 +68,7 @@ def moved(seq: int) -> DeltaFrame:
 
 
 def test_a_delta_is_in_tenths_of_millimetres_and_milliradians_over_40_ms() -> None:
-    """10000 counts are 1 m, and 1 rad."""
+    """10000 counts are 1 m or 1 rad."""
     (reading,) = readings(bot(), DeltaFrame(10000, -5000, 2500, 0))
     assert reading == DisplacementReading(
         pytest.approx(1.0), pytest.approx(-0.5), pytest.approx(0.25), "earth", 0.04, 0
@@ -76,7 +76,7 @@ def test_a_delta_is_in_tenths_of_millimetres_and_milliradians_over_40_ms() -> No
 
 
 def test_the_frame_of_the_deltas_is_the_settings() -> None:
-    """The wire does not tell."""
+    """The board does not report in which frame its deltas are."""
     (reading,) = readings(bot(delta_frame="body"), moved(0))
     assert isinstance(reading, DisplacementReading)
     assert reading.frame == "body"
@@ -84,7 +84,7 @@ def test_the_frame_of_the_deltas_is_the_settings() -> None:
 
 @pytest.mark.parametrize("order", ["big", "little"])
 def test_a_pose_is_in_millimetres_and_milliradians(order: str) -> None:
-    """1000 are 1 m, and 1 rad; in the byte order of the settings."""
+    """A value of 1000 is 1 m or 1 rad; its byte order is a setting."""
     board = bot(pose_byte_order=order)
     board.receive(encode(REST) * 2, 0.0)
     found = board.receive(encode(PoseFrame(1500.0, -250.0, 3142.0, 0), order), 0.0)  # type: ignore[arg-type]
@@ -101,27 +101,27 @@ def test_imu_counts_are_scaled_by_the_ranges_of_the_settings() -> None:
 
 
 def test_a_text_says_that_the_board_is_paused() -> None:
-    """It says nothing else."""
+    """The number in the text is not part of the reading."""
     assert readings(bot(), PausedFrame(3)) == [PausedReading()]
 
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """Bytes between two texts mean that the board ran, and may have restarted since."""
+    """Bytes between two texts show that the board ran; it may have restarted since."""
     texts = readings(bot(), *map(PausedFrame, (255, 0, 2)))
     assert texts == [PausedReading(), PausedReading(continues=True), PausedReading()]
     assert readings(bot(), PausedFrame(0), data, PausedFrame(1))[-1] == PausedReading()
 
 
 def test_readings_come_in_the_order_of_the_line() -> None:
-    """A pose includes the delta before it."""
+    """The order matters, because a pose includes the delta before it."""
     sent = [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0), PausedFrame(0)]
     kinds = [type(reading) for reading in readings(bot(), *sent)]
     assert kinds == [ImuReading, DisplacementReading, PoseReading, PausedReading]
 
 
 def test_readings_are_finite_but_for_poses() -> None:
-    """Integers scaled; a pose is what the board says it is."""
+    """They are scaled integers, but a pose consists of floats, which may have any value."""
     edge = (32767, -32768, -32768)
     found = readings(bot(), ImuFrame(edge, edge), DeltaFrame(*edge, 0))
     assert isinstance(found[0], ImuReading)
@@ -141,7 +141,7 @@ def lost(board: OmniBot, *sent: Frame) -> list[int]:
 
 @given(st.integers(0, 255), st.integers(0, 2000))
 def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, gap: int) -> None:
-    """SEQ is one byte; arrival times tell how often it has wrapped."""
+    """SEQ is one byte; arrival times show how often it has wrapped."""
     board = bot()
     readings(board, moved(start))
     (reading,) = board.receive(encode(moved((start + 1 + gap) % 256)) + b"\xff", 0.04 * (gap + 1))
@@ -150,7 +150,7 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """Between two such reads the counter wrapped, and three deltas were lost with all around."""
+    """SEQ wraps in them, and between the reads three deltas are lost with all around them."""
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
     board.receive(b"".join(periods[:58]), 10.0)
@@ -161,12 +161,12 @@ def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> N
 
 
 def test_a_regular_sequence_has_no_losses() -> None:
-    """The sequence has more than one wrap."""
+    """SEQ wraps twice in 600 deltas."""
     assert sum(lost(bot(), *[moved(n % 256) for n in range(600)])) == 0
 
 
 def test_the_first_delta_has_lost_nothing() -> None:
-    """What came before the connection, or before a pause, is unknown."""
+    """Losses before the connection, or before a pause, are unknown."""
     board = bot()
     assert lost(board, moved(7)) == [0]
     assert lost(board, PausedFrame(0), moved(100)) == [0]
@@ -175,7 +175,7 @@ def test_the_first_delta_has_lost_nothing() -> None:
 
 
 def test_the_poses_have_a_counter_of_their_own() -> None:
-    """It says nothing of lost deltas."""
+    """A pose with the count 99 between deltas 1 and 2 does not mean that deltas were lost."""
     assert lost(bot(), moved(1), PoseFrame(0.0, 0.0, 0.0, 99), moved(2)) == [0, 0]
 
 
@@ -183,7 +183,7 @@ def test_the_poses_have_a_counter_of_their_own() -> None:
 
 
 def test_faults_are_counted_over_all_connections() -> None:
-    """A new line has a new decoder, but the robot's cable is the same."""
+    """A new connection has a new decoder, but the counters describe the same cable."""
     board = bot()
     board.receive(encode(REST) * 8, 0.0)
     assert (board.figures.faults, board.figures.discarded_bytes) == (0, 0)
@@ -202,13 +202,13 @@ def test_stop_and_emergency_stop_are_the_manuals() -> None:
 
 
 def test_waking_is_eight_zeros_and_stop() -> None:
-    """Zeros end any half command and are not letters."""
+    """The zeros end any command that was cut, and are not letters."""
     assert joined(bot().wake()) == STOP
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
-    """It is harmless, and does not change the belief."""
+    """S is harmless, and the mode changes only with received data."""
     board = in_mode(mode)
     assert joined(board.start()) == ZEROS + b"\x53"
     assert board.mode is mode
@@ -216,7 +216,7 @@ def test_start_is_s_in_every_mode(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -> None:
-    """A toggle is for boards whose state is known; a refusal changes nothing."""
+    """P is a toggle, so it is sent only where the mode is known; a refusal changes nothing."""
     board = in_mode(mode)
     if mode.running:
         assert joined(board.pause()) == STOP + ZEROS + b"\x50"
@@ -255,7 +255,7 @@ def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
 
 
 def test_a_frame_that_waited_comes_out_at_the_end() -> None:
-    """One that ends in FF, when the line is closed."""
+    """A frame that ends in FF is held until the next byte, or until the line is closed."""
     board = bot()
     board.receive(encode(REST) * 2, 0.0)
     assert board.receive(encode(moved(255)), 0.0) == []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Wishes in SI units as the board's bytes."""
+"""Commands in SI units, encoded as the OmniBot's bytes."""
 
 import math
 import re
@@ -23,7 +23,7 @@ from omnibot_driver.core.packets import packed
 STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 
 HARMFUL = re.compile(rb"[SPR]|\xff\xfe")
-"""What acts by itself where the header before it is lost."""
+"""Bytes on which the board would act if the header before them were lost."""
 
 
 def encoder(**settings: object) -> CommandEncoder:
@@ -42,7 +42,7 @@ def encoder(**settings: object) -> CommandEncoder:
 def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
     twist: tuple[float, float, float], typed: str
 ) -> None:
-    """The vendor's scales, in mode 1."""
+    """These are the vendor's scales, in mode 1."""
     assert bare(encoder().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
 
 
@@ -54,7 +54,7 @@ def test_the_scales_are_those_of_the_settings() -> None:
 
 
 def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
-    """10 rad/s at 29 mm is 0.29 m/s: 20.3 LSB; mode 2."""
+    """10 rad/s at a radius of 29 mm are 0.29 m/s, which is 20.3 LSB in mode 2."""
     assert bare(encoder().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
     wide = encoder(wheel_radius_m=0.058)
     assert bare(wide.wheels((10.0, 0.0, 0.0))) == bytes.fromhex("FF FE 02 00 29 00 00 00 00")
@@ -69,7 +69,7 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """Zeros in mode 1 would mean: drive to the origin, with the switch on position."""
+    """In mode 1, with the board's switch on position, zeros would mean: drive to the origin."""
     command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
@@ -81,7 +81,7 @@ def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -
 
 @pytest.mark.parametrize("tiny", [0.0, -0.0, 0.005, -0.007, 5e-324])
 def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
-    """This holds for the body and for wheels."""
+    """This holds for body velocities and for wheel rates."""
     assert encoder().velocity(BodyTwist(tiny, -tiny, tiny / 10)) == STOP
     assert encoder().wheels((tiny, -tiny, tiny)) == STOP
 
@@ -90,7 +90,7 @@ def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
 def test_a_command_too_large_for_the_wire_keeps_its_direction(
     values: tuple[float, float, float],
 ) -> None:
-    """The whole command is scaled down, without an exception or a wrapped word."""
+    """One factor scales all three words down, without an exception or an overflow."""
     command = bare(encoder().velocity(BodyTwist(*values)))
     counts = (70 * values[0], 70 * values[1], 500 * values[2])
     largest = max(1.0, max(map(abs, counts)) / 32767)
@@ -103,7 +103,7 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
 
 @given(words, words, words)
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
-    """Whole counts survive scaling, rounding and the wire, but for what could act by itself."""
+    """Integer counts survive scaling, rounding and the wire, except harmful bytes."""
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
     command = bare(encoder().velocity(BodyTwist(x / 70, y / 70, omega / 500)))
@@ -123,7 +123,7 @@ def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int
 def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
     pose: tuple[float, float, float], typed: str
 ) -> None:
-    """The frame is of mode 1; the origin is a place like any other."""
+    """Goals use mode 1, and the origin is a goal like any other."""
     assert bare(encoder().drive_to(Pose(*pose))) == bytes.fromhex(typed)
 
 
@@ -132,7 +132,7 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """32.77 m and 32.77 rad are the end of the words."""
+    """A 16-bit word ends at 32.77 m or rad, and a limited value would be another place."""
     values = [0.0, 0.0, 0.0]
     values[place] = far
     with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
@@ -140,18 +140,18 @@ def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
 
 
 def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
-    """One at the very end of it is not."""
+    """A command exactly at the limit is not counted."""
     commands = encoder(linear_scale=10_000.0)
     commands.velocity(BodyTwist(3.2767, 0.0, 0.0))
     assert commands.saturated == 0
     commands.velocity(BodyTwist(3.3, 0.0, 0.0))
     assert commands.saturated == 1
     sent = bare(commands.velocity(BodyTwist(6.5534, 2.0, 0.0)))
-    assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice too fast: slowed as a whole
+    assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice too fast: halved as one
 
 
 def test_settings_may_be_replaced_while_it_runs() -> None:
-    """Scales hold from the next command on."""
+    """New scales apply from the next command on."""
     commands = encoder()
     commands.settings = OmniBotSettings(linear_scale=100.0)
     assert bare(commands.velocity(BodyTwist(1.0, 0.0, 0.0)))[3:5] == b"\x00\x64"
@@ -173,7 +173,7 @@ def test_settings_may_be_replaced_while_it_runs() -> None:
 def test_a_frame_means_the_velocity_that_it_commands(
     typed: str, twist: tuple[float, float, float]
 ) -> None:
-    """The last one that was written; zeros before it mean nothing."""
+    """The last frame in the bytes decides, and zeros before it have no meaning."""
     found = encoder().meaning(packed(bytes(8) + bytes.fromhex(typed)))
     assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
 
@@ -182,7 +182,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """Half a unit, or one and a half where a byte would be a letter."""
+    """The error is half a unit, or up to 1.5 units where a byte would be a letter."""
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
     assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)

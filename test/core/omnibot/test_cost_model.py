@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Content as evidence: what a frame costs after what came before it."""
+"""Cost of a frame's content, given the frames before it."""
 
 import pytest
 
@@ -12,7 +12,7 @@ IMU = ImuFrame((250, -130, -16380), (1, 2, 3))
 
 
 def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
-    """What is known after a pose at 100 mrad, and deltas with these turns and counters."""
+    """Return the context after a pose at 100 mrad, and deltas with these turns (in 0.1 mrad)."""
     context = NOTHING_KNOWN
     for frame in (DeltaFrame(0, 0, 0, 9), PoseFrame(0.0, 0.0, 100.0, 1)):
         _, context = EXPECTATION.weigh(frame, context)
@@ -28,14 +28,14 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """Five turns of 1 mrad, 5 mrad in all; rounding does not contradict."""
+    """Five turns of 1 mrad are 5 mrad in all; a rounding error is not a contradiction."""
     context = after_a_cycle([10] * 5, [10, 11, 12, 13, 14])
     cost, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, theta_mrad, 2), context)
     assert (cost > 0.0) is contradicts
 
 
 def test_a_pose_after_a_lost_delta_contradicts_nothing() -> None:
-    """How far the robot turned meanwhile is unknown."""
+    """The robot's turn during the lost delta is unknown."""
     context = after_a_cycle([10] * 5, [10, 11, 13, 14, 15])
     near, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 105.0, 2), context)
     far, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 180.0, 2), context)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The decoder on undamaged streams, from the beginning or from anywhere.
+"""The decoder on undamaged streams, from the beginning or from any other byte.
 
-Streams come from the simulated board and are typed from the manual's layouts; what is expected of
-them comes from their single frames.
+Streams come from the simulated board, or are typed from the manual's layouts. The expected frames
+come from decoding the parts of a stream one by one.
 """
 
 from random import Random
@@ -53,7 +53,7 @@ def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: st
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
-    """There are twenty different cuts."""
+    """Each stream is cut in 24 ways, into chunks of 1.5 to 200 bytes on average."""
     stream = b"".join(ticks_of(name))
     sent = [frame for _, frame in frames_of(stream)]
     random = Random(11)
@@ -67,15 +67,15 @@ def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
 def test_in_step_any_content_is_delivered_in_any_chunks(
     sent: list[Frame], data: st.DataObject
 ) -> None:
-    """A true shock, a stuck sensor and words that look like headers are frames like all others."""
+    """A real shock, a stuck sensor and words that look like headers are decoded like the rest."""
     stream = LEAD_IN + b"".join(map(encode, sent))
-    chunks = [chunk for chunk in data.draw(chunkings(stream)) if chunk]  # and no pauses
+    chunks = [chunk for chunk in data.draw(chunkings(stream)) if chunk]  # empty ones are pauses
     assert decoded(chunks, step_s=1e-3) == [REST, REST, *sent]
 
 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
-    """Except one that ends in a header's byte, or a spike: the next bytes decide."""
+    """A spike, or a frame that ends in a header's byte, waits for the next bytes."""
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
     for number, tick in enumerate(ticks_of(name)):
@@ -96,7 +96,7 @@ def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
 
 @given(believable_frames.filter(lambda frame: not isinstance(frame, PausedFrame)), st.data())
 def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataObject) -> None:
-    """It may be damaged; what follows in its place says that it is not."""
+    """Odd content may be damage, but two good frames right behind it show that it is not."""
     made, content = FrameDecoder(), encode(odd) + LEAD_IN + encode(REST)[:2]
     assert made.feed(LEAD_IN, 0.0) == [REST, REST]
     found = [frame for chunk in data.draw(chunkings(content)) for frame in made.feed(chunk, 0.0)]
@@ -104,7 +104,7 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """An adapter's pause within the last frame and its leap together do not make it a false one."""
+    """An adapter's pause within the last frame, together with its leap, does not discard it."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # it learns how calm the sensor is
     shock = [
@@ -118,7 +118,7 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """Out of the calm, with an adapter's pause within it: it ends where the line falls silent."""
+    """The line was calm, an adapter pauses within the frame, and then the line falls silent."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
     knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))
@@ -136,7 +136,7 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """An IMU frame that ends in FB or FC, before a delta: the rest of the tick is silent."""
+    """An IMU frame that ends in FB or FC waits only in a tick in which a delta is due."""
     made, waited = FrameDecoder(), []
     for tick in range(60):
         imu = encode(ImuFrame((120, -80, -16384), (1, 2, -4 - tick % 2)))
@@ -157,7 +157,7 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
     name: str, by: str
 ) -> None:
-    """The stream starts at each place in its first fifth of a second."""
+    """The stream starts at places in its first 345 bytes, about a fifth of a second."""
     ticks = ticks_of(name)[:60]
     stream = b"".join(ticks)
     sent = frames_of(stream)
@@ -181,7 +181,7 @@ def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
 def test_a_robot_on_a_slope_is_not_misread_for_ever(
     gyro: tuple[int, int, int], imu_only: bool
 ) -> None:
-    """Five degrees of tilt, and −6 on a gyro axis is a false header in every frame."""
+    """At five degrees of tilt, -6 on a gyro axis makes a false header in every frame."""
     random, ticks = Random(3), []
     for tick in range(60):
         accel = tuple(round(random.gauss(mean, 46)) for mean in (1428, 0, -16322))
@@ -204,7 +204,7 @@ def test_one_whole_text_is_enough_to_believe() -> None:
 
 
 def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
-    """Out of step, what follows speaks against them all."""
+    """Out of step, the nonsense behind the two frames speaks against both of them."""
     look_alike = encode(DeltaFrame(1, 2, 3, 4)) + encode(DeltaFrame(5, 6, 7, 8))
     assert decoded([look_alike + b"\x00" + LEAD_IN * 2]) == [REST] * 4
 
@@ -245,7 +245,7 @@ def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> 
 
 
 def test_a_pose_is_read_in_the_byte_order_asked_for() -> None:
-    """The manual has two readings of it."""
+    """The manual can be read either way."""
     pose = PoseFrame(1000.0, -2.5, 1.0, 9)
     for order in ("big", "little"):
         made = FrameDecoder(order)

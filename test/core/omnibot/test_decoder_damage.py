@@ -37,7 +37,11 @@ from omnibot_driver.core.omnibot.frames import Frame
 def assert_back_in_step(
     sent: list[tuple[int, Frame]], hurt: set[int], found: list[Frame], place: int
 ) -> None:
-    """``hurt``: numbers of the frames whose bytes are changed or pushed apart."""
+    """Check that only frames near the damage are missing, and that none is false.
+
+    ``hurt``: numbers of the frames whose bytes are changed or pushed apart. ``place``: position of
+    the damage, for messages.
+    """
     truth = [frame for _, frame in sent]
     assert is_subsequence(found, truth), f"a false frame came out: damage at {place}"
     first, last = min(hurt), max(hurt)
@@ -50,7 +54,7 @@ def assert_back_in_step(
 
 
 def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
-    """Each byte of the frames 20 to 45 with the number of its frame."""
+    """Return the position of each byte of frames 20 to 44, with the number of its frame."""
     ends = [at for at, _ in sent[1:]]
     return [
         (place, number)
@@ -62,11 +66,11 @@ def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
-    """One byte lost anywhere, when what follows is in hand; in step again within two frames."""
+    """Any byte may be lost; the decoder is in step again within two frames."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     for place, number in damage_places(sent):
-        # Losing either of two equal neighbours is one damage: it may be either's frame.
+        # Losing either of two equal neighbours has one result: the damage may be in either frame.
         hurt = set() if stream[place] in (stream[place - 1], stream[place + 1]) else {number}
         found = decoded([stream[:place] + stream[place + 1 :]])
         if hurt:
@@ -96,9 +100,7 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """There is no checksum, so a gyro that reads like a header may cause one, once in thirty
-    times.
-    """
+    """Without a checksum, a gyro that reads like a header may cause one: once in 30 times."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -114,7 +116,7 @@ def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
     "extra", [b"\x00", b"P", b"\xfa", b"\xff", b"\xff\xff", b"\xff\xfd", b"Pau"]
 )
 def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes) -> None:
-    """They may have been its own; the frame behind them comes out."""
+    """The bytes may belong to that frame; the frame behind them is returned."""
     other = ImuFrame((100, 90, -16300), (4, 5, 6))
     after = LEAD_IN * 2
     found = decoded([LEAD_IN + encode(other) + extra + after])
@@ -124,7 +126,7 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """Byte by byte as well: the FF that completes it waits for the byte that betrays it."""
+    """Byte by byte too: the FF that completes it is held until the next byte shows the error."""
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
     for number in range(8, 24):
@@ -145,7 +147,7 @@ def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(
 def test_rubbish_between_frames_costs_a_few_frames_only(
     pieces: list[Frame | bytes], data: st.DataObject
 ) -> None:
-    """Six ordinary frames later the decoder is in step, for any past."""
+    """After six ordinary frames the decoder is in step, whatever came before."""
     stream = b"".join(piece if isinstance(piece, bytes) else encode(piece) for piece in pieces)
     made = FrameDecoder()
     for chunk in data.draw(chunkings(stream)):
@@ -161,7 +163,7 @@ def test_rubbish_between_frames_costs_a_few_frames_only(
 @pytest.mark.parametrize("count", [0, 42, 255])
 @pytest.mark.parametrize("ends", ["text", "data"])
 def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> None:
-    """A pause in the middle of the data, and a start in the middle of the texts."""
+    """The board pauses amid data, or starts amid texts, and two reads split the stream anywhere."""
     text = encode(PausedFrame(count))
     stream = LEAD_IN + text + (LEAD_IN if ends == "data" else text)
     last = [REST, REST] if ends == "data" else [PausedFrame(count)]
@@ -173,7 +175,7 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A lost letter anywhere but in the number, where it cannot be seen, or of its blank."""
+    """A lost digit cannot be detected, so it is left out; a text without its blank is valid."""
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
     found = decoded([LEAD_IN + hurt + LEAD_IN + LEAD_IN])
@@ -188,7 +190,7 @@ def test_a_damaged_text_does_not_come_out(place: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
-    """A cable that was out for a moment: what comes now does not finish what was begun then."""
+    """The line was interrupted: later bytes must not complete the frame that was begun before."""
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
     after = [DeltaFrame(1, 2, 3, 4), REST, PoseFrame(1.0, 2.0, 3.0, 4), DeltaFrame(5, 6, 7, 8)]
@@ -198,7 +200,7 @@ def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: int) -> None:
-    """The rest of the frame never comes; the text does, after the boot."""
+    """The rest of the frame never comes, but the text after the boot is decoded at once."""
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
     assert made.feed(b"Paused: 0 \n", 0.3) == [PausedFrame(0)]
@@ -207,7 +209,7 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
-    """It was us who slept: what is held goes on in what was waiting, wherever it was cut."""
+    """The reader was late, not the line: the backlog completes the frame that was cut."""
     ticks = ticks_of(name)
     stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
     sent = [frame for _, frame in frames_of(stream)]
@@ -223,7 +225,7 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """No later bytes contradicted it."""
+    """Bytes that contradict the frame did not come."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -232,7 +234,7 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """A whole frame in step comes out; partial or unproved frames do not."""
+    """A complete frame in step is returned, but partial and unproved frames are not."""
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()
     in_step.feed(LEAD_IN + encode(doubtful), 0.0)
@@ -247,7 +249,7 @@ def test_flush_tells_what_can_still_be_told() -> None:
 
 
 def test_a_decoder_goes_on_after_a_flush() -> None:
-    """It decodes the next whole frames."""
+    """The next complete frames are decoded."""
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:5], 0.0)
     made.flush(0.0)

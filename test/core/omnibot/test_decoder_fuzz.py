@@ -1,15 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whatever comes in, at whatever times, in whatever chunks, the decoder
+"""Fuzz tests of the decoder, with any bytes, at any times, in any chunks.
+
+The decoder
 
 * never raises;
-* gives out frames that stand in the stream, byte for byte, in that order, none of them overlapping;
+* returns frames that are in the stream, byte for byte, in order and without overlap;
 * holds less than ``DOUBT_BYTES`` between calls, and nothing after ``flush``;
-* does work in proportion to the bytes, however they are chosen and cut;
+* does work in proportion to the number of bytes, however they are chosen and cut;
+* returns all frames of a stream in which nothing is lost or added, in any chunks.
 
-and of a stream in which nothing is lost or added, the same frames in any chunking: all of them.
-
-How rarely a frame is wrong that stands in a damaged stream is measured in ``test/integrity``.
+``test/integrity`` measures how rarely a damaged stream gives a wrong frame.
 """
 
 from typing import Any
@@ -27,12 +28,13 @@ from omnibot_driver.core.omnibot.frames import LENT, Frame, decode_measured, mea
 
 REST = encode(ImuFrame((120, -80, -16384), (1, 2, 3)))
 THIRD = 300
-"""Bytes: much longer than what is held, so that the second third begins with full buffers."""
+"""Number of bytes in a third of a stream: much more than is held, so the second third begins with
+full buffers."""
 times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
 
 
 def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
-    """Compared as text, for a pose may hold a NaN."""
+    """Check that the stream holds these frames in order; compare texts, as a pose may hold NaN."""
     at = 0
     for frame in found:
         while at < len(stream):
@@ -50,7 +52,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
 ) -> None:
-    """The decoder raises nothing and holds little."""
+    """Nothing raises, and fewer than ``DOUBT_BYTES`` are held between calls."""
     made, now, found = FrameDecoder(), 0.0, []
     for chunk in data.draw(chunkings(stream)):
         now += data.draw(times_s)
@@ -65,7 +67,7 @@ def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
 def test_all_frames_between_silences_come_in_any_chunks(
     bursts: list[list[Frame]], data: st.DataObject
 ) -> None:
-    """A board that is paused and un-paused: texts between frames, cut anywhere."""
+    """The board is paused and started again, and chunks end anywhere."""
     made, now = FrameDecoder(), 0.0
     found = made.feed(REST * 2, now)[2:]
     for burst in bursts:
@@ -78,7 +80,7 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """Near the one before, counted on: unless it ends in a byte that the next header may lend."""
+    """Its content and count follow the frame before; only a last byte like a header's must wait."""
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
     for number, frame in enumerate(frames, 1):
@@ -92,9 +94,7 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 
 @pytest.mark.parametrize("word", [-6, -5, -4])
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
-    """The header needs an acceleration below a fifth of gravity, and -6 in the accelerometer's
-    words.
-    """
+    """Below 0.5 g, -6 (FF FA) among the accelerations looks like an IMU header."""
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
     assert found.count(fall) == (word != -6)
@@ -124,8 +124,9 @@ ADVERSARIES = {
 def work(
     monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
 ) -> tuple[list[int], int]:
-    """Looks at a byte and edges of the trellis, all until the end of each chunk, beginning with 0;
-    and the most bytes held.
+    """Return the work until the end of each chunk, beginning with 0, and the most bytes held.
+
+    The work is the number of looks at a byte and of edges in the trellis.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 
@@ -158,7 +159,7 @@ def work(
 def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, pattern: bytes, chunk_length: int, pause_s: float
 ) -> None:
-    """The last third of the bytes is no more work than the second, when all buffers are full."""
+    """All buffers are full after the first third, so the last costs no more than the second."""
     stream = pattern * (THIRD // len(pattern))
     if chunk_length < THIRD:
         sums, most = work(monkeypatch, stream * 3, chunk_length, pause_s)
@@ -179,7 +180,7 @@ def test_work_is_linear_and_memory_bounded(
 def test_no_repeated_pattern_costs_much_more_than_another(
     pattern: bytes, chunk_length: int
 ) -> None:
-    """A bounded number of edges for each byte."""
+    """The number of edges in the trellis is bounded for each byte."""
     stream = pattern * (1000 // len(pattern))
     with pytest.MonkeyPatch.context() as patch:
         sums, _ = work(patch, stream, chunk_length)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards that send their deltas at another rate than 25 Hz, and a driver that knows it."""
+"""Boards that send deltas at another rate than 25 Hz, with a driver that is set to that rate."""
 
 import math
 from itertools import pairwise
@@ -27,7 +27,7 @@ EVERY_PERIOD = pytest.mark.parametrize("period_s", DELTA_PERIODS_S)
 
 
 def driving(period_s: float, *, seconds: float = 3.0, **settings: object) -> Bench:
-    """A robot that turns in circles, and has for some time."""
+    """Return a bench whose robot has been driving in circles for ``seconds``."""
     bench = Bench(BoardSettings(running=True, delta_period_s=period_s, **settings))  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -51,7 +51,7 @@ def off_by_m(bench: Bench) -> float:
 @EVERY_PERIOD
 @pytest.mark.parametrize("frame", ["earth", "body", "wheel_counts"])
 def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str) -> None:
-    """0.3 m/s, -0.1 m/s and 0.4 rad/s, and nothing is taken for lost."""
+    """The robot drives at 0.3 m/s, -0.1 m/s and 0.4 rad/s, and nothing is counted as lost."""
     bench = driving(period_s, frame=frame)
     begun, readings = len(bench.odometry), sum(isinstance(e, ImuEstimate) for e in bench.events)
     drive(bench, 5.0)
@@ -78,7 +78,7 @@ def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str
 
 @EVERY_PERIOD
 def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s: float) -> None:
-    """Every frame of it, and none is thought odd for its place."""
+    """Every frame is returned, and the order of frames causes no fault."""
     board = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
     ticks = [board.step() for _ in range(600)]
     stream = b"".join(ticks)
@@ -98,7 +98,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 
 
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
-    """Four and five are not; at 25 Hz it is the other way round."""
+    """At 25 Hz, four IMU frames to a delta and five deltas to a pose are expected instead."""
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
     for schedule, right in ((Schedule(0.1), True), (Schedule(), False)):
@@ -114,7 +114,7 @@ def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_1
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """This holds at 10 Hz and 25 Hz, and over the wrap of SEQ."""
+    """The rate is 10 Hz, and SEQ wraps in the longest gap."""
     for seed in range(3):
         on = Line(
             BoardSettings(running=True, delta_period_s=TEN_HZ_S, frame=frame, seed=seed), seed=seed
@@ -141,7 +141,7 @@ def test_a_lost_delta_is_bridged_and_settled() -> None:
 
 @EVERY_PERIOD
 def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
-    """This holds over any number of wraps."""
+    """SEQ wraps several times in the longest gaps."""
     schedule = Schedule(period_s)
     for lost in (0, 1, 7, 200, 256, 300, 1000):
         sequence = Sequence(schedule)
@@ -153,7 +153,7 @@ def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
 
 @pytest.mark.parametrize("period_s", [period_s for period_s in DELTA_PERIODS_S if period_s >= 0.04])
 def test_a_restart_shows_in_the_count(period_s: float) -> None:
-    """It begins anew where going on does not fit the time."""
+    """If counting had continued, a count of 1 would not fit a gap of 1.5 s."""
     sequence = Sequence(Schedule(period_s))
     for count in range(100):
         sequence.delta(count, count * period_s)
@@ -162,7 +162,7 @@ def test_a_restart_shows_in_the_count(period_s: float) -> None:
 
 @pytest.mark.parametrize("action", [Request.RESET, "pause", "unplugged"])
 def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> None:
-    """A reset, a pause, another plug."""
+    """The board is reset, paused and started, or connected again."""
     bench = driving(TEN_HZ_S)
     bench.run(2.0)
     begun = off_by_m(bench)
@@ -183,7 +183,7 @@ def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> N
 
 @EVERY_PERIOD
 def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
-    """Two that were lost on the line do not make it; the bytes in between are IMU frames then."""
+    """Fewer may be lost on the line, so IMU frames alone do not change the mode sooner."""
     schedule = Schedule(period_s)
     assert schedule.imus_alone > max(24, 6 * schedule.imus_per_delta)
     assert ModeTracker(schedule).imus_to_come == schedule.imus_alone
@@ -201,7 +201,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
-    """The board's order of frames tells: the last one before a delta, and the delta."""
+    """By the order of frames, 23 bytes were the last IMU frame before a delta, and the delta."""
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)
     for _ in range(3):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bytes that made no frame, and the frames that they were."""
+"""Frames that were lost, inferred from bytes that were not a frame."""
 
 import pytest
 from hypothesis import given
@@ -13,7 +13,7 @@ kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
 
 
 def nominal(imus: int) -> FrameSchedule:
-    """A second under way; this many IMU frames came after a pose."""
+    """Return a schedule after one second of nominal mode, and ``imus`` IMU frames after a pose."""
     rhythm = FrameSchedule()
     for _ in range(5):
         for _ in range(5):
@@ -32,12 +32,12 @@ def nominal(imus: int) -> FrameSchedule:
 def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     imus: int, skipped: int, lost: int
 ) -> None:
-    """A delta among them is none."""
+    """A delta among the damaged bytes is not counted."""
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
 
 def test_a_damaged_pose_is_no_imu_frame() -> None:
-    """It has the length of one."""
+    """Its length of 15 bytes is close to the 14 bytes of an IMU frame."""
     rhythm = nominal(0)
     for _ in range(5):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -46,7 +46,7 @@ def test_a_damaged_pose_is_no_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """The delta in between is lost, and its SEQ counts what came before it."""
+    """An IMU frame and a delta are missing before the pose."""
     rhythm = nominal(0)
     for _ in range(4):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -58,7 +58,7 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """This holds after a delta as well."""
+    """This holds although deltas came before: 30 IMU frames in a row show the mode."""
     rhythm = nominal(0)
     for _ in range(30):
         rhythm.hear(ImuFrame, 0)
@@ -67,7 +67,7 @@ def test_imu_frames_alone_are_all_that_was_lost() -> None:
 
 @given(st.lists(st.tuples(kinds, st.integers(0, 500))))
 def test_any_order_of_frames_is_borne(heard: list[tuple[type, int]]) -> None:
-    """There are never more IMU frames lost than there were bytes for."""
+    """At most one IMU frame is counted as lost for each seven bytes."""
     rhythm = FrameSchedule()
     skipped = lost = 0
     for kind, count in heard:

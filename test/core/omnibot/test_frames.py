@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver's codec against bytes typed by hand from the manual."""
+"""The codec, against bytes typed by hand from the manual."""
 
 import math
 import struct
@@ -82,7 +82,7 @@ FRAME_TABLES: dict[str, tuple[str, Frame | CommandFrame]] = {
 
 @pytest.mark.parametrize(("typed", "frame"), APPENDIX.values(), ids=APPENDIX.keys())
 def test_each_command_of_the_appendix_is_these_bytes(typed: str, frame: CommandFrame) -> None:
-    """The ten useful serial commands of the manual, out and back."""
+    """These are the ten useful serial commands of the manual, encoded and decoded."""
     assert encode(frame) == bytes.fromhex(typed)
     assert decode(bytes.fromhex(typed)) == frame
 
@@ -91,13 +91,13 @@ def test_each_command_of_the_appendix_is_these_bytes(typed: str, frame: CommandF
 def test_each_frame_table_is_laid_out_as_in_the_manual(
     typed: str, frame: Frame | CommandFrame
 ) -> None:
-    """Header, words with the most significant byte first, SEQ last; out and back."""
+    """Header, words with the most significant byte first, SEQ last; encoded and decoded."""
     assert encode(frame) == bytes.fromhex(typed)
     assert decode(bytes.fromhex(typed)) == frame
 
 
 def test_the_pose_may_be_little_endian() -> None:
-    """The manual's other reading turns round each float, and nothing else."""
+    """The manual can also be read so that the bytes of each float are reversed."""
     typed = bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 09")
     frame = PoseFrame(1000.0, -2.5, 1.0, 9)
     assert encode(frame, "little") == typed
@@ -119,7 +119,7 @@ def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
 
 @pytest.mark.parametrize("text", [b"Paused: 3\n", b"Paused: 3 \r\n", b"Paused: 3\r\n"])
 def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
-    """How a firmware ends its lines is not worth losing the mode for."""
+    """The mode must not be missed because a firmware ends its lines differently."""
     assert decode(text) == PausedFrame(3)
 
 
@@ -132,19 +132,19 @@ def test_the_named_frames_and_letters_are_those_of_the_manual() -> None:
 
 @given(frames, byte_orders)
 def test_decoding_undoes_encoding(frame: Frame, order: ByteOrder) -> None:
-    """Every frame the board may send survives the wire."""
+    """Every frame that the board may send survives the wire."""
     assert decode(encode(frame, order), order) == frame
 
 
 @given(commands)
 def test_decoding_undoes_encoding_of_commands(command: CommandFrame) -> None:
-    """Every frame the board may be sent survives the wire."""
+    """Every command that may be sent to the board survives the wire."""
     assert decode(encode(command)) == command
 
 
 @given(st.one_of(frames, commands), byte_orders)
 def test_encoding_undoes_decoding(frame: Frame | CommandFrame, order: ByteOrder) -> None:
-    """No byte of a frame is without meaning."""
+    """Every byte of a frame has a meaning, so decoding keeps it."""
     data = encode(frame, order)
     assert encode(decode(data, order), order) == data
 
@@ -159,7 +159,7 @@ def test_the_simulated_board_speaks_the_same_language(
     theta: float,
     order: ByteOrder,
 ) -> None:
-    """Two codecs written apart from one manual agree on every value."""
+    """Two codecs, written separately from one manual, agree on every value."""
     assert decode(wire.imu_frame(a, b)) == ImuFrame(a, b)
     assert decode(wire.delta_frame(a, seq)) == DeltaFrame(*a, seq)
     assert decode(wire.pose_frame(x, y, theta, seq, order), order) == PoseFrame(x, y, theta, seq)
@@ -168,7 +168,7 @@ def test_the_simulated_board_speaks_the_same_language(
 
 @given(commands)
 def test_the_simulated_board_understands_every_command(command: CommandFrame) -> None:
-    """What the driver encodes is what the board reads."""
+    """The board's receiver reads what the driver encodes."""
     receiver = CommandReceiver(awake=True)
     understood = [receiver.feed(byte, 0.0, control_frames=True) for byte in encode(command)]
     assert understood[-1] == (wire.ControlFrame(command.mode, command.values),)
@@ -176,7 +176,7 @@ def test_the_simulated_board_understands_every_command(command: CommandFrame) ->
 
 
 def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
-    """The decoder does not judge values."""
+    """Decoding does not judge values."""
     frame = decode(bytes.fromhex("FF FC 7F C0 00 00 FF 80 00 00 00 00 00 00 01"))
     assert isinstance(frame, PoseFrame)
     assert math.isnan(frame.x)
@@ -185,7 +185,7 @@ def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
 
 @given(pose_frames, st.floats(allow_nan=False, allow_infinity=False))
 def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -> None:
-    """A double that no float holds is our own misuse."""
+    """A number beyond the range of a 32-bit float is a mistake of the caller."""
     wide = PoseFrame(x, pose.y, pose.theta, pose.seq)
     try:
         rounded = float32(x)
@@ -262,7 +262,7 @@ def test_bytes_of_no_frame_are_refused(data: bytes) -> None:
 
 @given(frames, st.binary(max_size=20), st.binary(max_size=20))
 def test_a_frame_is_measured_wherever_it_stands(frame: Frame, before: bytes, after: bytes) -> None:
-    """Its own length once it is whole, and INCOMPLETE at every length before."""
+    """The result is the length of a complete frame, and INCOMPLETE for any part of it."""
     data = encode(frame)
     assert measure(before + data + after, len(before)) == len(data)
     for length in range(1, len(data)):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When a line was idle: the time that bytes take to arrive is not a pause."""
+"""Detection of an idle line: the time in which bytes arrive is not a pause."""
 
 import pytest
 
@@ -18,7 +18,7 @@ from omnibot_driver.core.omnibot.gaps import InterFrameGaps
     ],
 )
 def test_bytes_of_a_slow_line_take_longer(baudrate: int, pause_s: float, idle: bool) -> None:
-    """24 bytes of ten bits: 2.08 ms at 115200 baud, 6.25 ms at 38400; 4 ms more are a pause."""
+    """24 bytes take 2.08 ms at 115200 baud, 6.25 ms at 38400; 4 ms more are a pause."""
     pauses = InterFrameGaps(10 / baudrate)
     pauses.read(pause_s, 24, 5, now=1.0)
     assert bool(pauses.gaps) is idle

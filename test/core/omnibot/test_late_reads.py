@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A read is not an arrival: a reader that is late loses nothing of a good line."""
+"""Late readers: a read is not an arrival, so a late read loses nothing of a good line."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -17,11 +17,12 @@ from omnibot_driver.core.omnibot.frames import Frame
 Reads = Iterator[tuple[bytes, float]]
 
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
-"""8.8 ms and whole ticks are how long a line is idle, or seems to be where frames are lost."""
+"""Durations of a stop in s: a line is idle for 8.8 ms, or seems idle for multiples of 10 ms where
+frames are lost."""
 
 
 def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
-    """All bytes, and when each has come."""
+    """Return all bytes, and the arrival time of each in s."""
     times = [
         number * TICK_S + (place + 1) * BYTE_S
         for number, tick in enumerate(ticks)
@@ -33,9 +34,10 @@ def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
 def stopped(
     ticks: Sequence[bytes], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
 ) -> Reads:
-    """A reader takes pieces as they come, and stops once for ``stop_s``, after ``place`` bytes.
+    """Yield the reads of a reader that takes pieces as they come, and stops once for ``stop_s``.
 
-    It then reads all that has come, at most ``most`` bytes at once, one read every 20 µs.
+    It stops after ``place`` bytes. Then it reads all that has arrived, at most ``most`` bytes at
+    once, one read every 20 µs.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -66,7 +68,7 @@ def heard(reads: Reads) -> list[Frame]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """Between any two bytes of five frames, after half a second in which it was prompt."""
+    """The stop is between any two bytes of five frames, after half a second of prompt reads."""
     ticks = ticks_of(name)[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))
@@ -78,7 +80,7 @@ def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: floa
 @pytest.mark.parametrize("most", [1, 8, 32])
 @pytest.mark.parametrize("piece", [1, 4])
 def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: int) -> None:
-    """What it has not read yet is not lost."""
+    """Bytes that have not been read yet are not lost."""
     ticks = ticks_of("driving")[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))
@@ -96,7 +98,7 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:
-    """A true shock and a late read together are not damage."""
+    """A real shock and a late read together are not damage."""
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
     for seq, (accel, gyro, delta) in enumerate(content):
@@ -123,7 +125,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """The last frame before it comes out too, since a paused board owes no other."""
+    """The last frame before it is returned too, since a paused board is not due to send another."""
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"
     made = FrameDecoder()
@@ -138,7 +140,7 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter that fills its piece keeps the end of one text until the next one begins."""
+    """An adapter that collects 8 bytes holds the end of one text until the next begins."""
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
     for number in range(0, len(texts), 8):
@@ -147,8 +149,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The front of one frame and the back of a later one are not a frame: at rest only time says
-    so, and it was read by a prompt reader."""
+    """The front of one frame and the back of a later one are not a frame.
+
+    At rest only the pause between them shows it, and a prompt reader measured that pause.
+    """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
         hurt = [*ticks[:50], ticks[50][:cut], b"", ticks[52][cut:], *ticks[53:]]
@@ -164,7 +168,7 @@ def test_where_the_line_was_cut_a_pause_still_tells() -> None:
 
 
 def test_a_line_that_was_out_for_long_is_read_anew() -> None:
-    """What comes then does not finish what had begun."""
+    """Bytes after the interruption do not complete the frame that was begun before it."""
     made = FrameDecoder()
     found = made.feed(LEAD_IN + encode(REST)[:5], 0.0)
     other = ImuFrame((100, -70, -16300), (2, 3, 4))
@@ -190,12 +194,12 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""After the first two bytes of a delta: milliseconds since the read before, and bytes."""
+"""Reads after the first two bytes of a delta: milliseconds since the read before, and bytes."""
 
 
 @pytest.mark.parametrize("name", LATE_ENDS)
 def test_a_late_end_belongs_to_its_frame_where(name: str) -> None:
-    """Read beside busy loops, from an adapter beside busy loops."""
+    """The reads are like those of a busy computer, directly or through an adapter."""
     made, ticks = FrameDecoder(), ticks_of("driving")[:96]
     found, now = [], 0.0
     for number, tick in enumerate(ticks):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings that the wire contradicts: told in one sentence, and only when they are wrong."""
+"""Settings that the data contradicts: one sentence of advice, and only if they are wrong."""
 
 import math
 
@@ -21,11 +21,11 @@ from omnibot_driver.simulator.omnibot import (
 )
 
 DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
-"""0.3 m/s ahead, 0.2 m/s to the left, 0.4 rad/s."""
+"""Command for 0.3 m/s forward, 0.2 m/s to the left, 0.4 rad/s."""
 
 
 def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0) -> str | None:
-    """The advice after a drive on this board with these settings."""
+    """Return the advice after a drive on this board with these settings."""
     sender, driver = SimulatedBoard(board), OmniBot(settings)
     sender.receive(DRIVE)
     for tick in range(round(seconds * 100)):
@@ -54,9 +54,7 @@ def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str) -> None:
 @pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
 @pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
 def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
-    """It takes three seconds, and the message names the right one; the right one causes no
-    message.
-    """
+    """Three seconds are enough; the advice names the right period, which itself causes none."""
     board = BoardSettings(running=True, delta_period_s=sent_s)
     told = advice(board, OmniBotSettings(delta_period_s=read_s), 3.0)
     if sent_s == read_s:
@@ -71,7 +69,7 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
 @pytest.mark.parametrize("period_s", [0.04, 0.1])
 @pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
-    """The arrival of the deltas contradicts it, whatever the number of missing IMU frames."""
+    """Missing IMU frames suggest another period, but the arrival times of deltas contradict it."""
     sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
     driver = OmniBot(OmniBotSettings(delta_period_s=period_s))
     line = FaultyLine(LineFaults(lose=lose), 5)
@@ -83,7 +81,7 @@ def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("lose", [0.001, 0.005])
 def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
-    """A delta is a witness also where an IMU frame before it is missing."""
+    """A delta is evidence even where an IMU frame before it is missing."""
     sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     driver = OmniBot(OmniBotSettings())
     line = FaultyLine(LineFaults(lose=lose), 5)
@@ -95,7 +93,7 @@ def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
 
 @pytest.mark.parametrize("reads_s", [0.016, 0.1, 0.5, 1.0])
 def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
-    """A busy computer, and an adapter that collects."""
+    """The computer is busy, or an adapter collects, so one read may bring a second of data."""
     sender, driver = SimulatedBoard(BoardSettings(running=True)), OmniBot(OmniBotSettings())
     held, read_at = b"", 0.0
     for tick in range(3000):
@@ -113,13 +111,13 @@ def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: f
 def test_nobody_is_told_anything_of_right_settings(
     frame: str, order: str, start: BoardPose
 ) -> None:
-    """Far away, at zero, and where one coordinate is nothing but the rounding of the board."""
+    """The robot starts far away, at zero, or with a coordinate that is a rounding error."""
     board = BoardSettings(running=True, frame=frame, pose_byte_order=order, initial_pose=start)
     assert advice(board, OmniBotSettings(delta_frame=frame, pose_byte_order=order), 30.0) is None
 
 
 def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
-    """An impossible pose does not move it."""
+    """A pose that is impossible does not move the odometry."""
     start = BoardPose(3000.0, -2000.0, 0.0)
     bench = Bench(BoardSettings(running=True, pose_byte_order="little", initial_pose=start))
     bench.open()
@@ -134,7 +132,7 @@ def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
 
 
 def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
-    """A robot that drove off from zero, read in the wrong byte order: deltas come for days."""
+    """Read in the wrong byte order, poses are useless while deltas come for days."""
     suspicion = MisconfigurationChecks()
     zero, absurd = PoseFrame(0.0, 0.0, 0.0, 1), PoseFrame(1e-30, 1e-30, 1e-30, 1)
     suspicion.posed(zero, PoseReading(0.0, 0.0, 0.0), "big")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The mode table: what S, P, R and what is heard do."""
+"""The mode table: what S, P, R and received data do in each mode."""
 
 from itertools import product
 
@@ -24,7 +24,7 @@ HEARD = [happening for happening in Happening if happening.name.startswith("HEAR
 
 
 def tracker(mode: Mode) -> ModeTracker:
-    """A tracker that believes this, for what it heard."""
+    """Return a tracker that is in this mode after received frames."""
     made = ModeTracker()
     heard = {Mode.UNKNOWN: [], Mode.PAUSED: [PAUSED], Mode.NOMINAL: [DELTA]}
     for frame in heard.get(mode, [IMU] * 25):
@@ -34,26 +34,26 @@ def tracker(mode: Mode) -> ModeTracker:
 
 
 def test_the_public_names_are_those_of_the_interface() -> None:
-    """They are what ~/state says."""
+    """They are the values of ~/state."""
     assert {mode.value for mode in Mode} == {"connecting", "paused", "nominal", "imu_only"}
     assert {mode for mode in Mode if mode.running} == {Mode.NOMINAL, Mode.IMU_ONLY}
 
 
 def test_nothing_is_believed_before_anything_is_heard() -> None:
-    """A new line is unknown."""
+    """The mode on a new line is unknown."""
     assert ModeTracker().mode is Mode.UNKNOWN
 
 
 @pytest.mark.parametrize(("happening", "mode"), list(product(HEARD, Mode)))
 def test_the_table_is_total_over_what_is_heard(happening: Happening, mode: Mode) -> None:
-    """Bytes can come in any mode, and never raise."""
+    """Data can arrive in any mode, and never raises."""
     made = tracker(mode)
     made.apply(happening)
     assert made.mode is TRANSITIONS[happening][mode]
 
 
 def test_only_p_is_ever_refused() -> None:
-    """S is harmless, R is always allowed."""
+    """S is harmless, and R is always allowed."""
     missing = {
         happening
         for happening, mode in product(Happening, Mode)
@@ -77,7 +77,7 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """It is not believed sooner: five missing deltas may be chance, six may not."""
+    """It does not change sooner, as five missing deltas may be chance, but six may not."""
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
         made.hear(DELTA)
@@ -90,7 +90,7 @@ def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
 
 
 def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
-    """There are four IMU frames to a delta, and up to five deltas are lost in a row."""
+    """Even if five deltas in a row are lost, only 24 IMU frames come in between."""
     made = ModeTracker()
     for tick in range(1, 400):
         made.hear(IMU)
@@ -108,7 +108,7 @@ def test_r_makes_the_mode_unknown(mode: Mode) -> None:
 
 
 def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
-    """A reboot starts the count anew."""
+    """A reboot sets the count to zero."""
     made = tracker(Mode.NOMINAL)
     for _ in range(24):
         made.hear(IMU)
@@ -119,7 +119,7 @@ def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
-    """S and P may be lost: the belief waits for what is heard."""
+    """S and P may be lost, so the mode changes only with received data."""
     made = tracker(mode)
     made.apply(Happening.SENT_START)
     assert made.mode is mode
@@ -130,7 +130,7 @@ def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", [Mode.UNKNOWN, Mode.PAUSED])
 def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
-    """It is a toggle: there it would start the board, or have an unknown effect."""
+    """P is a toggle: it would start a paused board, or have an unknown effect."""
     made = tracker(mode)
     with pytest.raises(RequestRefused, match=mode.value):
         made.apply(Happening.SENT_PAUSE)
@@ -141,7 +141,7 @@ def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
 def test_an_illegal_request_raises_and_changes_nothing(
     happenings: list[Happening | Frame],
 ) -> None:
-    """A tracker that was refused something goes on exactly like one that was not asked."""
+    """A tracker that refused a request continues exactly like one that did not get it."""
     asked, spared = ModeTracker(), ModeTracker()
     for happening in happenings:
         if not isinstance(happening, Happening):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What stands on the line to the board besides the manual's frames, and the words it avoids."""
+"""Zeros before frames to the board, and payload words that it could take for commands."""
 
 import re
 
@@ -29,19 +29,19 @@ def payload(a: int, b: int, c: int) -> bytes:
 
 
 def words_of(counts: list[float]) -> tuple[int, ...]:
-    """As they fit the wire."""
+    """Return the words for these counts, scaled down to fit the wire."""
     return nearest(*slow(counts, MAX_WORD))
 
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """A parser that lost the frame's own header finds nothing to act on."""
+    """A parser that missed the frame's own header finds nothing to act on."""
     assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
 
 
 @given(st.tuples(words, words, words).filter(lambda w: min(w) > -32768))
 def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
-    """Only words that could act are changed."""
+    """Only words that could act as a letter or header are changed."""
     if not re.search(rb"[SPR]|\xff\xfe", payload(*counts)):
         assert harmless(counts) == counts
 
@@ -50,7 +50,7 @@ def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
 def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
     counts: tuple[float, float, float],
 ) -> None:
-    """Beyond 20,479 a high byte may be a letter; the nearest value without it is further."""
+    """Beyond 20,479 the high byte may be a letter; the nearest harmless value is further away."""
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5
 
@@ -76,7 +76,7 @@ def test_words_that_would_act_take_the_nearest_value_that_does_not(
 
 
 def test_everything_goes_out_behind_zeros() -> None:
-    """They complete whatever was begun, and wake a board that has booted."""
+    """They complete a frame that was cut, and wake a board that has booted."""
     board = OmniBot(OmniBotSettings())
     zeros = "00 00 00 00 00 00 00 00 "
     stop = zeros + "ff fe 02 00 00 00 00 00 00"
@@ -91,7 +91,7 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """Another place half a metre away was not requested."""
+    """The nearest harmless goal may be 0.26 m away, which is not what was requested."""
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset the board"):
         encoder.drive_to(Pose(x_mm / 1000, 0.0, 0.0))
@@ -99,7 +99,7 @@ def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
 
 
 def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
-    """The coordinate 0.083 m has the byte 53 hex, a letter."""
+    """83 mm are 53 hex, the letter S."""
     encoder = CommandEncoder(OmniBotSettings())
     assert bare(encoder.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")
 
@@ -108,7 +108,7 @@ def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
 @example([0.5, -0.5, 1.5])
 @example([0.49999999999999994, 2.5, -2.4999])
 def test_words_are_the_nearest_integers(counts: list[float]) -> None:
-    """Never cut off towards zero."""
+    """They are not truncated towards zero."""
     for word, count in zip(words_of(counts), counts, strict=True):
         assert isinstance(word, int)
         assert abs(word - count) <= 0.5
@@ -116,13 +116,13 @@ def test_words_are_the_nearest_integers(counts: list[float]) -> None:
 
 @given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
 def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
-    """A robot does not drift backwards."""
+    """Otherwise a robot would drift."""
     mirrored = words_of([-count for count in counts])
     assert mirrored == tuple(-word for word in words_of(counts))
 
 
 def test_halves_are_rounded_away_from_zero() -> None:
-    """The even ones, too: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
+    """This includes halves above even numbers: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
     assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
 
 
@@ -130,7 +130,7 @@ def test_halves_are_rounded_away_from_zero() -> None:
 @example([1e308, -1e308, 5e307])
 @example([32768.0, 100.0, 0.0])
 def test_words_fit_16_bits_and_keep_the_direction(counts: list[float]) -> None:
-    """What is too large is scaled down as a whole, to half a count."""
+    """Counts that are too large are scaled down by one factor, exact to half a count."""
     words = words_of(counts)
     assert all(-32768 <= word <= 32767 for word in words)
     largest = max(map(abs, counts))

@@ -72,7 +72,7 @@ AnyFrame = ImuFrame | DeltaFrame | PoseFrame | PausedFrame | CommandFrame
 
 
 def command(mode: int) -> Callable[..., CommandFrame]:
-    """How the three words of a control frame with this mode are read."""
+    """Return a function that makes a control frame with this mode from its three words."""
     return lambda a, b, c: CommandFrame(mode, (a, b, c))
 
 
@@ -95,7 +95,7 @@ SENT_AS_IT_IS = {
 
 
 class Example(NamedTuple):
-    """An example is one line of the document."""
+    """One example of the document: a line of a code block."""
 
     data: bytes
     word: str
@@ -104,12 +104,12 @@ class Example(NamedTuple):
 
 
 def code_lines(text: str) -> list[str]:
-    """The lines inside fenced code blocks."""
+    """Return the lines inside fenced code blocks."""
     return [line for block in text.split("```")[1::2] for line in block.splitlines()[1:]]
 
 
 def examples(text: str) -> list[Example]:
-    """The examples of a text in order."""
+    """Return the examples of a text, in order."""
     found = filter(None, map(EXAMPLE.fullmatch, code_lines(text)))
     return [
         Example(
@@ -123,7 +123,7 @@ def examples(text: str) -> list[Example]:
 
 
 def section(title: str) -> str:
-    """The document's text under one heading of the second level."""
+    """Return the document's text under one heading of the second level."""
     return next(part for part in DOCUMENT.split("\n## ") if title in part.partition("\n")[0])
 
 
@@ -143,9 +143,7 @@ def test_each_example_means_what_the_document_says(example: Example) -> None:
 
 
 def test_no_line_of_bytes_escapes_the_check() -> None:
-    """In a code block, each line that begins with bytes or has an arrow after them is an
-    example.
-    """
+    """In a code block, a line that begins with bytes or has an arrow must be an example."""
     suspects = re.compile(r"\s*[0-9A-Fa-f]{2}( [0-9A-Fa-f]{2})*(\s|$)|.*\s->\s")
     lines = [line for line in code_lines(DOCUMENT) if suspects.match(line)]
     assert [line for line in lines if not EXAMPLE.fullmatch(line)] == []
@@ -164,7 +162,7 @@ def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
 
 
 def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None:
-    """The remark gives the wish, the bytes are the driver's."""
+    """The remark gives the commanded motion, and the bytes are the driver's."""
     wishes = [
         (example, [float(part.split()[0]) for part in example.remark.split(",")])
         for example in EXAMPLES
@@ -178,7 +176,7 @@ def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None
 
 
 def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() -> None:
-    """The framing example is real: the line of two true frames holds the false ones."""
+    """The bytes of the two true frames contain the false ones, which are not decoded."""
     in_section = examples(section("Why framing is hard"))
     false = [example for example in in_section if example.remark.startswith("false")]
     true = [example for example in in_section if example not in false]
@@ -191,7 +189,7 @@ def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() 
 
 
 def test_the_parameters_that_carry_a_decision_exist_with_the_stated_defaults() -> None:
-    """The table of decisions that are parameters agrees with the driver's own."""
+    """The document's table of decisions agrees with the driver's declared parameters."""
     rows = re.findall(r"^\| `([a-z]\w+)` \| ([^|]+?) \|", DOCUMENT, re.MULTILINE)
     assert {name for name, _ in rows} == DECISIONS
     for name, value in rows:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the board's counters tell: losses, wraps, pauses, restarts."""
+"""What the board's counters reveal: losses, wraps, pauses and restarts."""
 
 import pytest
 from hypothesis import given
@@ -12,7 +12,7 @@ counts = st.integers(0, 255)
 
 
 def begun(count: int) -> Sequence:
-    """Half a minute under way, the last delta with this count at 100 s, no pose since."""
+    """Return a sequence whose only delta had this count, at 100 s, and without a pose since."""
     sequence = Sequence()
     sequence.delta(count, 100.0)
     return sequence
@@ -22,20 +22,20 @@ def begun(count: int) -> Sequence:
 def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
     count: int, lost: int, late_s: float
 ) -> None:
-    """The line may be late by up to half a second."""
+    """Arrival times may be wrong by up to 0.4 s."""
     step = begun(count).delta((count + 1 + lost) % 256, 100.0 + 0.04 * (lost + 1) + late_s)
     assert step == Step(lost)
 
 
 @given(counts, st.floats(0.0, 5.0))
 def test_the_next_count_is_no_gap_however_late_it_comes(count: int, late_s: float) -> None:
-    """A host that hangs loses nothing by that."""
+    """A host that hangs for up to five seconds does not lose a delta by that."""
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The time is not known; only at the very wrap it may as well be a restart."""
+    """Its duration is unknown; a count of 0 after 255 may also be a restart."""
     sequence = begun(count)
     sequence.pause()
     step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
@@ -44,7 +44,7 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """The first deltas may be lost, unless the old count continues as well."""
+    """The first deltas may be lost, but a count that also continues the old one is ambiguous."""
     sequence = begun(count)
     sequence.pause()
     goes_on = (lost - count - 1) % 256
@@ -54,12 +54,12 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """Zero after two seconds is not a gap of (255 - count) x 40 ms."""
+    """As a gap, a count of 0 would take (255 - count) x 40 ms, which is not two seconds."""
     assert begun(count).delta(0, 102.0).restarted
 
 
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
-    """They are not lost a second time with the next delta."""
+    """Deltas that a pose includes are not counted as lost again by the next delta."""
     sequence = Sequence()
     for count in range(10):
         sequence.delta(count, count * 0.04)
@@ -72,7 +72,7 @@ def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_wit
 
 
 def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
-    """Twelve deltas are missing, and both poses among them came in: twelve in all."""
+    """Twelve deltas are missing: two poses reveal five each, and the next delta the other two."""
     sequence = Sequence()
     for count in range(10):
         sequence.delta(count, count * 0.04)
@@ -84,7 +84,7 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """Two seconds after 205 the count is at zero anyway, but not that of the poses."""
+    """Two seconds after 205 a continued SEQ is near 0 too, but the count of poses is not."""
     sequence = Sequence()
     for count in range(206):
         sequence.delta(count, count * 0.04)
@@ -98,7 +98,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
-    """An example is two deltas to a pose."""
+    """Here a pose comes with every second delta."""
     sequence = Sequence()
     for count in range(20):
         assert sequence.delta(count, count * 0.04) == Step(0)
@@ -107,7 +107,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_no_gap() -> None:
-    """It would be longer than the time since the last delta."""
+    """As a gap it would be longer than the time since the last delta."""
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -124,7 +124,7 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
 
 
 def test_a_count_that_comes_again_is_no_wrap() -> None:
-    """Framing made a delta up, ahead of its time; the true one has the same count."""
+    """A false delta came too early; the true one has the same count."""
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)
     assert sequence.delta(10, 100.04, imus=2) == Step(0)
@@ -133,7 +133,7 @@ def test_a_count_that_comes_again_is_no_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """A clock that slept while the line did not."""
+    """The host's clock stood still while the line did not."""
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
     assert sequence.delta(111, 100.08, imus=4) == Step(100)
@@ -141,7 +141,7 @@ def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it
 
 
 def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
-    """Its count is near zero, but the next true one goes on from where the board was."""
+    """Its count is near zero, but the next true delta continues the old count."""
     sequence = begun(88)
     assert sequence.delta(1, 100.02, imus=1).restarted
     assert sequence.delta(89, 100.04, imus=2) == Step(0)
@@ -149,7 +149,7 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """What was held in doubt came out late, and the next delta soon after it."""
+    """Frames that were held as uncertain come out late, and the next delta soon after them."""
     sequence = Sequence()
     for count in range(11):
         sequence.delta(count, count * 0.04, imus=4)
@@ -163,7 +163,7 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """Few IMU frames came since, for a count that would say that many deltas are missing."""
+    """Four IMU frames arrived since, too few for the deltas that a continued count would lack."""
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted

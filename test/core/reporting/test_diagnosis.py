@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Verdicts: each fault alone raises its own status, says what to do, and is forgotten in time."""
+"""Diagnostics: each fault raises its own status, says what to do, and is cleared in time."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,7 +25,7 @@ Change = Callable[["Robot"], None]
 
 
 class Robot:
-    """A healthy one, in figures; ``seconds`` lets time pass, with a verdict every second."""
+    """The figures of a healthy robot; ``seconds`` lets time pass, with a diagnosis each second."""
 
     def __init__(self) -> None:
         self.diagnosis = Diagnosis("its power, cable and baudrate")
@@ -87,7 +87,7 @@ class Robot:
 
 
 def test_a_healthy_robot_is_all_ok() -> None:
-    """The statuses show rates, skew, delay and gravity."""
+    """The figures shown are rates, skew, delay and gravity."""
     robot = Robot()
     assert not robot.troubles
     stream, time = robot.statuses["Stream"].values, robot.statuses["Time"].values
@@ -130,7 +130,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
 def test_each_fault_alone_raises_its_own_status(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """No other status changes; the message says what to do."""
+    """All other statuses stay OK; the message says what to do."""
     robot = Robot()
     fault(robot)
     robot.seconds(5)
@@ -139,7 +139,7 @@ def test_each_fault_alone_raises_its_own_status(
 
 
 def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
-    """The link says what is missing."""
+    """The link's status names the missing line."""
     robot = Robot()
     robot.connect(trouble="the line 'front' is missing: unplugged")
     robot.set(state="connecting")
@@ -150,7 +150,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """One example is the rate of its own odometry."""
+    """An example is the rate of its own odometry."""
     robot = Robot()
     assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
     robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
@@ -166,7 +166,7 @@ HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
 def test_what_happened_is_told_for_a_while_and_then_forgotten(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """The count stays among the figures."""
+    """The count remains visible."""
     robot = Robot()
     fault(robot)
     robot.seconds(round(RECENT_S) - 1)
@@ -176,7 +176,7 @@ def test_what_happened_is_told_for_a_while_and_then_forgotten(
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """Late reads lose nothing; they are the cause where the rates are off."""
+    """Late reads lose nothing; they are named as the cause if rates are wrong."""
     robot = Robot()
     for second in range(12):
         robot.connect(waited_s=0.3 * second)
@@ -192,7 +192,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 
 
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
-    """A computer that was busy at first shows one for up to a minute, and is not blamed for it."""
+    """A busy computer may show such a skew for up to a minute after the start."""
     robot = Robot()
     robot.set(skew_ppm=-119.0)
     robot.seconds(70)
@@ -226,7 +226,7 @@ def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     ],
 )
 def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str, Level]) -> None:
-    """What cannot be known is stale; in IMU-only mode no displacements are expected."""
+    """What is unknown is stale; in IMU-only mode displacements are not expected."""
     robot = Robot()
     robot.set(state=state)
     if state == "imu_only":
@@ -250,7 +250,7 @@ def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
 
 
 def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
-    """The status stays OK and says that the command is limited."""
+    """The status stays OK and shows that commands are limited."""
     robot = Robot()
     robot.command(source="cmd_vel", age_s=0.05)
     robot.seconds(1)
@@ -266,7 +266,7 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
 
 
 def test_what_a_board_does_not_send_has_no_figures() -> None:
-    """There is no IMU status, and there are no rates and counts of IMU and poses."""
+    """Its diagnostics have no IMU status, and no rates and counts of IMU and poses."""
     robot = Robot()
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}
     robot.set(board=BoardFigures(rates_hz=rates_hz))

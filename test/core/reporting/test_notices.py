@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Sentences for a user: they name only what the board has."""
+"""Messages for users: they name only parts that the board has."""
 
 from dataclasses import replace
 

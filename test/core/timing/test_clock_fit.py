@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The line over the ticks, between made-up bounds in s."""
+"""The line fitted through ticks, with artificial bounds in s."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ NEVER_BELOW = -1.0
 def followed(
     skew: float, above: Callable[[int], float], below: Callable[[int], float], *, ticks: int = 2000
 ) -> tuple[ClockFit, float]:
-    """A line that saw bounds so far above and below the truth; how late it is at the end."""
+    """Fit a line with bounds this far above and below the truth; return it and its last error."""
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
     for tick in range(ticks):
@@ -27,7 +27,7 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """The slope is found as well."""
+    """The slope is right as well."""
     line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
     assert late_s == pytest.approx(0.0, abs=1e-6)
     assert line.slope_s == pytest.approx(PERIOD_S * (1.0 + skew), rel=1e-6)
@@ -40,7 +40,7 @@ def test_between_near_bounds_the_middle_is_taken() -> None:
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """A timer's: for eight seconds they move past the truth by 0.1 ms a second."""
+    """The bounds are those of a timer: for 8 s they drift from the truth by 0.1 ms per second."""
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
         start = 0.0 if drift[-1] > 0.0 else 0.87e-3
@@ -54,7 +54,7 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """One in twenty, by little or by much: what they did not bring may have come long before."""
+    """One read in twenty is late; data missing in such a read may have come long before it."""
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
             0.0,

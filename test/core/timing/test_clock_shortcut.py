@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The clock's short way for ticks that come when they are due changes no stamp."""
+"""The clock's shortcut for ticks that arrive when due: it changes no stamp."""
 
 import random
 
@@ -26,12 +26,12 @@ pytestmark = interpreted_only
 WHOLE = SampleBoundary(0, 0.0, 13 * 10 / 115200)
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 SETTLING = 40
-"""Ticks after which a calm line is believed to be one."""
+"""Number of ticks after which a calm line is recognized."""
 Read = tuple[list[Reading], float, SampleBoundary | None]
 
 
 def stamped(reads: list[Read], *, quick: bool) -> tuple[list[list[float]], str]:
-    """The stamps of each read, and the final state of the clock."""
+    """Return the stamps of each read, and the final state of the clock."""
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(device_clock, "CALM", -1.0)
@@ -52,7 +52,7 @@ def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:
 @pytest.mark.parametrize("loss", [0.0, 0.01])
 @pytest.mark.parametrize("chunker", [ftdi(latency_s=0.001), bursts, singles, crumbs])
 def test_lines_are_stamped_alike(chunker: Chunker, loss: float) -> None:
-    """This holds for good and bad lines alike."""
+    """This holds with and without losses."""
     reads = heard(Board(seconds=12, skew=1e-4, loss=loss), chunker, 1)
     assert stamped(reads, quick=True) == stamped(reads, quick=False)
 
@@ -76,7 +76,7 @@ surprises = st.tuples(
     edges,
     st.sampled_from([0, 1, 14]),
 )
-"""Readings, ticks since the last, how late they come; and a number of normal reads behind them."""
+"""Readings, ticks since the last, their lateness in s; and the number of normal reads after."""
 
 
 @pytest.mark.slow
@@ -85,7 +85,7 @@ surprises = st.tuples(
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """They follow a normal beginning, which enables the short way; all arrive late afterwards."""
+    """They follow a normal start, which enables the shortcut; everything after them is late."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:
@@ -101,7 +101,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the tests above would compare nothing."""
+    """Otherwise the tests above would compare the slow way with itself."""
     compared = 0
     compare = DeviceClock._compare
 

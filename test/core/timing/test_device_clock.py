@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Sampling times against the truth of a generated line, in simulated time."""
+"""Sampling times compared with the true ones of a generated line, in simulated time."""
 
 import math
 import random
@@ -29,14 +29,14 @@ COUNTS = 16384 / STANDARD_GRAVITY
 
 @dataclass(slots=True)
 class Stamped:
-    """The stamps of one stream: (tick, stamp, arrival) of samples and of displacements."""
+    """Stamps of one stream: (tick, stamp, arrival), times in s, of samples and displacements."""
 
     board: Board
     samples: list[tuple[int, float, float]] = field(default_factory=list)
     displacements: list[tuple[int, float, float]] = field(default_factory=list)
 
     def errors(self, since_s: float = SETTLED_S) -> list[float]:
-        """Stamp minus true sampling time, from this time after the board began."""
+        """Return stamp minus true sampling time in s, from ``since_s`` after the board's start."""
         return [
             stamp_s - self.board.sampled_at(tick)
             for tick, stamp_s, _ in self.samples
@@ -44,7 +44,7 @@ class Stamped:
         ]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Standard deviation of the stamps' differences from 10 ms."""
+        """Return the standard deviation of the stamps' differences from 10 ms, in s."""
         return math.sqrt(
             fmean(
                 (after[1] - before[1] - 0.01) ** 2
@@ -55,7 +55,7 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Half the width of the narrowest interval that holds this part: error up to one constant."""
+    """Return half the width of the narrowest interval that contains this part of the errors."""
     ordered = sorted(errors)
     count = math.ceil(part * len(ordered))
     ends = zip(ordered, ordered[count - 1 :], strict=False)
@@ -63,7 +63,7 @@ def spread(errors: list[float], part: float = 0.99) -> float:
 
 
 def stamp(clock: DeviceClock, board: Board, reads: Iterable[Read]) -> Stamped:
-    """Decode and stamp; on the way, what is true of every stamp is asserted."""
+    """Decode and stamp the reads; assert what must hold for every stamp."""
     stamped = Stamped(board)
     omnibot = OmniBot(OmniBotSettings())
     last_s = -math.inf
@@ -119,7 +119,7 @@ def test_stamps_are_even_and_true_to_a_constant(
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     skew: float, imu_only: bool
 ) -> None:
-    """A free timer of 16 ms: for seconds nothing on the line tells 0.8 ms of delay from none."""
+    """With a free timer of 16 ms, delays of 0.8 ms and of none look equal for seconds."""
     stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -128,7 +128,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [bursts, singles], ids=["bursts", "bytes"])
 def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Chunker) -> None:
-    """Both error and evenness are compared."""
+    """Both the error and the evenness are compared."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=1e-4), chunker, seed)
         arrivals = Stamped(stamped.board, [(tick, at, at) for tick, _, at in stamped.samples])
@@ -137,7 +137,7 @@ def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Ch
 
 
 def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> None:
-    """240 ticks at once; the line is known after some of them."""
+    """A block has 240 ticks; the clock's line is fitted after some blocks."""
     for seed in SEEDS:
         stamped = run(Board(seconds=120, skew=1e-4, imu_only=True), blocks, seed)
         assert stamped.unevenness(since_s=20.0) < 0.2e-3
@@ -147,7 +147,7 @@ def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, crumbs])
 def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
-    """Ten stalls of 5 to 200 ms: what came meanwhile is stamped as if there had been none."""
+    """After each of ten stalls of 5 to 200 ms, the data that waited is stamped as usual."""
     for seed in SEEDS:
         rng = random.Random(seed)
         stalls = [(1003 + 1.5 * k, 1003 + 1.5 * k + rng.uniform(0.005, 0.2)) for k in range(10)]
@@ -159,7 +159,7 @@ def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) -> None:
-    """Three seconds of frames in the first read, cut at any place, get their own times."""
+    """Three seconds of frames in the first read, cut anywhere, get their own times."""
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4, imu_only=imu_only, first_tick=seed * 1234 + 3)
         rng = random.Random(seed)
@@ -173,7 +173,7 @@ def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) 
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, singles])
 def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
-    """One frame in a hundred is lost; the displacements' counter says how many were."""
+    """One frame in 100 is lost; the counter of displacements shows how many."""
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01), chunker, seed)
         errors = stamped.errors()
@@ -182,15 +182,14 @@ def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
 
 
 def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
-    """The line delivers at once, so a tick of silence is a tick."""
+    """This line delivers at once, so 10 ms of silence is one missing tick."""
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01, imu_only=True), bursts, seed)
         assert spread(stamped.errors()) < 0.5e-3
 
 
 def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
-    """A network hands over what it held packet by packet: the first of ten took no tenth of the
-    time."""
+    """A network may deliver held packets one by one within a fraction of their usual time."""
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4)
         rng = random.Random(seed)
@@ -205,7 +204,7 @@ def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
 
 @pytest.mark.parametrize("skew", [*SKEWS, 0.0])
 def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
-    """Positive where it is faster than ours, so that its ticks are shorter."""
+    """It is positive if the board's crystal is faster, so that its ticks are shorter."""
     clock = DeviceClock(0.01)
     for tick in range(1000):
         clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew))
@@ -214,7 +213,7 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """Phase and SEQ are new; the stamps increase and keep the same constant."""
+    """Its phase and SEQ are new; the stamps increase and keep the same constant offset."""
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
     before = run(Board(seconds=10, skew=skew), adapter, 1, clock=clock)
@@ -227,7 +226,7 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
-    """Five seconds without a byte, and SEQ does not say so: the line is laid anew."""
+    """Five seconds are silent, which SEQ does not show; the clock's line is fitted again."""
     clock = DeviceClock(0.01)
     run(Board(seconds=10), bursts, 1, clock=clock)
     after = run(Board(seconds=10, begins_at=1015.0055), bursts, 2, clock=clock)
@@ -236,7 +235,7 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
 
 
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
-    """The adapter may cut between the two frames."""
+    """The adapter may cut the stream between the two frames."""
     for chunker in (ftdi(restarted_by_data=True), bursts, singles):
         stamped = run(Board(seconds=10), chunker, 0)
         stamp_of = {tick: stamp_s for tick, stamp_s, _ in stamped.samples}
@@ -245,7 +244,7 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """The false count lies two ticks after a true one, and two before the next."""
+    """The false restart is two ticks after a true displacement, and two before the next."""
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)
@@ -277,7 +276,7 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Counters and framing may claim anything."""
+    """Counters and frame boundaries may claim anything."""
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
     for passed_s, readings, edge in reads:
@@ -289,7 +288,7 @@ def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
 
 
 def test_displacements_alone_are_stamped_forwards() -> None:
-    """Should every sample be lost, or a board have none."""
+    """All samples may be lost, or a board may have none."""
     clock = DeviceClock(0.01)
     reading = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     stamps_s = [clock.stamps([reading], 1000.0 + 0.04 * k)[0] for k in range(500)]
@@ -298,7 +297,7 @@ def test_displacements_alone_are_stamped_forwards() -> None:
 
 
 def test_stamps_increase_even_where_arrival_times_do_not() -> None:
-    """A coarse clock reads them all at once; their stamps differ by a microsecond each."""
+    """A coarse clock shows the same time for all; the stamps differ by a microsecond each."""
     clock = DeviceClock(0.01)
     stamps_s = [clock.stamps([SAMPLE], 5.0)[0] for _ in range(100)]
     assert all(before < after for before, after in pairwise(stamps_s))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An adapter that holds everything back for seconds, loses what it cannot hold, and then works."""
+"""An adapter that holds data back for seconds, loses what exceeds its buffer, and recovers."""
 
 import math
 from itertools import pairwise
@@ -14,11 +14,11 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySet
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 HELD = 4095
-"""Bytes, 2.4 s of them; later ones are lost."""
+"""Size of the adapter's buffer in bytes, 2.4 s of data; later bytes are lost."""
 
 
 def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:
-    """The robot drives on meanwhile, for it receives nothing either."""
+    """Hold back all data for some ticks; the robot drives on, since it receives nothing either."""
     bench = Bench(BoardSettings(frame=frame))
     bench.open()
     bench.run_until_state("nominal")
@@ -50,7 +50,7 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 @example(ticks=592, frame="earth", vx=0.0)
 @example(ticks=291, frame="body", vx=0.4)
 def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
-    """This holds for any loss, and if the stamps know little of it; soon nothing is missing."""
+    """This holds for any loss, also if the stamps do not show it; the pose is right soon after."""
     bench = through_a_stall(ticks, frame, vx, 0.5)
     fastest_mps = OdometrySettings().fastest_mps
     for before, after in pairwise(bench.odometry):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of a Fejemis: what is written to the boards, and what is refused."""
+"""The parameters of a Fejemis: values written to the boards, and values that are refused."""
 
 import math
 from pathlib import Path
@@ -19,7 +19,7 @@ def check(**given: Any) -> dict[str, Any]:
 
 
 def test_nothing_is_written_by_default() -> None:
-    """A board's own settings are not ours to overwrite."""
+    """The driver must not overwrite a board's own settings."""
     values = check()
     assert settings(values).written == {}
     assert kinematics(values).track_m == 0.4
@@ -27,7 +27,7 @@ def test_nothing_is_written_by_default() -> None:
 
 
 def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
-    """``confw``, ``confs``, ``fwoffset``: radii, gear, ticks, B; B and F; degrees."""
+    """``confw`` has radii, gear, ticks, B; ``confs`` has B and F; ``fwoffset`` is in degrees."""
     values = check(
         wheel_radii=[0.08, 0.081],
         gear=20.0,
@@ -56,19 +56,19 @@ def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
     ],
 )
 def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
-    """A part alone is refused: the rest would have to be guessed."""
+    """A part alone is refused, since the rest would have to be guessed."""
     with pytest.raises(ParameterError, match=f"parameter '{missing}' must be set too"):
         check(**given)
 
 
 def test_a_track_alone_is_refused() -> None:
-    """Two commands have it, and neither has it alone."""
+    """Two commands contain it, both with other values."""
     with pytest.raises(ParameterError, match="set 'steering_distance' too"):
         check(track=0.4)
 
 
 def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
-    """By another name too."""
+    """This includes a port that is given by another name."""
     link = tmp_path / "front"
     link.symlink_to("/dev/ttyACM0")
     for front in ("/dev/ttyACM0", str(link)):

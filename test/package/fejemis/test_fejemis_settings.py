@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of other packages for a Fejemis, and its description: its topics, limits and frames."""
+"""Settings of other packages for a Fejemis, and its description: topics, limits, frames, sizes."""
 
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
-    """No pose, no acceleration, and no yaw of the board, which holds the gyro already."""
+    """Poses, accelerations and the board's yaw, which includes the gyro, are not fused."""
     ekf = load("ekf_fejemis.yaml")["/**"]["ros__parameters"]
     fused = {
         sensor: {s for s, used in zip(STATES, ekf[f"{sensor}_config"], strict=True) if used}
@@ -45,7 +45,7 @@ def test_the_filter_fuses_velocities_and_the_gyro() -> None:
 
 
 def test_nav2_plans_and_follows_curves_forward() -> None:
-    """One radius in planner and controller; the limits are the driver's."""
+    """Planner and controller have the same radius; the limits are the driver's."""
     file = load("nav2_fejemis.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     planner = file["planner_server"]["ros__parameters"]["GridBased"]
@@ -81,7 +81,7 @@ def test_the_description_has_every_joint_and_frame_of_the_driver() -> None:
 
 
 def test_the_description_has_the_drivers_sizes() -> None:
-    """Track and wheelbase of the defaults."""
+    """Track and wheelbase are those of the default parameters."""
     joints = description().joint_map
     left, right = (joints[name].origin.xyz for name in WHEELS.joints)
     assert left[1] - right[1] == WHEELS.track_m
@@ -89,7 +89,7 @@ def test_the_description_has_the_drivers_sizes() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """In both maps."""
+    """Both maps have the same footprint."""
     file = load("nav2_fejemis.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]

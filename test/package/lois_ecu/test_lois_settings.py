@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of other packages for the LOIS ECU: its topics, its limits, and no way sideways."""
+"""Settings of other packages for the LOIS ECU: its topics, limits, and no sideways motion."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_heading() -> None:
-    """No pose of the wheels; the heading as it was at first, as odom begins."""
+    """The wheels' pose is not fused; the heading is relative to its first value, as odom is."""
     ekf = load("ekf_lois_ecu.yaml")["/**"]["ros__parameters"]
     fused = {
         sensor: {s for s, used in zip(STATES, ekf[f"{sensor}_config"], strict=True) if used}
@@ -40,7 +40,7 @@ def test_the_filter_fuses_velocities_and_the_heading() -> None:
 
 
 def test_nav2_keeps_to_the_drivers_limits_and_does_not_move_sideways() -> None:
-    """Whatever limits a speed in Nav2 is the driver's default."""
+    """Each speed limit in Nav2 is the driver's default."""
     file = load("nav2_lois_ecu.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     assert mppi["motion_model"] == "DiffDrive"
@@ -58,7 +58,7 @@ def test_nav2_keeps_to_the_drivers_limits_and_does_not_move_sideways() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """In both maps; a robot with this board is not round."""
+    """Both maps have the same footprint, which is not round for this board."""
     file = load("nav2_lois_ecu.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]

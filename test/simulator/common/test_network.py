@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The bad network of a simulated board, in board time."""
+"""The faulty network of a simulated board, in board time."""
 
 import pytest
 from hypothesis import given
@@ -12,7 +12,7 @@ SENT = [b"%d" % number for number in range(5000)]
 
 
 def through(path: NetworkPath, every_s: float = 0.01) -> list[bytes]:
-    """What arrives of one datagram every so often, looked at whenever one is sent, then later."""
+    """Send one datagram every ``every_s``; return what arrives, in order of arrival."""
     arrived = []
     for number, datagram in enumerate(SENT):
         path.send(datagram, number * every_s)
@@ -21,7 +21,7 @@ def through(path: NetworkPath, every_s: float = 0.01) -> list[bytes]:
 
 
 def test_a_good_network_hands_over_at_once_and_in_order() -> None:
-    """No datagram is lost, doubled or counted."""
+    """No datagram is lost, duplicated or counted."""
     network = FaultyNetwork()
     network.to_board.send(b"hello", 1.0)
     assert network.to_board.arrived(1.0) == [b"hello"]
@@ -31,7 +31,7 @@ def test_a_good_network_hands_over_at_once_and_in_order() -> None:
 
 
 def test_datagrams_are_lost_at_the_given_rate() -> None:
-    """Each direction loses its own."""
+    """Losses in one direction are independent of those in the other."""
     network = FaultyNetwork(NetworkFaults(lose=0.1))
     there, back = through(network.to_board), through(network.from_board)
     assert set(there) <= set(SENT)
@@ -41,7 +41,7 @@ def test_datagrams_are_lost_at_the_given_rate() -> None:
 
 
 def test_datagrams_come_twice_at_the_given_rate() -> None:
-    """The copy follows at once if there is no delay."""
+    """Without a delay, the copy directly follows the original."""
     path = NetworkPath(NetworkFaults(duplicate=0.1), "seed")
     arrived = through(path)
     assert len(arrived) - len(SENT) == path.duplicated == pytest.approx(500, rel=0.2)
@@ -49,7 +49,7 @@ def test_datagrams_come_twice_at_the_given_rate() -> None:
 
 
 def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
-    """It ends at the first look after it."""
+    """With polls every 10 ms and delays up to 50 ms, each datagram is at most 60 ms late."""
     path = NetworkPath(NetworkFaults(delay_s=0.05), "seed")
     for number in range(200):
         now_s = number * 0.01
@@ -62,7 +62,7 @@ def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
 
 @given(st.integers(0, 5))
 def test_equal_seeds_meet_equal_fates(seed: int) -> None:
-    """Different seeds give different losses."""
+    """Another seed gives other faults."""
     faults = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.1)
     first = through(FaultyNetwork(faults, seed).to_board)
     assert first == through(FaultyNetwork(faults, seed).to_board)

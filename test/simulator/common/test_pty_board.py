@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Any board of one line in real time behind a real pseudo-terminal."""
+"""Any board with one serial line, in real time behind a real pseudo-terminal."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ PATIENCE_S = 20.0
 
 
 class Ticker:
-    """Says its tick in every one, in 26 bytes; ``sent`` is all that it said."""
+    """A board that sends its tick number in each tick, as 26 bytes; ``sent`` is all of them."""
 
     channels, tick_s = (Channel(),), 0.01
 
@@ -27,7 +27,7 @@ class Ticker:
         self.sent = bytearray()
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
-        """It does not listen."""
+        """Ignore all input."""
 
     def advance(self) -> list[Packet]:
         self.tick += 1
@@ -44,14 +44,14 @@ class Ticker:
 
 
 def all_of(port: int) -> Iterator[bytes]:
-    """What a terminal holds: one read may return less."""
+    """Yield all bytes that a terminal holds, because one read may return fewer."""
     with suppress(BlockingIOError):
         while data := os.read(port, 8192):
             yield data
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """The board runs on; what is left unread is what a terminal holds, and it is the oldest."""
+    """The board continues; the terminal holds the oldest bytes, up to its limit."""
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -67,7 +67,7 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 class Clock:
-    """A clock that waiting and working move, in place of the machine's."""
+    """A replacement of the computer's clock that advances only when the board waits or works."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_s = 0.0
@@ -81,12 +81,12 @@ class Clock:
     def wait(
         self, _read: object, _write: object, _error: object, timeout_s: float
     ) -> tuple[list[int], list[int], list[int]]:
-        """Let the time-out pass, with nothing to read at its end."""
+        """Advance by the timeout, as ``select`` does when nothing arrives."""
         self.now_s += timeout_s
         return [], [], []
 
     def board(self, cost_s: Callable[[int], float]) -> Ticker:
-        """A board that takes this long to make its n-th tick."""
+        """Return a board whose n-th tick takes ``cost_s(n)`` to compute."""
         clock = self
 
         class SlowBoard(Ticker):
@@ -102,7 +102,7 @@ class Clock:
 def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A tick that takes 3 ms, or now and then 25 ms, leaves the thousandth at ten seconds."""
+    """With ticks that take 3 ms, and each 50th 25 ms, the 999th tick is at 9.99 s."""
     clock = Clock(monkeypatch)
     board = clock.board(lambda tick: 0.025 if tick % 50 == 0 else 0.003)
     with PtyBoard(board) as pty:
@@ -111,7 +111,7 @@ def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
 
 
 def test_a_long_standstill_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After the machine has slept for an hour the board goes on at its pace."""
+    """After the computer slept for an hour, the board continues at one tick per 10 ms."""
     clock = Clock(monkeypatch)
     with PtyBoard(clock.board(lambda tick: 3600.0 if tick == 10 else 0.0)) as pty:
         assert pty.wait_for(lambda board: board.tick >= 30, PATIENCE_S)
@@ -119,13 +119,13 @@ def test_a_long_standstill_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_waiting_for_what_does_not_come_ends_with_false() -> None:
-    """A predicate that never holds is given up."""
+    """The predicate is never true, so the timeout of 0.05 s ends the wait."""
     with PtyBoard(Ticker()) as pty:
         assert not pty.wait_for(lambda board: False, 0.05)
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """An exception in the thread is not swallowed; it is the cause of what is raised."""
+    """An exception in the thread is not lost: it is the cause of the RuntimeError raised."""
 
     class BrokenBoard(Ticker):
         def advance(self) -> list[Packet]:
@@ -143,13 +143,13 @@ def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
 
 @pytest.mark.usefixtures("nothing_left_behind")
 def test_no_thread_and_no_descriptor_is_left_behind() -> None:
-    """After the exit the process holds what it held before."""
+    """After the exit, the process has the threads and descriptors that it had before."""
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: board.tick > 2, PATIENCE_S)
 
 
 def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
-    """The symbolic link exists exactly as long as the board runs."""
+    """The symbolic link exists exactly while the board runs."""
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)) as pty:
         assert os.readlink(link) == pty.path
@@ -157,7 +157,7 @@ def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
 
 
 def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
-    """What a killed simulator left behind does not stand in the way."""
+    """A link that a killed simulator left behind does not prevent a new start."""
     link = tmp_path / "board"
     link.symlink_to("/dev/pts/no-such-terminal")
     with PtyBoard(Ticker(), str(link)) as pty:
@@ -165,7 +165,7 @@ def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
 
 
 def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
-    """A second simulator on the same link keeps it when the first one ends."""
+    """If a second simulator replaces the link, the first one does not remove it when it ends."""
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)):
         second = PtyBoard(Ticker(), str(link))
@@ -178,7 +178,7 @@ def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "link to a file"])
 def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> None:
-    """The error names the path and what to do, and no descriptor is left open."""
+    """The error message says what to do, and no descriptor stays open."""
     precious = tmp_path / "precious"
     precious.write_text("data")
     link = precious
@@ -196,7 +196,7 @@ def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> N
 
 
 def test_a_link_that_cannot_be_made_is_named_with_what_to_do(tmp_path: Path) -> None:
-    """The link's folder does not exist."""
+    """Here the folder of the link does not exist."""
     with (
         pytest.raises(FileNotFoundError, match=r"nowhere/board .*choose a folder that exists"),
         PtyBoard(Ticker(), tmp_path / "nowhere/board"),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards of several channels and of datagrams behind their lines, in simulated time."""
+"""Boards with several channels or datagrams behind their lines, in simulated time."""
 
 import pytest
 from toy_lines import DRIVE, FRONT, ToyLines
@@ -12,7 +12,7 @@ from omnibot_driver.simulator.common.wired import WiredBoard
 
 
 def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
-    """A line that is cut between two calls is whole; another channel does not break it."""
+    """A command split over two calls is complete, even if another channel receives in between."""
     wired = WiredBoard(ToyLines())
     wired.receive(b"go 0.", 0.0, DRIVE)
     wired.receive(b"angle 30\n", 0.0, FRONT)
@@ -22,7 +22,7 @@ def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
 
 
 def test_each_channel_has_its_own_faults() -> None:
-    """One line is cut, the other whole."""
+    """One line loses all bytes, the other none."""
     cut = FaultyLine(LineFaults(lose=1.0))
     wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
     packets = [packet for _ in range(20) for packet in wired.advance()]
@@ -45,7 +45,7 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """Ten seconds of board time pass at once."""
+    """Delays up to 10 s pass without waiting, because they are in board time."""
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
     wired = WiredBoard(board, [network])
@@ -60,7 +60,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """A board's time goes on from its last value."""
+    """Its arrival time continues the clock of the caller, which here began at 1000 s."""
     at: list[float] = []
 
     class Watch(ToyServer):
@@ -75,7 +75,7 @@ def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
 
 
 def test_lines_that_do_not_match_the_channels_are_a_defect() -> None:
-    """There are too few, or lines of the wrong kind."""
+    """One line for two channels, or a line of the wrong kind."""
     for lines in ([FaultyLine()], [FaultyLine(), FaultyNetwork()]):
         with pytest.raises(ValueError, match="do not match"):
             WiredBoard(ToyLines(), lines)

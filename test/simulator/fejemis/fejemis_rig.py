@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Somebody who talks to a simulated Fejemis by typed lines, in simulated time."""
+"""A simulated Fejemis and a host that sends typed lines, in simulated time."""
 
 import re
 
@@ -11,9 +11,10 @@ BEAT = re.compile(r"(;\d\d)?hbt ")
 
 
 class Rig:
-    """``lines``: all that came, with its time and its port, without ends.
+    """A board and its host.
 
-    relays: hands each angle of the front wheel on to drive, as the host is to do.
+    lines: all lines received, with time and port, without line ends.
+    relays: whether the host relays each angle of the front wheel to the drive half.
     """
 
     def __init__(self, *, firmware: Firmware | None = None, **settings: object) -> None:
@@ -27,22 +28,22 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated."""
+        """Simulated time, in s."""
         return self.board.now_s
 
     def booted(self) -> "Rig":
-        """A second after power on."""
+        """Run for a second after power on, and discard the lines received."""
         self.run(1.0)
         self.lines.clear()
         return self
 
     def say(self, port: int, *texts: str) -> None:
-        """Lines as they are typed."""
+        """Send these lines to a port."""
         for text in texts:
             self.board.receive(text.encode("latin-1") + b"\n", self.now, port)
 
     def run(self, seconds: float) -> list[tuple[int, str]]:
-        """What came meanwhile."""
+        """Advance by this time, in s; return the port and text of each line received meanwhile."""
         before = len(self.lines)
         for _ in range(round(seconds / self.board.tick_s)):
             for port, data in self.board.advance():
@@ -57,13 +58,13 @@ class Rig:
             self.say(DRIVE, f"fwl {text.split()[1]}")
 
     def ask(self, port: int, text: str) -> list[str]:
-        """Answers of this port within 10 ms, without heartbeats that were not asked for."""
+        """Send a line; return the replies on its port within 10 ms, without periodic heartbeats."""
         self.say(port, text)
         said = [answer for number, answer in self.run(0.01) if number == port]
         return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]
 
     def drive(self, text: str, seconds: float) -> None:
-        """The same ``rc`` to both, with the angle relayed."""
+        """Send the same ``rc`` to both halves, and relay the angle of the front wheel."""
         self.relays = True
         self.say(FRONT, "sub fwl 15", text)
         self.say(DRIVE, text)

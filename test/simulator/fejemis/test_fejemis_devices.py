@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What hangs on each half of the simulated Fejemis: brush, lift, LEDs, distances, IMU, settings."""
+"""Devices of the simulated Fejemis: brush, lift, LEDs, distances, IMU, stored settings."""
 
 from math import pi
 
@@ -11,7 +11,7 @@ MODULE = "omnibot_driver.simulator.fejemis"
 
 
 def test_brush_and_lift() -> None:
-    """12 s from end to end at 6 V; the voltage ends with its time, or with 0."""
+    """The lift takes 12 s from end to end at 6 V; its voltage ends after its time, or with 0."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")
     rig.run(1.0)
@@ -30,7 +30,7 @@ def test_brush_and_lift() -> None:
 
 
 def test_the_band_and_single_leds() -> None:
-    """0 to 255 of each colour."""
+    """Each colour is limited to 0..255."""
     rig = Rig().booted()
     rig.say(FRONT, "ledb 10 20 300", "led 3 1 2 3")
     rig.run(0.01)
@@ -44,7 +44,7 @@ def test_the_band_and_single_leds() -> None:
 
 
 def test_distances_to_a_wall() -> None:
-    """Far away: 8.19 m, no echo, and the end of the infrared range."""
+    """Without a wall: 8.19 m, no sonar echo, and the end of the infrared range."""
     rig = Rig(front_m=0.5).booted()
     assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]
     assert rig.ask(FRONT, "iri")[0].split()[:3] == ["irc", "0.500", "0.500"]
@@ -56,7 +56,7 @@ def test_distances_to_a_wall() -> None:
 
 
 def test_the_sonar_measures_when_it_is_triggered() -> None:
-    """``hcsr``; until then it repeats itself."""
+    """``hcsr`` triggers it; before that, it repeats the last distance."""
     rig = Rig(front_m=2.0).booted()
     rig.drive("rc 2 0.5 0", 2.0)
     assert rig.ask(DRIVE, "sr04i") == ["sr04 2.000"]
@@ -65,7 +65,7 @@ def test_the_sonar_measures_when_it_is_triggered() -> None:
 
 
 def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
-    """The mean of what it reads becomes its offset."""
+    """The mean reading becomes the offset, so a robot that turns gets a wrong one."""
     rig = Rig().booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -78,7 +78,7 @@ def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
 
 
 def test_the_accelerometer_is_calibrated_as_level() -> None:
-    """``acccal2``; ``acccal`` sets offsets and scales."""
+    """``acccal2`` assumes a level board; ``acccal`` sets offsets and scales."""
     rig = Rig(accel_noise_mps2=0.0).booted()
     rig.say(DRIVE, "acccal2")
     rig.run(1.2)
@@ -90,7 +90,7 @@ def test_the_accelerometer_is_calibrated_as_level() -> None:
 
 
 def test_the_yaw_of_the_imu_follows_the_robot() -> None:
-    """A gyro without bias; a bias that is not calibrated away would add to it."""
+    """The gyro has no bias here; one that is not calibrated would add to the yaw."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 0.0)).booted()
     rig.drive("rc 2 0.3 20", 4.0)
     yaw = float(rig.ask(DRIVE, "imuposei")[0].split()[3])
@@ -98,7 +98,7 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 
 
 def test_the_answer_to_confs_has_the_steering_first() -> None:
-    """``confs B F`` sets it, ``confs F B`` is the answer, in both halves."""
+    """Both halves are set with ``confs B F`` but reply with ``confs F B``."""
     rig = Rig().booted()
     for port in (DRIVE, FRONT):
         rig.say(port, "confs 0.5 0.6")
@@ -107,7 +107,7 @@ def test_the_answer_to_confs_has_the_steering_first() -> None:
 
 
 def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
-    """``eew`` saves, ``eer`` loads, and so does a restart."""
+    """``eew`` saves it; ``eer`` and a restart load it."""
     rig = Rig().booted()
     rig.say(DRIVE, "confw 0.08 0.081 20 64 0.41")
     rig.run(0.01)
@@ -123,7 +123,7 @@ def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
 
 
 def test_id_zero_erases_the_configuration() -> None:
-    """Nothing is saved until the board has an id again."""
+    """The configuration cannot be saved until the board has an id again."""
     rig = Rig().booted()
     rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")
     rig.run(0.01)
@@ -138,7 +138,7 @@ def test_id_zero_erases_the_configuration() -> None:
 
 
 def test_gains_of_the_steering_count() -> None:
-    """``cssteer``, in the order of ``cpsteer``; half the gain is slower."""
+    """``cssteer`` sets them in the order of ``cpsteer``; a lower gain steers more slowly."""
     times = []
     for gain in (43, 10):
         rig = Rig().booted()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How the simulated robot moves: by the manual's equations, not as ``rc`` says."""
+"""Motion of the simulated robot: by the manual's equations, which differ from ``rc`` commands."""
 
 from math import atan2, degrees, hypot, radians
 
@@ -14,7 +14,7 @@ B, F = 0.4, 0.42
 
 
 def steered_degrees(v: float, w: float) -> float:
-    """The manual's angle of the front wheel."""
+    """Return the manual's angle of the front wheel, in degrees."""
     return degrees(atan2(F * w, v))
 
 
@@ -31,14 +31,14 @@ def steered_degrees(v: float, w: float) -> float:
 def test_the_body_moves_by_the_equations_of_the_manual(
     v: float, w: float, speed: float, turn: float
 ) -> None:
-    """Hand-computed; not what ``rc`` says."""
+    """The values are calculated by hand; they are not those that ``rc`` commands."""
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)
     assert (right - left) / B == pytest.approx(turn, abs=1e-4)
 
 
 def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
-    """The same on the whole robot, once its wheel stands across."""
+    """The same equations, on the complete robot, after its front wheel has turned across."""
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 4.0)
     truth = rig.board.truth
@@ -47,14 +47,14 @@ def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
 
 
 def test_from_straight_ahead_a_turn_on_the_spot_surges_forward() -> None:
-    """Both wheels run until the front one stands across."""
+    """Both wheels turn forward until the front wheel is across."""
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 2.0)
     assert hypot(rig.board.truth.x_m, rig.board.truth.y_m) > 0.15
 
 
 def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
-    """An ``rc`` to front alone moves nothing else."""
+    """An ``rc`` to the front half alone moves only the front wheel."""
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0 20")
     rig.run(2.0)
@@ -63,7 +63,7 @@ def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
 
 
 def test_without_the_angle_drive_goes_straight() -> None:
-    """It knows the angle of the wheel only from the relayed lines."""
+    """The drive half knows the angle of the front wheel only from relayed lines."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.5 30")
     rig.run(1.0)
@@ -71,7 +71,7 @@ def test_without_the_angle_drive_goes_straight() -> None:
 
 
 def test_no_command_ends_by_itself() -> None:
-    """A host that is lost leaves the robot driving."""
+    """The board has no watchdog: without its host, the robot still drives after 20 s."""
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
     rig.relays = False
@@ -81,7 +81,7 @@ def test_no_command_ends_by_itself() -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
-    """The wheel takes the angle of the same curve."""
+    """The front wheel takes the angle of the same curve driven forward."""
     rig = Rig(firmware=Firmware(sums=False, reverse="mirrored")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth
@@ -96,7 +96,7 @@ def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
-    """The wheel stands across, and the outer wheel runs backward."""
+    """The front wheel is across, and the outer wheel turns backward."""
     rig = Rig(firmware=Firmware(sums=False, reverse="clamped")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth
@@ -106,7 +106,7 @@ def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
 
 
 def test_the_steering_follows_a_small_step_at_12_radians_a_second() -> None:
-    """The manual's controller: 63 % after about a twelfth of a second, and no overshoot."""
+    """As the manual's controller: 63 % after about 1/12 s, without overshoot."""
     rig = Rig(angle_noise_deg=0.0).booted()
     rig.say(FRONT, "rc 2 1 10")
     wanted = steered_degrees(1.0, radians(10))
@@ -121,7 +121,7 @@ def test_the_steering_follows_a_small_step_at_12_radians_a_second() -> None:
 
 
 def test_the_odometry_of_the_board_is_where_the_robot_is() -> None:
-    """On wheels of the size that the board knows."""
+    """The true wheels have the sizes that the board assumes."""
     rig = Rig().booted()
     for text in ("rc 2 0.3 0", "rc 2 0.2 20", "rc 2 0.2 -40"):
         rig.drive(text, 2.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What each half of the simulated Fejemis does beside driving, and what befalls it alone."""
+"""Functions of each half of the simulated Fejemis besides driving, and faults of one half alone."""
 
 import json
 
@@ -15,7 +15,7 @@ MODULE = "omnibot_driver.simulator.fejemis"
 
 
 def angle_line(rig: Rig) -> tuple[float, int, int]:
-    """Degrees, error flags, diagnosis without the frame counter."""
+    """Return the angle in degrees, the error flags, and the diagnosis without the frame counter."""
     _, degrees, errors, bits = rig.ask(FRONT, "fwli")[0].split()
     return float(degrees), int(errors, 16), int(bits, 16) & 0x7FF
 
@@ -24,7 +24,7 @@ def angle_line(rig: Rig) -> tuple[float, int, int]:
 
 
 def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
-    """rcSource is -1 meanwhile, and what is commanded does not count."""
+    """Meanwhile rcSource is -1, and commands have no effect."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.3 0")
     rig.run(0.5)
@@ -40,7 +40,7 @@ def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
 
 
 def test_some_firmware_goes_on_after_start() -> None:
-    """The manual does not say whether the last command holds again."""
+    """The manual does not say whether the last command takes effect again."""
     rig = Rig(firmware=Firmware(sums=False, start_resumes=True)).booted()
     rig.say(DRIVE, "rc 2 0.3 0", "stop")
     rig.run(0.5)
@@ -54,7 +54,7 @@ def test_some_firmware_goes_on_after_start() -> None:
 
 
 def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
-    """Pose, subscriptions, source, time; the other half goes on."""
+    """Pose, subscriptions, source and time are reset; the other half continues."""
     rig = Rig().booted()
     rig.say(DRIVE, "sub pose 20")
     rig.drive("rc 2 0.3 0", 1.0)
@@ -72,7 +72,7 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 
 
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
-    """It no longer sends the angle; drive goes on with the last one that it has."""
+    """It no longer sends the angle, and the drive half continues with the last one it received."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 4")
     rig.drive("rc 2 0.3 20", 1.0)
@@ -86,7 +86,7 @@ def test_front_that_restarts_switches_brush_and_lift_off() -> None:
 
 
 def test_what_is_sent_while_a_half_boots_is_lost() -> None:
-    """For 0.4 s."""
+    """The boot takes 0.4 s."""
     rig = Rig()
     rig.say(DRIVE, "stop")
     rig.run(1.0)
@@ -96,7 +96,7 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """The other one is heard all the time; the robot drives on."""
+    """Meanwhile the other half sends as usual, and the robot still drives."""
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
     port = DRIVE if half == "drive" else FRONT
@@ -111,7 +111,7 @@ def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
 
 
 def test_sums_can_begin_and_end_in_each_half() -> None:
-    """While it runs."""
+    """The change happens while the half is running."""
     rig = Rig().booted()
     rig.board.befall("front", "sums-begin")
     said = dict(rig.run(0.5))
@@ -122,7 +122,7 @@ def test_sums_can_begin_and_end_in_each_half() -> None:
 
 
 def test_faults_can_be_planned() -> None:
-    """As the options have them, in any order."""
+    """They occur at their times, in whatever order the options list them."""
     late = Fault(at_s=2.0, half="front", what="well")
     rig = Rig(faults=(late, Fault(at_s=1.0, half="front", what="silent")))
     rig.run(0.99)
@@ -133,7 +133,7 @@ def test_faults_can_be_planned() -> None:
 
 
 def test_ports_can_be_swapped_and_ids_be_others() -> None:
-    """Each is found out by its heartbeat only."""
+    """A host can identify each half only by its heartbeat."""
     rig = Rig(swapped=True)
     rig.run(1.0)
     assert any(port == FRONT and " 90 " in text for _, port, text in rig.lines)
@@ -147,7 +147,7 @@ def test_ports_can_be_swapped_and_ids_be_others() -> None:
 
 
 def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
-    """``0x3c2`` and ``0x13c2``, as in the manual's list."""
+    """The diagnosis is ``0x3c2`` or ``0x13c2``, as in the manual's list."""
     rig = Rig().booted()
     bits = [rig.ask(FRONT, "fwli")[0].split()[3] for _ in range(8)]
     assert set(bits) == {"0x3c2", "0x13c2"}
@@ -170,7 +170,7 @@ def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
     ],
 )
 def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> None:
-    """By the manual's list of bits."""
+    """The bits are those of the manual's list."""
     rig = Rig().booted()
     rig.board.befall("front", what)
     assert angle_line(rig)[1:] == (0, diagnosis)
@@ -179,7 +179,7 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """A frozen one looks healthy, and the steering runs to its end."""
+    """A frozen sensor looks healthy, and the steering runs to its end stop."""
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")
     rig.run(1.0)
@@ -197,7 +197,7 @@ def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
 
 
 def test_the_offset_of_the_sensor_is_configured() -> None:
-    """``fwoffset``; the second number turns it round."""
+    """``fwoffset`` sets it; its second number reverses the sign of the angle."""
     rig = Rig(sensor_zero_deg=7.0, angle_noise_deg=0.0).booted()
     assert angle_line(rig)[0] == 0.0
     rig.say(FRONT, "fwoffset 0 1")
@@ -210,7 +210,7 @@ def test_the_offset_of_the_sensor_is_configured() -> None:
 
 
 def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
-    """``on`` before takes it back."""
+    """``on`` before the end of the delay cancels it."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1")
     rig.say(DRIVE, "off 2")
@@ -230,7 +230,7 @@ def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
 
 
 def test_options_reach_the_board_by_a_url() -> None:
-    """The same words as on the command line."""
+    """The names are those of the command line."""
     url = (
         "sim://?sums=off&reverse=clamped&swapped&ids=90,7&fault=1:front:silent&fault=2:drive:hung"
         "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100"
@@ -246,11 +246,11 @@ def test_options_reach_the_board_by_a_url() -> None:
 
 @pytest.mark.parametrize("wrong", ["fault=5:rear:silent", "fault=5:drive:hall-broken", "ids=a,b"])
 def test_a_wrong_option_is_refused(wrong: str) -> None:
-    """By a sentence; a drive half has no angle sensor."""
+    """For example a fault of the angle sensor in the drive half, which does not have one."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{wrong}", options.load(MODULE))
 
 
 def test_the_names_of_faults_are_unique() -> None:
-    """So one table is enough for the front half."""
+    """The front half looks both kinds up in one table."""
     assert not FAULTS.keys() & SENSOR_FAULTS.keys()

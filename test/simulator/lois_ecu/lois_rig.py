@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated LOIS ECU and somebody who talks to it with the driver's codec, in simulated time."""
+"""A simulated LOIS ECU, commanded and read through the driver's codec, in simulated time."""
 
 from omnibot_driver.core.lois_ecu import (
     BoardOdometry,
@@ -18,7 +18,7 @@ LOW_PASS = WriteSetting(Setting.RPM_LOW_PASS, 1.0)
 
 
 class Rig:
-    """``heard``: all reports with the time of their last byte."""
+    """A board and its host; ``heard`` holds all reports, each with the time of its last byte."""
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
         self.board = SimulatedLois(LoisSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
@@ -27,11 +27,11 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated."""
+        """Simulated time, in s."""
         return self.board.now_s
 
     def run(self, seconds: float) -> list[Report]:
-        """What was reported meanwhile."""
+        """Advance by this time, in s; return the reports received meanwhile."""
         found: list[Report] = []
         for _ in range(round(seconds / self.board.tick_s)):
             found += self.decoder.feed(self.board.step(), self.now)
@@ -40,7 +40,7 @@ class Rig:
         return found
 
     def say(self, *commands: Command) -> None:
-        """Repeat the line until the board has obeyed, as it may miss one."""
+        """Send each command until the board obeys it, because the board may miss a line."""
         for command in commands:
             data = encode_command(command, with_sum=self.board._reader.checks)
             for _ in range(50):
@@ -53,12 +53,12 @@ class Rig:
                 raise AssertionError(f"{command} was not obeyed")
 
     def drive(self, left: int, right: int, seconds: float) -> list[Report]:
-        """At these RPM."""
+        """Command these wheel speeds, in RPM, and return the reports received meanwhile."""
         self.say(SetRpm(left, right))
         return self.run(seconds)
 
     def booted(self) -> "Rig":
-        """With a low-pass, if it has one."""
+        """Run until the board has booted, and switch its low-pass on if it has one."""
         self.run(2.1)
         if self.board.settings.quirks.extra_settings:
             self.say(LOW_PASS)
@@ -66,10 +66,10 @@ class Rig:
 
 
 def ticks_in(reports: list[Report]) -> list[Ticks]:
-    """In their order."""
+    """Return the reports of encoder ticks, in order."""
     return [report for report in reports if isinstance(report, Ticks)]
 
 
 def odometry_in(reports: list[Report]) -> list[BoardOdometry]:
-    """In their order."""
+    """Return the reports of the odometry, in order."""
     return [report for report in reports if isinstance(report, BoardOdometry)]

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether a board has a quirk of its wheels: how they count, measure, follow and are added up.
+"""Detectors of quirks in motion: how a board counts, measures, controls and adds up its wheels.
 
-Each function has the name of its quirk.
+Each function is named after a quirk, and returns whether a board shows it.
 """
 
 import math
@@ -24,14 +24,14 @@ STRAIGHT = 20
 
 
 def ticks_of_forward_targets(quirks: Quirks) -> bool:
-    """Reverse counts nothing."""
+    """Driving backward counts no ticks."""
     rig = Rig(quirks).booted()
     rig.drive(-STRAIGHT, -STRAIGHT, 4.0)
     return ticks_in(rig.run(1.0))[-1].left == 0
 
 
 def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
-    """Less than three quarters of a straight drive are in 0x20, once both wheels turn alike."""
+    """With equal controllers, 0x20 reports less than 75 % of a straight drive."""
     rig = Rig(quirks).booted()
     rig.say(WriteSetting(Setting.RIGHT_KP, 0.4412), WriteSetting(Setting.RIGHT_TN, 0.2865))
     rig.drive(STRAIGHT, STRAIGHT, 10.0)
@@ -40,7 +40,7 @@ def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
 
 
 def velocity_may_be_nan(quirks: Quirks) -> bool:
-    """In some groups of a straight drive."""
+    """In a straight drive, some reported velocities are not finite."""
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.TICKS, 60))
     rig.drive(40, 40, 30.0)
@@ -49,7 +49,7 @@ def velocity_may_be_nan(quirks: Quirks) -> bool:
 
 
 def sign_of_command(quirks: Quirks) -> bool:
-    """After forward to backward, the odometry goes back while the wheels still roll forward."""
+    """After a change to backward, the measured speed is negative before the wheel reverses."""
     rig = Rig(quirks).booted()
     rig.drive(30, 40, 6.0)
     rig.say(SetRpm(-30, -40))
@@ -61,7 +61,7 @@ def sign_of_command(quirks: Quirks) -> bool:
 
 
 def keeps_speed_of_stalled_wheel(quirks: Quirks) -> bool:
-    """For ever."""
+    """A wheel that has been blocked for 3 s still has a measured speed."""
     rig = Rig(quirks).booted()
     rig.drive(20, 30, 6.0)
     rig.board.hold(left=True, right=True)
@@ -70,7 +70,7 @@ def keeps_speed_of_stalled_wheel(quirks: Quirks) -> bool:
 
 
 def duty_drags_target(quirks: Quirks) -> bool:
-    """After negative duty a positive one is integrated backwards."""
+    """After a negative duty, a positive one is measured as a negative speed."""
     rig = Rig(quirks).booted()
     rig.say(SetDuty(-40, -30))
     rig.run(3.0)
@@ -82,7 +82,7 @@ def duty_drags_target(quirks: Quirks) -> bool:
 
 
 def reverse_runs_fast(quirks: Quirks) -> bool:
-    """By 1 RPM and more."""
+    """At a target of -30 RPM the wheel turns at more than 31.2 RPM."""
     rig = Rig(quirks).booted()
     rig.drive(-30, -30, 12.0)
     speeds = []
@@ -93,7 +93,7 @@ def reverse_runs_fast(quirks: Quirks) -> bool:
 
 
 def low_pass_starts_at_zero(quirks: Quirks) -> bool:
-    """RPM mode never moves until it is written."""
+    """Until the low-pass is written, a speed target does not move the robot."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.drive(30, 30, 5.0)
@@ -101,7 +101,7 @@ def low_pass_starts_at_zero(quirks: Quirks) -> bool:
 
 
 def slow_timer(quirks: Quirks) -> bool:
-    """It measures 0.7 % more than there is."""
+    """The measured speed is 0.7 % too high."""
     rig = Rig(quirks).booted()
     rig.drive(30, 30, 0.5)
     rig.say(SetDuty(50, 50))
@@ -115,7 +115,7 @@ def slow_timer(quirks: Quirks) -> bool:
 
 
 def limits_rpm(quirks: Quirks) -> bool:
-    """At 50."""
+    """A target of 58 RPM gives a speed below 55 RPM."""
     rig = Rig(quirks).booted()
     rig.drive(58, 58, 30.0)
     speeds = []
@@ -126,7 +126,7 @@ def limits_rpm(quirks: Quirks) -> bool:
 
 
 def fast_control(quirks: Quirks) -> bool:
-    """A set-point acts within 100 ms."""
+    """A set point takes effect within 110 ms."""
     delays = []
     rig = Rig(quirks).booted()
     for _ in range(12):

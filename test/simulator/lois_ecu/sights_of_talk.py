@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether a board has a quirk of what it hears, says and records.
+"""Detectors of quirks in communication: what a board receives, sends and records.
 
-Each function has the name of its quirk.
+Each function is named after a quirk, and returns whether a board shows it.
 """
 
 from dataclasses import replace
@@ -36,7 +36,7 @@ from omnibot_driver.simulator.lois_ecu import Quirks
 
 
 def with_sum(text: bytes) -> bytes:
-    """The XOR of its characters, and the end."""
+    """Return the text with its checksum (XOR of its characters) and a line feed."""
     total = 0
     for character in text:
         total ^= character
@@ -44,7 +44,7 @@ def with_sum(text: bytes) -> bytes:
 
 
 def extra_settings(quirks: Quirks) -> bool:
-    """Feed-forward alone turns the wheels at once."""
+    """With Kp = 0, feed-forward alone turns the wheels."""
     rig = Rig(replace(quirks, low_pass_starts_at_zero=False))
     rig.run(2.1)
     for setting in (Setting.LEFT_KP, Setting.RIGHT_KP):
@@ -55,19 +55,19 @@ def extra_settings(quirks: Quirks) -> bool:
 
 
 def appends_odometry(quirks: Quirks) -> bool:
-    """0x12 has groups of six."""
+    """Messages 0x12 contain the odometry."""
     return any(group.appended for group in odometry_in(Rig(quirks).run(4.0)))
 
 
 def clock_in_ms(quirks: Quirks) -> bool:
-    """Not in ns."""
+    """The decoder recognises timestamps in ms instead of ns."""
     rig = Rig(quirks)
     rig.run(6.0)
     return rig.decoder.clock_unit == "ms"
 
 
 def clock_stops_while_sending(quirks: Quirks) -> bool:
-    """So it runs slow, the more is sent."""
+    """The clock is more than 3 % slow, because it stops during each message."""
     rig = Rig(quirks)
     rig.run(3.0)
     began, counts = rig.now, [ticks_in(rig.run(0.5))[-1].time_counts]
@@ -78,7 +78,7 @@ def clock_stops_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_sending(quirks: Quirks) -> bool:
-    """Of single lines 3 to 10 % are lost."""
+    """More than 5 of 300 single lines are lost."""
     rig = Rig(quirks)
     rig.run(2.1)
     for number in range(300):
@@ -90,7 +90,7 @@ def deaf_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_counting(quirks: Quirks) -> bool:
-    """At full speed more than a tenth of single lines are lost."""
+    """At full speed, more than 10 % of single lines are lost."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(100, 100))
@@ -103,7 +103,7 @@ def deaf_while_counting(quirks: Quirks) -> bool:
 
 
 def button_waits_while_sending(quirks: Quirks) -> bool:
-    """A record of 100 samples takes 0.12 s."""
+    """The power stays on during a record; one of 100 samples takes 0.12 s to send."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(50, 50), RecordTorque(100, 100))
@@ -116,7 +116,7 @@ def button_waits_while_sending(quirks: Quirks) -> bool:
 
 
 def odometry_period_is_fixed(quirks: Quirks) -> bool:
-    """0x20 cannot be turned off."""
+    """The periodic message 0x20 cannot be switched off."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetPeriod(Stream.ODOMETRY, PERIOD_OFF))
@@ -125,7 +125,7 @@ def odometry_period_is_fixed(quirks: Quirks) -> bool:
 
 
 def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
-    """Also where the mode stays what it was."""
+    """Writing 0x11 does so even if the mode does not change."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST))
@@ -133,7 +133,7 @@ def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
 
 
 def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
-    """Nothing tells of it, not even afterwards."""
+    """A press in a terminal mode is not reported, not even after the mode ends."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.GPS))
@@ -144,7 +144,7 @@ def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
 
 
 def terminal_mixes_sensors(quirks: Quirks) -> bool:
-    """The compass speaks in the GPS's mode."""
+    """In the GPS mode, sentences of the compass are forwarded, too."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.GPS))
@@ -152,7 +152,7 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
 
 
 def terminal_passes_input_on(quirks: Quirks) -> bool:
-    """The compass takes 34 lines a second; the board cannot obey more."""
+    """The compass reads 34 lines a second, and the board obeys no faster."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.COMPASS))
@@ -163,7 +163,7 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 
 
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
-    """The second one is ignored, the one after that is not."""
+    """The second request is ignored, the third, 6 s later, is not."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(DistributeBall(), DistributeBall())
@@ -173,7 +173,7 @@ def one_ball_in_six_seconds(quirks: Quirks) -> bool:
 
 
 def reset_clears_ticks_only(quirks: Quirks) -> bool:
-    """The odometry stays, and the robot drives on."""
+    """After 0x18 the odometry is kept, and the robot still drives."""
     rig = Rig(quirks).booted()
     rig.drive(20, 30, 4.0)
     rig.say(Reset())
@@ -183,12 +183,12 @@ def reset_clears_ticks_only(quirks: Quirks) -> bool:
 
 
 def gps_is_ignored(quirks: Quirks) -> bool:
-    """0/0."""
+    """The reported position is latitude 0, longitude 0."""
     return GpsPosition(0.0, 0.0) in Rig(quirks).run(4.0)
 
 
 def headings_average_over_north(quirks: Quirks) -> bool:
-    """A robot that turns through north seems to look south."""
+    """While the robot turns through north, the reported heading leaps to the south."""
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.HEADING, 40), SetPeriod(Stream.TICKS, PERIOD_OFF))
     rig.drive(-20, 20, 12.0)
@@ -209,7 +209,7 @@ def _record(rig: Rig, kind: RecordKind, count: int, seconds: float) -> Record | 
 
 
 def records_in_100_us(quirks: Quirks) -> bool:
-    """At 20 RPM a tick takes 50 ms, which do not fit 16 bits of 100 ns."""
+    """At 20 RPM a tick takes 50 ms, which is beyond 16 bits in units of 100 ns."""
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 5.0)
     record = _record(rig, RecordKind.RPM, 20, 4.0)
@@ -219,7 +219,7 @@ def records_in_100_us(quirks: Quirks) -> bool:
 
 
 def torque_comes_as_rpm(quirks: Quirks) -> bool:
-    """Under 0x04."""
+    """The reply to 0x17 has command number 0x04."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(encode_command(RecordTorque(5, 5)))
@@ -229,14 +229,14 @@ def torque_comes_as_rpm(quirks: Quirks) -> bool:
 
 
 def record_waits_for_one_more(quirks: Quirks) -> bool:
-    """The record is sent after one more sample."""
+    """A record of 3 headings is not complete after 3 samples."""
     rig = Rig(quirks, compass_period_s=1.0)
     rig.run(2.5)
     return _record(rig, RecordKind.HEADING, 3, 3.1) is None
 
 
 def large_records_never_end(quirks: Quirks) -> bool:
-    """1025 torque samples would be there after 93 s, or 205 s."""
+    """1025 torque samples would be complete after 93 s (fast control) or 205 s."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(with_sum(b":1704010401"))
@@ -248,7 +248,7 @@ def large_records_never_end(quirks: Quirks) -> bool:
 
 
 def lenient_hex(quirks: Quirks) -> bool:
-    """A payload with letters that are not digits, and a right checksum."""
+    """A payload with characters that are not digits is obeyed if its checksum is right."""
     rig = Rig(quirks)
     rig.run(2.1)
     for _ in range(5):
@@ -258,7 +258,7 @@ def lenient_hex(quirks: Quirks) -> bool:
 
 
 def slow_boot(quirks: Quirks) -> bool:
-    """Silent; what comes meanwhile is read afterwards."""
+    """The board is silent for 2 s after power-up, and reads afterwards what arrived meanwhile."""
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))
     early = rig.run(1.9)

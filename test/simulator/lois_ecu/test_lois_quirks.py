@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each way in which the public firmware departs from the manual: seen with it, unseen without."""
+"""Each deviation of the public firmware from the manual can be observed, and be switched off."""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -23,14 +23,14 @@ SEEN: dict[str, Callable[[Quirks], bool]] = {
 
 
 def test_every_quirk_has_its_sight() -> None:
-    """None is forgotten here."""
+    """A new quirk without a detector fails here."""
     assert set(SEEN) == {field.name for field in fields(Quirks)}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """All the others being there."""
+    """All other quirks are on, as in the public firmware."""
     assert SEEN[name](FIRMWARE)
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
@@ -38,12 +38,12 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
 def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
-    """All the others being away as well."""
+    """All other quirks are off, as well."""
     assert not SEEN[name](DOCUMENTED)
 
 
 def test_ticks_are_reported_as_they_are() -> None:
-    """So the tests above look at the right ones."""
+    """The other tests rely on these reports."""
     rig = Rig().booted()
     rig.drive(20, 20, 3.0)
     assert isinstance(ticks_in(rig.run(0.5))[-1], Ticks)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated board shares nothing with the driver."""
+"""The simulated board shares no code with the driver."""
 
 import ast
 from pathlib import Path
@@ -14,7 +14,7 @@ MODULES = sorted(Path(lois_ecu.__file__).parent.glob("*.py"))
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.name)
 def test_no_module_imports_the_core(path: Path) -> None:
-    """A misread manual must not cancel out."""
+    """With a shared decoder, a misread manual would cancel out."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             assert node.module is not None

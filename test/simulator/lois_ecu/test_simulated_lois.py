@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated LOIS ECU: what it sends by itself, obeys, and does whatever its firmware is."""
+"""The simulated LOIS ECU: periodic messages, commands, and behaviour of both firmware variants."""
 
 import math
 from functools import reduce
@@ -39,7 +39,7 @@ BOTH = pytest.mark.parametrize("quirks", [DOCUMENTED, FIRMWARE], ids=["documente
 
 @BOTH
 def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
-    """All but the date, about every 400 ms, 1 s and 1.2 s; nothing is damaged."""
+    """All messages but the date, about every 400 ms, 1 s and 1.2 s; none is damaged."""
     rig = Rig(quirks)
     heard = rig.run(22.0)
     counts = dict.fromkeys((Ticks, Heading, BoardOdometry, GpsTime, GpsPosition, GpsDate), 0)
@@ -54,7 +54,7 @@ def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
 
 
 def test_periods_stretch_with_the_load() -> None:
-    """The public firmware's 400 ms are 422 ms."""
+    """In the public firmware a period of 400 ms takes 422 ms."""
     rig = Rig()
     rig.run(3.0)
     assert len(ticks_in(rig.run(42.2))) in range(98, 103)
@@ -62,7 +62,7 @@ def test_periods_stretch_with_the_load() -> None:
 
 @BOTH
 def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -> None:
-    """Both wheels near 20 RPM; it holds for ever."""
+    """Both wheels reach about 20 RPM and keep it, because set points never expire."""
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 10.0)
     speeds = []
@@ -76,7 +76,7 @@ def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -
 @pytest.mark.slow
 @BOTH
 def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
-    """Within half a second; neither is sooner."""
+    """Zero RPM and zero duty both stop it within 0.5 s."""
     rig = Rig(quirks).booted()
     for drive in (SetRpm(30, 30), SetRpm(-30, 30), SetDuty(45, 45), SetDuty(-45, 45)):
         for stop in (SetRpm(0, 0), SetDuty(0, 0)):
@@ -91,7 +91,7 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
-    """Its release does not move the robot; a set-point does, pressed or not."""
+    """Its release does not move the robot, but a new set point does, even while it is pressed."""
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 4.0)
     rig.board.press(True)
@@ -127,7 +127,7 @@ def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks
 
 @BOTH
 def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
-    """What it sends keeps its checksum."""
+    """Lines with a checksum are rejected in this mode; the board's own lines keep theirs."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM))
@@ -145,7 +145,7 @@ def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
 
 @BOTH
 def test_junk_before_a_colon_is_harmless(quirks: Quirks) -> None:
-    """Either case of letters too."""
+    """A colon always begins a new line."""
     rig = Rig(quirks)
     rig.run(2.1)
     for line in (b"\xffx:030000000138\n", b":19000000003200:190000000032\n"):
@@ -159,7 +159,7 @@ def test_junk_before_a_colon_is_harmless(quirks: Quirks) -> None:
 
 @BOTH
 def test_a_carriage_return_makes_a_line_too_long(quirks: Quirks) -> None:
-    """All lines have 14 characters."""
+    """Every line has exactly 14 characters, so a line that ends with CR LF is rejected."""
     rig = Rig(quirks)
     rig.run(2.1)
     for _ in range(4):
@@ -170,7 +170,7 @@ def test_a_carriage_return_makes_a_line_too_long(quirks: Quirks) -> None:
 
 @pytest.mark.parametrize("payload", [b"0000 +01", b"00000x01", b"0000-fff"])
 def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
-    """With space, sign and prefix, if the checksum is right."""
+    """Space, sign and prefix are accepted if the checksum is right."""
     rig = Rig(FIRMWARE)
     rig.run(2.1)
     text = b":03" + payload
@@ -182,7 +182,7 @@ def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
 
 @BOTH
 def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
-    """By 0xfffe and 0xffff."""
+    """A period of 0xfffe requests it once, and 0xffff turns it off."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetPeriod(Stream.TICKS, PERIOD_OFF), SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
@@ -195,7 +195,7 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 
 
 def test_the_gps_moves_with_the_robot() -> None:
-    """x is east."""
+    """A drive along x changes the longitude, because x points east."""
     rig = Rig(DOCUMENTED)
     rig.drive(40, 40, 20.0)
     fixes = [report for report in rig.run(3.0) if isinstance(report, GpsPosition)]
@@ -205,7 +205,7 @@ def test_the_gps_moves_with_the_robot() -> None:
 
 
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
-    """Ticks, odometry, periods and the low-pass are as at first."""
+    """The ticks are zero, and the low-pass must be written again; the true pose is kept."""
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)
     place = rig.board.truth
@@ -219,7 +219,7 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
 
 
 def test_input_while_booting_is_kept_up_to_600_characters() -> None:
-    """The rest is lost."""
+    """Of 700 characters, the last 100 are lost."""
     rig = Rig()
     rig.board.receive(encode_command(LOW_PASS) * 50)
     rig.run(2.3)
@@ -228,7 +228,7 @@ def test_input_while_booting_is_kept_up_to_600_characters() -> None:
 
 
 def test_planted_errors_are_in_the_truth_alone() -> None:
-    """The board believes in its nominal wheels."""
+    """The board computes its odometry with the nominal wheel radius."""
     rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
     rig.drive(20, 20, 10.0)
     rig.say(SetRpm(0, 0))
@@ -240,7 +240,7 @@ def test_planted_errors_are_in_the_truth_alone() -> None:
 @given(st.lists(st.binary(max_size=200), max_size=6))
 @settings(max_examples=30)
 def test_any_bytes_are_taken(chunks: list[bytes]) -> None:
-    """The same bytes lead to the same answer."""
+    """No input raises an exception, and the same bytes give the same output."""
     sent = []
     for _ in range(2):
         board = SimulatedLois()

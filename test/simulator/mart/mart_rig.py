@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Somebody who talks to a simulated MART controller by hand-typed datagrams, in simulated time."""
+"""A simulated MART controller and a host that sends typed datagrams, in simulated time."""
 
 from math import inf
 
@@ -18,7 +18,7 @@ INCH_M = 0.0254
 
 
 class Rig:
-    """``replies``: all that came, with the time."""
+    """A controller and its host; ``replies`` holds all replies, each with its time."""
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
         self.server = MartServer(MartSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
@@ -27,26 +27,26 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated."""
+        """Simulated time, in s."""
         return self.server.now_s
 
     def say(self, *texts: str) -> None:
-        """To the command port, without waiting."""
+        """Send these requests to the command port, without waiting for replies."""
         for text in texts:
             self.server.receive(text.encode("latin-1"), COMMAND, "us", self.now)
 
     def stop(self, text: str) -> None:
-        """To the stop port."""
+        """Send this request to the stop port."""
         self.server.receive(text.encode("latin-1"), STOP, "us", self.now)
 
     def run(self, seconds: float) -> list[str]:
-        """What came meanwhile."""
+        """Advance by this time, in s; return the replies received meanwhile."""
         found = self.server.advance(self.now + seconds)
         self.replies += [(reply.at_s, reply.data) for reply in found]
         return [reply.data.decode("latin-1") for reply in found]
 
     def wait(self, limit_s: float = 20.0) -> str | None:
-        """The next reply; ``took_s`` is how long it took. None: there was none."""
+        """Return the next reply, or None after ``limit_s``; ``took_s`` is its delay, in s."""
         began_s, until_s = self.now, self.now + limit_s
         while self.now < until_s:
             found = self.run(max(0.0, min(self.server.wake_at, until_s) - self.now))
@@ -59,12 +59,12 @@ class Rig:
         return None
 
     def ask(self, text: str, limit_s: float = 20.0) -> str | None:
-        """One command and its reply."""
+        """Send one request to the command port and return its reply."""
         self.say(text)
         return self.wait(limit_s)
 
     def number(self, text: str) -> float:
-        """One question and the number in its answer."""
+        """Send one request and return the number in its reply."""
         answer = self.ask(text)
         assert answer is not None
         ok, number = answer.split()
@@ -72,18 +72,18 @@ class Rig:
         return float(number)
 
     def drive(self, text: str, seconds: float = 1.0) -> None:
-        """Start an uncontrolled motion, and let it drive."""
+        """Start an uncontrolled motion and let it run for this time, in s."""
         assert self.ask(text) == "ok"
         self.run(seconds)
 
     @property
     def x_in(self) -> float:
-        """The true way forward in inches."""
+        """True distance forward, in inches."""
         return self.server.chassis.x_m / INCH_M
 
     @property
     def yaw_deg(self) -> float:
-        """The true heading."""
+        """True heading, in degrees."""
         return self.server.chassis.yaw_rad * 57.29577951308232
 
     @property
@@ -93,5 +93,5 @@ class Rig:
 
     @property
     def in_progress(self) -> Kind | None:
-        """As the server believes."""
+        """The motion that the server believes to be in progress."""
         return self.server.motion

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""TF, TB, MCR and MCL of the public server."""
+"""Controlled moves of the public server: TF, TB, MCR and MCL."""
 
 import pytest
 from mart_rig import INCH_M, Rig
@@ -8,7 +8,7 @@ from mart_rig import INCH_M, Rig
 
 @pytest.mark.parametrize(("text", "sign"), [("TF 12", 1), ("TB 12", -1)])
 def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) -> None:
-    """It is computed from time."""
+    """The public server computes the distance from time."""
     rig = Rig()
     assert rig.ask(text) == "ok 12"
     assert sign * rig.x_in == pytest.approx(15.8, abs=0.2)
@@ -17,14 +17,14 @@ def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) ->
 
 @pytest.mark.parametrize("volts", [20.0, 26.0])
 def test_it_echoes_it_at_any_voltage(volts: float) -> None:
-    """However far the robot went."""
+    """The reply does not depend on the distance driven."""
     rig = Rig(volts=volts)
     assert rig.ask("TF 24") == "ok 24"
     assert abs(rig.x_in - 30.3) > 2
 
 
 def test_tf_24_slow_runs_at_normal_speed() -> None:
-    """TF SLOW 24 does not."""
+    """Only TF SLOW 24 is slow, because the speed word must come first."""
     fast, normal, slow = Rig(), Rig(), Rig()
     assert fast.ask("TF 24 SLOW") == normal.ask("TF NORMAL 24") == "ok 24"
     assert slow.ask("TF SLOW 24") == "ok 24"
@@ -33,7 +33,7 @@ def test_tf_24_slow_runs_at_normal_speed() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TF x", "TF SLOW x", "TB 0", "TB NORMAL y", "TF FAST 12"])
 def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
-    """Until it is stopped."""
+    """The robot drives until it is stopped."""
     rig = Rig()
     assert rig.ask(text, 60.0) is None
     assert rig.moving
@@ -42,7 +42,7 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """Counted from its start."""
+    """The limit is counted from the start of the move."""
     rig = Rig()
     rig.say("TF 0")
     rig.run(1.0)
@@ -55,7 +55,7 @@ def test_sdr_limits_an_unlimited_move_alone() -> None:
 
 
 def test_a_negative_distance_is_refused() -> None:
-    """With these words."""
+    """The reply is "fail bad distance value"."""
     assert Rig().ask("TF -5") == "fail bad distance value"
     assert Rig().ask("TB SLOW -5") == "fail bad distance value"
 
@@ -71,7 +71,7 @@ def test_a_negative_distance_is_refused() -> None:
     ],
 )
 def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
-    """In two spellings."""
+    """The server has two spellings of this reply."""
     assert Rig().ask(text) == answer
 
 
@@ -79,7 +79,7 @@ def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
 def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
     front_in: float, driven_in: float
 ) -> None:
-    """With these words."""
+    """The robot moves a little before the first look at the sonar."""
     rig = Rig(front_m=front_in * INCH_M)
     assert rig.ask("TF 24") == "fail Insufficient front clearance."
     assert rig.took_s == pytest.approx(0.55, abs=0.06)
@@ -87,21 +87,21 @@ def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
 
 
 def test_near_an_obstacle_tb_fails_likewise() -> None:
-    """Behind."""
+    """TB looks at the rear sonar."""
     rig = Rig(rear_m=12 * INCH_M)
     assert rig.ask("TB 24") == "fail Insufficient rear clearance."
 
 
 @pytest.mark.parametrize("text", ["TF SLOW NCC 30", "TF DOCK 30"])
 def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
-    """No clearance check."""
+    """These options switch the clearance check off, so the robot hits the wall."""
     rig = Rig(front_m=20 * INCH_M)
     assert rig.ask(text, 60.0) == "ok 30"
     assert rig.server.hit_wall
 
 
 def test_tf_dock_stops_at_the_dock() -> None:
-    """It reports the computed distance."""
+    """The reply has the computed distance, not the one driven."""
     rig = Rig(dock_m=20 * INCH_M)
     assert rig.ask("DOCKED") == "ok false"
     answer = rig.ask("TF DOCK 60", 60.0)
@@ -112,7 +112,7 @@ def test_tf_dock_stops_at_the_dock() -> None:
 
 
 def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
-    """Then it is 19 inches again."""
+    """After that TF, the clearance is 19 inches again."""
     rig = Rig(front_m=60 * INCH_M)
     assert rig.ask("TFSFC 40") == "ok"
     assert rig.ask("TF 60") == "fail Insufficient front clearance."
@@ -122,7 +122,7 @@ def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
 
 
 def test_tf_holds_its_course_with_unequal_motors() -> None:
-    """By the gyro."""
+    """It corrects its heading by the gyro; F does not."""
     rig = Rig(motor_inequality=0.05)
     assert rig.ask("TF 80", 60.0) == "ok 80"
     assert abs(rig.yaw_deg) < 4
@@ -132,7 +132,7 @@ def test_tf_holds_its_course_with_unequal_motors() -> None:
 
 
 def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
-    """With these words."""
+    """The reply is "fail excessive gyro correct"."""
     rig = Rig()
     rig.say("TF 80")
     rig.run(1.0)
@@ -142,14 +142,14 @@ def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
 
 @pytest.mark.parametrize(("text", "sign"), [("MCR 90", -1), ("MCL 90", 1), ("MCL SLOW 90", 1)])
 def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
-    """Whatever the manual says of MCL."""
+    """The manual says otherwise of MCL."""
     rig = Rig()
     assert rig.ask(text) == "ok"
     assert sign * rig.yaw_deg == pytest.approx(93, abs=5)
 
 
 def test_mcr_normal_90_parses_as_0() -> None:
-    """It does not turn."""
+    """The robot does not turn."""
     rig = Rig()
     assert rig.ask("MCR NORMAL 90") == "ok"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -157,7 +157,7 @@ def test_mcr_normal_90_parses_as_0() -> None:
 
 
 def test_less_than_10_degrees_are_turned_slowly() -> None:
-    """Also at normal speed."""
+    """This also holds at normal speed."""
     rig, slow = Rig(), Rig()
     rig.ask("MCR 9")
     slow.ask("MCR SLOW 9")
@@ -166,14 +166,14 @@ def test_less_than_10_degrees_are_turned_slowly() -> None:
 
 @pytest.mark.parametrize("text", ["PTF 12 4 0.05 10", "PTF SLOW 12 4 0 10", "MCF 12", "MCB 12"])
 def test_undocumented_moves_answer_ok(text: str) -> None:
-    """Without a distance."""
+    """The reply does not contain a distance."""
     rig = Rig()
     assert rig.ask(text) == "ok"
     assert abs(rig.x_in) > 8
 
 
 def test_the_port_is_silent_during_a_controlled_move() -> None:
-    """A TF of 80 inches slowly takes 20 s."""
+    """TF SLOW 80 takes 20 s, and all replies come after it."""
     rig = Rig()
     rig.say("TF SLOW 80", "ENC", "RMRA")
     assert rig.run(15.0) == []

@@ -1,13 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Downloads and the end of the public server."""
+"""File downloads from the public server, and how EXIT ends it."""
 
 import pytest
 from mart_rig import Rig
 
 
 def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
-    """Name, size and blocks of a file."""
+    """Return name, size and blocks of a file."""
     before = len(rig.replies)
     rig.say(text)
     rig.run(0.1)
@@ -31,7 +31,7 @@ def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
 def test_a_file_comes_in_datagrams_of_512_bytes(
     start: str, end: str | None, text: str, name: str
 ) -> None:
-    """Behind its name and size; SRM fills LAST MOVE too."""
+    """Name and size come first; SRM also fills LAST MOVE."""
     rig = Rig()
     answer = rig.ask(start)
     assert answer is not None
@@ -49,7 +49,7 @@ def test_a_file_comes_in_datagrams_of_512_bytes(
 
 
 def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
-    """Not UTF-8."""
+    """Decoding them as UTF-8 fails."""
     rig = Rig()
     rig.ask("TF 12")
     content = b"".join(download(rig, "LAST MOVE")[2])
@@ -60,7 +60,7 @@ def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
 
 
 def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
-    """Until the next motion; LOG again deletes nothing."""
+    """The next motion makes a new file; a second LOG deletes nothing."""
     rig = Rig()
     rig.ask("TF 5")
     assert rig.ask("LOG") == "ok"
@@ -88,14 +88,14 @@ def test_exit_downloads_the_log_if_log_was_given() -> None:
 
 
 def test_exit_without_log_answers_nothing_and_ends_the_server() -> None:
-    """The same afterwards."""
+    """The server also ends when a log is downloaded."""
     rig = Rig()
     assert rig.ask("EXIT") is None
     assert rig.server.crashed == "EXIT"
 
 
 def test_exit_stops_no_motor() -> None:
-    """Of a motion in progress."""
+    """A motion in progress continues without the server."""
     rig = Rig()
     rig.drive("RM 30")
     rig.say("EXIT")

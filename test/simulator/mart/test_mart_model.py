@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated controller as an instrument: time, copies, seeds, networks, ports."""
+"""Properties of the simulated controller: time, copies, seeds, networks, ports, options."""
 
 import copy
 import random
@@ -25,7 +25,7 @@ TEXTS = (
 
 
 def walk(rig: Rig, seed: int, steps: int) -> None:
-    """Say anything, stop anyhow, unplug the IMU and plug it in."""
+    """Send random requests and stops, and disconnect and reconnect the IMU."""
     dice = random.Random(seed)
     for _ in range(steps):
         rig.run(dice.choice((0.0, 0.01, 0.1, 0.5, 2.0)))
@@ -42,7 +42,7 @@ def walk(rig: Rig, seed: int, steps: int) -> None:
 
 @pytest.mark.parametrize("seed", range(15))
 def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -> None:
-    """Copies of both kinds, and in steps of any size."""
+    """This holds for both kinds of copies, and for steps of any size."""
     rig = Rig(seed=seed, front_m=3.0, rear_m=3.0)
     walk(rig, seed, 40)
     twins = [rig.server.copy(), copy.deepcopy(rig.server)]
@@ -59,7 +59,7 @@ def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -
 
 
 def test_the_size_of_the_steps_does_not_matter() -> None:
-    """A millisecond at a time, or all at once."""
+    """Steps of 1 ms and of 2 s give the same replies."""
     found = []
     for step_s in (0.001, 0.013, 2.0):
         rig = Rig(motor_inequality=0.03)
@@ -73,7 +73,7 @@ def test_the_size_of_the_steps_does_not_matter() -> None:
 
 
 def test_it_runs_faster_than_a_hundredth_of_real_time_even_while_it_drives() -> None:
-    """In processor time: about a 1000 times faster on a machine of its own."""
+    """In processor time; an idle computer runs it about 1000 times faster than real time."""
     rig = Rig()
     rig.drive("RM 30")
     began = time.process_time()
@@ -82,7 +82,7 @@ def test_it_runs_faster_than_a_hundredth_of_real_time_even_while_it_drives() -> 
 
 
 def test_a_robot_that_stands_costs_nothing_as_time_passes() -> None:
-    """A year."""
+    """A year passes in one step."""
     rig = Rig()
     assert rig.server.wake_at == float("inf")
     rig.run(3e7)
@@ -90,7 +90,7 @@ def test_a_robot_that_stands_costs_nothing_as_time_passes() -> None:
 
 
 def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
-    """Both ways, in simulated time."""
+    """In both directions, in simulated time."""
 
     def talk(seed: int) -> tuple[list[bytes], list[bytes]]:
         faults = NetworkFaults(lose=0.2, duplicate=0.2, delay_s=0.3)
@@ -115,7 +115,7 @@ def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
 
 
 def test_options_choose_the_robot_and_its_faults() -> None:
-    """Of a command line or a URL."""
+    """The same options exist on the command line and in a URL."""
     board, lines = options.from_url(
         "sim://?firmware=documented&volts=21.5&imu-dies=3&stuck=left&speed-per-unit=0.01"
         "&metres-per-count=0.001&motor-inequality=0.05&front=2&rear=1&dock=4&encoder-inverted"
@@ -137,13 +137,13 @@ def test_options_choose_the_robot_and_its_faults() -> None:
 
 @pytest.mark.parametrize("word", ["volts=x", "volts=99", "motor-status=256", "stuck=front"])
 def test_options_that_make_no_sense_are_refused(word: str) -> None:
-    """With a sentence."""
+    """The error has a text for the user."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{word}", mart)
 
 
 def test_it_answers_on_two_udp_ports() -> None:
-    """Through the driver's transport, on loopback."""
+    """The requests pass the driver's transport, on the loopback interface."""
     with ServedBoard(mart.SimulatedMart()) as served:
         first, second = (int(address.rpartition(":")[2]) for address in served.addresses)
         assert second == first + 1
@@ -165,7 +165,7 @@ def test_it_answers_on_two_udp_ports() -> None:
 
 
 def test_it_answers_in_process() -> None:
-    """sim://, and can be rebooted."""
+    """A sim:// URL runs it; it can also be rebooted."""
     transport = SimulatedTransport("sim://?volts=25", "omnibot_driver.simulator.mart")
     try:
         transport.write([(0, b"VOLTS")])
@@ -178,7 +178,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """For the console and for tests."""
+    """The console and the tests use them."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each way in which the public server departs from its manual: seen with it, unseen without."""
+"""Each deviation of the public server from its manual can be observed, and be switched off."""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -15,7 +15,7 @@ IN_SOURCE_ALONE = ("heading_in_reference_moves_only", "probe_turns", "heading_st
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """SL alone: a conflict with everything; then SM: silence for good."""
+    """After SL alone every motion conflicts, and SM then silences the server for ever."""
     rig = Rig(quirks)
     rig.drive("F")
     rig.stop("SL")
@@ -38,7 +38,7 @@ def spin_stop_ends_drives(quirks: Quirks) -> bool:
 
 
 def early_stop_is_ignored(quirks: Quirks) -> bool:
-    """SL 0.1 s after F, before its ok."""
+    """SL comes 0.1 s after F, before its ok."""
     rig = Rig(quirks)
     rig.say("F")
     rig.run(0.1)
@@ -47,7 +47,7 @@ def early_stop_is_ignored(quirks: Quirks) -> bool:
 
 
 def left_spin_in_reference_move(quirks: Quirks) -> bool:
-    """It spins, and is silent."""
+    """L during RM starts a spin, and the server is silent."""
     rig = Rig(quirks)
     rig.drive("RM 30")
     if rig.ask("L") == CONFLICT:
@@ -57,7 +57,7 @@ def left_spin_in_reference_move(quirks: Quirks) -> bool:
 
 
 def moves_wait_for_imu(quirks: Quirks) -> bool:
-    """F is never answered, and starts when the IMU is back."""
+    """Without an IMU, F is not answered, and starts when the IMU is back."""
     rig = Rig(quirks, imu_dies_s=0.0, imu_returns_s=60.0)
     rig.say("F")
     answer = rig.wait(59.0)
@@ -66,20 +66,20 @@ def moves_wait_for_imu(quirks: Quirks) -> bool:
 
 
 def drives_trust_imu(quirks: Quirks) -> bool:
-    """RM moves without one, and is not answered."""
+    """RM moves without an IMU, and is not answered."""
     rig = Rig(quirks, imu_dies_s=0.0)
     silent = rig.ask("RM 30") is None
     return silent and rig.moving
 
 
 def reference_speed_wraps(quirks: Quirks) -> bool:
-    """RM -20 is obeyed, backward."""
+    """RM -20 drives backward."""
     rig = Rig(quirks)
     return rig.ask("RM -20") == "ok" and rig.server.chassis.right_mps < 0
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """After a stop of 0.57 s RM fails at once; the next one does not."""
+    """After a stop of 0.57 s, RM fails at once; the next RM does not."""
     rig = Rig(quirks)
     rig.drive("RM 66")
     assert rig.ask("SRM") == "ok"
@@ -101,13 +101,13 @@ def speed_word_first(quirks: Quirks) -> bool:
 
 
 def zero_distance_is_unlimited(quirks: Quirks) -> bool:
-    """TF 0 drives on."""
+    """TF 0 drives without end."""
     rig = Rig(quirks)
     return rig.ask("TF 0", 60.0) is None and rig.moving
 
 
 def echoes_distance(quirks: Quirks) -> bool:
-    """12 inches are reported, 16 were driven."""
+    """The reply is 12 inches after 16 were driven."""
     rig = Rig(quirks)
     answer = rig.ask("TF 12")
     assert round(rig.x_in) == 16
@@ -115,25 +115,25 @@ def echoes_distance(quirks: Quirks) -> bool:
 
 
 def crashes_on_missing_numbers(quirks: Quirks) -> bool:
-    """TIME with five of them."""
+    """TIME with five numbers crashes the server."""
     rig = Rig(quirks)
     return rig.ask("TIME 7 4 2024 12 30") is None and bool(rig.server.crashed)
 
 
 def empty_datagram_ends(quirks: Quirks) -> bool:
-    """Nothing is answered afterwards."""
+    """Requests after an empty datagram are not answered."""
     rig = Rig(quirks)
     rig.say("")
     return rig.ask("HELLO") is None
 
 
 def exit_is_silent(quirks: Quirks) -> bool:
-    """Without LOG before."""
+    """EXIT without a LOG before it is not answered."""
     return Rig(quirks).ask("EXIT") is None
 
 
 def log_deletes_files(quirks: Quirks) -> bool:
-    """The name is known, the file is away."""
+    """The server knows the name of the last file, but the file is deleted."""
     rig = Rig(quirks)
     rig.ask("MCR SLOW 20")
     rig.ask("LOG")
@@ -142,14 +142,14 @@ def log_deletes_files(quirks: Quirks) -> bool:
 
 
 def unknown_reset_repeats(quirks: Quirks) -> bool:
-    """It answers with the voltage."""
+    """RST x repeats the previous reply, here the voltage."""
     rig = Rig(quirks)
     rig.ask("VOLTS")
     return rig.ask("RST x") == "ok 24.00"
 
 
 def clock_moves_heading(quirks: Quirks) -> bool:
-    """An hour that passes at once while the robot turns."""
+    """The clock is set an hour ahead while the robot turns."""
     rig = Rig(quirks)
     rig.ask("TIME 1 1 2024 0 0 0")
     rig.drive("RM 30")
@@ -160,19 +160,19 @@ def clock_moves_heading(quirks: Quirks) -> bool:
 
 
 def undocumented_commands(quirks: Quirks) -> bool:
-    """TFSFC, for one."""
+    """TFSFC is an example."""
     return Rig(quirks).ask("TFSFC 30") == "ok"
 
 
 def heading_in_reference_moves_only(quirks: Quirks) -> bool:
-    """A spin does not move it."""
+    """A spin does not change RMRA."""
     rig = Rig(quirks)
     rig.drive("R")
     return rig.number("RMRA") == 0.0
 
 
 def probe_turns(quirks: Quirks) -> bool:
-    """MCR SLOW 0 with a dead IMU."""
+    """MCR SLOW 0 with a dead IMU turns the robot."""
     rig = Rig(quirks, imu_dies_s=0.0)
     assert rig.ask("MCR SLOW 0") == "fail MPU6050 connection lost"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -180,7 +180,7 @@ def probe_turns(quirks: Quirks) -> bool:
 
 
 def heading_starts_off(quirks: Quirks) -> bool:
-    """The second RM, after a long time."""
+    """The heading of the second RM, a long time after the first, does not start at zero."""
     rig = Rig(quirks)
     for _ in range(2):
         rig.drive("RM 30", 0.0)
@@ -198,32 +198,32 @@ SEEN: dict[str, Callable[[Quirks], bool]] = {
 
 
 def test_every_quirk_has_its_sight() -> None:
-    """None is forgotten here."""
+    """A new quirk without a detector fails here."""
     assert set(SEEN) == {field.name for field in fields(Quirks)}
 
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """All the others being there."""
+    """All other quirks are as in the public server."""
     assert SEEN[name](replace(FIRMWARE, **{name: True}))
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_unseen_on_a_server_as_documented(name: str) -> None:
-    """All the others being away as well."""
+    """All other quirks are off, as well."""
     assert not SEEN[name](DOCUMENTED)
 
 
 @pytest.mark.parametrize("name", IN_SOURCE_ALONE)
 def test_what_only_the_source_says_is_played_only_if_it_is_asked_for(name: str) -> None:
-    """Both readings of the server can be chosen."""
+    """Either variant of the server can be selected."""
     assert SEEN[name](SOURCE)
     assert not SEEN[name](FIRMWARE)
 
 
 def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
-    """SS does nothing to F, and SM ends it as if nothing had been said."""
+    """SS has no effect on F, and SM ends F as usual."""
     rig = Rig(SOURCE)
     rig.drive("F")
     rig.stop("SS")
@@ -234,7 +234,7 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """It goes on afterwards."""
+    """It still answers afterwards."""
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":
         rig.drive("F")
@@ -243,7 +243,7 @@ def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> No
 
 
 def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
-    """None of its motions is blind."""
+    """Every motion is supervised."""
     for start in ("F", "RM 30", "R"):
         rig = Rig(DOCUMENTED, imu_dies_s=1.0, front_m=200 * INCH_M)
         rig.drive(start, 5.0)
@@ -252,7 +252,7 @@ def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """It is answered then."""
+    """Its reply comes within 1 s of the stop."""
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):
             rig = Rig(DOCUMENTED)
@@ -267,12 +267,12 @@ def test_a_documented_move_is_cancelled_at_any_time() -> None:
 
 
 def test_the_ports_are_numbered_as_they_stand() -> None:
-    """The command port is the first."""
+    """The command port is channel 0."""
     assert COMMAND == 0
 
 
 def test_by_the_source_a_probe_of_a_living_imu_turns_the_robot_a_little() -> None:
-    """By one to two degrees to the right, each time."""
+    """Each probe turns it by 1 to 2.5 degrees to the right."""
     rig = Rig(SOURCE)
     for probes in (1, 2, 3):
         assert rig.ask("MCR SLOW 0") == "ok"

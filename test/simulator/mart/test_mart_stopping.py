@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which stop ends which motion of the public server, and which leaves it hanging."""
+"""Which stop request ends which motion of the public server, and which makes the server hang."""
 
 import pytest
 from mart_rig import Rig
@@ -12,7 +12,7 @@ CONFLICT = "fail conflicting action in progress"
 
 @pytest.mark.parametrize("start", ["F", "F SLOW", "F FAST", "B", "B SLOW", "B FAST", "B NORMAL"])
 def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
-    """The robot stands when it answers."""
+    """The robot is at rest when the reply comes."""
     rig = Rig()
     rig.drive(start)
     assert rig.moving
@@ -25,7 +25,7 @@ def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
 
 @pytest.mark.parametrize("speed", [45, 50, 60])
 def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
-    """Only SRM does."""
+    """SM fails during RM; only SRM ends it."""
     rig = Rig()
     rig.drive(f"RM {speed}")
     assert rig.ask("SM") == "fail no motion"
@@ -38,7 +38,7 @@ def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
 
 @pytest.mark.parametrize(("start", "degrees"), [("R", -1), ("L", 1), ("R SLOW", -1), ("L SLOW", 1)])
 def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> None:
-    """Right is negative."""
+    """A turn to the right is negative."""
     rig = Rig()
     rig.drive(start)
     answer = rig.ask("SM")
@@ -49,7 +49,7 @@ def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> No
 
 
 def test_ss_then_sm_ends_a_spin_too() -> None:
-    """SM tells the angle."""
+    """The reply to SM has the angle."""
     rig = Rig()
     rig.drive("R")
     rig.stop("SS")
@@ -61,7 +61,7 @@ def test_ss_then_sm_ends_a_spin_too() -> None:
 
 @pytest.mark.parametrize("start", ["TF 100", "TB 100", "TF SLOW 100", "TF 0"])
 def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
-    """It claims what it computed, and the port is free."""
+    """The reply has the computed distance, and the command port is free again."""
     rig = Rig()
     rig.say(start)
     rig.run(2.0)
@@ -77,7 +77,7 @@ def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
 
 @pytest.mark.parametrize("start", ["MCR 170", "MCL 170", "MCR SLOW 170"])
 def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
-    """By ok, although it did not turn so far."""
+    """The reply is ok, although the turn is incomplete."""
     rig = Rig()
     rig.say(start)
     rig.run(0.8)
@@ -93,7 +93,7 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """For good; the motors do stop."""
+    """It hangs for ever, but the motors do stop."""
     rig = Rig()
     rig.drive(start)
     rig.stop(stop)
@@ -112,7 +112,7 @@ def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
 @pytest.mark.parametrize("stop", ["SL", "SS"])
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 30", "SRM")])
 def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str) -> None:
-    """Whatever is first."""
+    """The order of the two requests does not matter."""
     rig = Rig()
     rig.drive(start)
     rig.stop(stop)
@@ -122,7 +122,7 @@ def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str
 
 
 def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
-    """SM is answered."""
+    """SM itself is answered."""
     rig = Rig()
     rig.drive("F")
     rig.say("SM")
@@ -139,7 +139,7 @@ def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30"])
 def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
-    """Questions are answered."""
+    """Requests for values are still answered."""
     rig = Rig()
     rig.drive(start)
     rig.stop("SL")
@@ -158,7 +158,7 @@ def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
 @pytest.mark.parametrize("start", ["F", "B SLOW", "RM 30"])
 @pytest.mark.parametrize("after_s", [0.001, 0.03, 0.06])
 def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: float) -> None:
-    """So is SS."""
+    """SS is ignored, too."""
     rig = Rig()
     rig.say(start)
     rig.run(after_s)
@@ -171,7 +171,7 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 
 
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
-    """At first it is forgotten; while the bias is taken, it ends the move late, as a failure."""
+    """At first it is ignored; during the bias measurement it ends the move late, as a failure."""
     rig = Rig()
     rig.say("TF 24")
     rig.run(0.03)
@@ -187,7 +187,7 @@ def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() 
 
 
 def test_l_during_rm_is_accepted_and_hangs_the_command_port_with_the_robot_spinning() -> None:
-    """Nothing is answered any more."""
+    """Later requests are not answered."""
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask("L") is None
@@ -200,7 +200,7 @@ def test_l_during_rm_is_accepted_and_hangs_the_command_port_with_the_robot_spinn
 
 @pytest.mark.parametrize("text", ["R", "F", "B", "TF 12", "MCR 20", "RM 20", "SB", "RST IMU"])
 def test_r_and_f_during_rm_are_refused_correctly(text: str) -> None:
-    """The robot drives on as before."""
+    """The motion in progress continues."""
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask(text) == CONFLICT
@@ -211,7 +211,7 @@ def test_r_and_f_during_rm_are_refused_correctly(text: str) -> None:
 @pytest.mark.parametrize("text", ["R", "L", "F", "RM 20", "TF 12", "MCR 20", "SB"])
 @pytest.mark.parametrize("start", ["F", "R"])
 def test_everything_is_refused_during_f_and_r(start: str, text: str) -> None:
-    """Even L."""
+    """Even L is refused."""
     rig = Rig()
     rig.drive(start)
     assert rig.ask(text) == CONFLICT
@@ -219,7 +219,7 @@ def test_everything_is_refused_during_f_and_r(start: str, text: str) -> None:
 
 
 def test_a_command_port_that_is_busy_executes_later_in_order() -> None:
-    """Queries and motions alike."""
+    """This holds for requests for values and for motions."""
     rig = Rig()
     rig.say("TF 12", "VOLTS", "R", "HELLO")
     assert rig.run(1.0) == []
@@ -228,7 +228,7 @@ def test_a_command_port_that_is_busy_executes_later_in_order() -> None:
 
 
 def test_nothing_stops_by_itself_when_the_host_is_lost() -> None:
-    """No watchdog."""
+    """The server has no watchdog: after 120 s the robot still moves."""
     for start in ("F", "RM 30", "R"):
         rig = Rig()
         rig.drive(start, 120.0)
@@ -236,7 +236,7 @@ def test_nothing_stops_by_itself_when_the_host_is_lost() -> None:
 
 
 def test_the_stop_port_is_never_answered() -> None:
-    """Whatever is said."""
+    """This holds for every request to it."""
     rig = Rig()
     for text in ("SL", "SS", "SDR 10", "HELLO", ""):
         rig.stop(text)
@@ -246,7 +246,7 @@ def test_the_stop_port_is_never_answered() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 120", "SRM")])
 def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
-    """A motor board that obeys slowly; RM gives itself 1.88 s if it was fast."""
+    """The motor board is slow here; after a fast RM the limit is 1.88 s."""
     rig = Rig()
     rig.ask("SLMP 1 60")
     rig.drive(start)
@@ -260,7 +260,7 @@ def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> N
 
 @pytest.mark.parametrize("start", ["TF 0", "TF 24"])
 def test_sdr_without_a_number_crashes_the_server(start: str) -> None:
-    """In a controlled move; nothing stops the motors."""
+    """It does so in a controlled move only; the motors keep their speed."""
     rig = Rig()
     rig.stop("SDR")
     assert not rig.server.crashed

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Talking to a simulated board in simulated time: what it receives, and what it has sent."""
+"""Helpers to command a simulated board and to read its output, in simulated time."""
 
 import struct
 
@@ -15,27 +15,27 @@ IMU, DELTA, POSE = b"\xff\xfa", b"\xff\xfb", b"\xff\xfc"
 
 
 def velocity(x: int, y: int, omega: int) -> bytes:
-    """A body velocity command in LSB."""
+    """Return a body velocity command, in LSB."""
     return bytes.fromhex("FF FE 01") + struct.pack(">3h", x, y, omega)
 
 
 def wheels(a: int, b: int, c: int) -> bytes:
-    """A wheel command in LSB."""
+    """Return a wheel command, in LSB."""
     return bytes.fromhex("FF FE 02") + struct.pack(">3h", a, b, c)
 
 
 def run(board: SimulatedBoard, seconds: float) -> bytes:
-    """Everything that the board sends in some simulated seconds."""
+    """Return everything that the board sends in this simulated time, in s."""
     return b"".join(board.step() for _ in range(round(seconds * 100)))
 
 
 def mode_of(board: SimulatedBoard) -> BoardMode:
-    """The mode, asked anew: a type checker would take an attribute for unchanged."""
+    """Return the mode; a type checker would assume that an attribute has not changed."""
     return board.mode
 
 
 def booted(settings: BoardSettings) -> SimulatedBoard:
-    """A board that has just become paused and has not been spoken to."""
+    """Return a board that has just become paused and has not received any bytes."""
     board = SimulatedBoard(settings)
     run(board, settings.boot_time_s)
     assert mode_of(board) is BoardMode.PAUSED
@@ -43,15 +43,15 @@ def booted(settings: BoardSettings) -> SimulatedBoard:
 
 
 def sent(board: SimulatedBoard, header: bytes) -> list[bytes]:
-    """The frames of one kind that the board has sent."""
+    """Return the frames of one kind that the board has sent."""
     return [frame.data for frame in board.sent if frame.data.startswith(header)]
 
 
 def deltas(board: SimulatedBoard) -> list[tuple[int, int, int, int]]:
-    """The 25 Hz frames so far: 0.1 mm, 0.1 mm, 1e-4 rad, SEQ."""
+    """Return the 25 Hz frames so far: 0.1 mm, 0.1 mm, 0.1 mrad, SEQ."""
     return [struct.unpack(">3hB", frame[2:]) for frame in sent(board, DELTA)]
 
 
 def poses(board: SimulatedBoard) -> list[tuple[float, float, float, int]]:
-    """The 5 Hz frames so far: mm, mm, mrad, SEQ."""
+    """Return the 5 Hz frames so far: mm, mm, mrad, SEQ."""
     return [struct.unpack(">3fB", frame[2:]) for frame in sent(board, POSE)]

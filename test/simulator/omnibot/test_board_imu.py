@@ -22,7 +22,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def readings(board: SimulatedBoard, seconds: float) -> list[tuple[float, ...]]:
-    """IMU readings in g and degrees per second over this time."""
+    """Return the IMU readings over this time, in g and °/s."""
     board.sent.clear()
     run(board, seconds)
     raw = [struct.unpack(">6h", frame[2:]) for frame in sent(board, IMU)]
@@ -30,12 +30,12 @@ def readings(board: SimulatedBoard, seconds: float) -> list[tuple[float, ...]]:
 
 
 def mean(values: list[tuple[float, ...]]) -> tuple[float, ...]:
-    """The mean of each column."""
+    """Return the mean of each column."""
     return tuple(sum(column) / len(values) for column in zip(*values, strict=True))
 
 
 def rms(values: list[tuple[float, ...]]) -> tuple[float, ...]:
-    """The deviation of each column from its mean."""
+    """Return the standard deviation of each column."""
     means = mean(values)
     return tuple(
         (sum((value - middle) ** 2 for value in column) / len(values)) ** 0.5
@@ -44,7 +44,7 @@ def rms(values: list[tuple[float, ...]]) -> tuple[float, ...]:
 
 
 def test_at_rest_the_upside_down_sensor_feels_minus_one_g() -> None:
-    """Gravity stands on -z of the sensor; bias and noise are those of the settings."""
+    """Gravity is measured on -z of the sensor; bias and noise are those of the settings."""
     board = SimulatedBoard(BoardSettings(running=True, gyro_bias_dps=(1.0, -2.0, 3.0)))
     values = readings(board, 20.0)
     assert mean(values) == pytest.approx((0.0, 0.0, -1.0, 1.0, -2.0, 3.0), abs=0.005)
@@ -68,7 +68,7 @@ def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
 
 
 def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
-    """Accelerations while speeding up add to the speed, along x as it is and along y reversed."""
+    """The integrated acceleration is the speed gained: equal on x, reversed on y."""
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
     values = readings(board, 1.0)
@@ -82,7 +82,7 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
 def test_a_curve_is_felt_as_centripetal_acceleration(
     x: int, y: int, felt_mps2: tuple[float, float]
 ) -> None:
-    """A left turn at 1 rad/s presses 0.5 m/s² to the left of the motion, y reversed."""
+    """At 0.5 m/s and 1 rad/s it is 0.5 m/s² towards the left of the motion; y is reversed."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(x, y, 500))
     run(board, 2.0)
@@ -91,7 +91,7 @@ def test_a_curve_is_felt_as_centripetal_acceleration(
 
 
 def test_readings_saturate_at_the_range_of_the_sensor() -> None:
-    """Beyond 250 degrees per second the gyro stays at the end of its int16."""
+    """Beyond 250 °/s the gyro reads the limit of int16."""
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(60, 60, 60))
     run(board, 1.0)
@@ -99,7 +99,7 @@ def test_readings_saturate_at_the_range_of_the_sensor() -> None:
 
 
 def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
-    """The root mean square over sixty robots; each step adds to those before."""
+    """The rms over sixty robots is that of the settings, because the steps of the walk add up."""
     ends = []
     for seed in range(60):
         board = SimulatedBoard(
@@ -116,7 +116,7 @@ def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
 
 
 def test_a_stuck_gyro_reads_its_counts_whatever_the_motion() -> None:
-    """All three words stay, while the accelerometer goes on."""
+    """The three gyro values are constant, while the accelerometer still varies."""
     board = SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4)))
     board.receive(velocity(0, 0, 250))
     run(board, 1.0)

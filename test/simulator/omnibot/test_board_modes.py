@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The manual's state machine: booting, paused, nominal, IMU only; what is heard in each."""
+"""The manual's state machine (booting, paused, nominal, IMU only) and what each mode obeys."""
 
 import pytest
 from board_talk import (
@@ -31,7 +31,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
-    """Nothing is sent and nothing is heard before the boot is over; then a text comes at once."""
+    """It sends and obeys nothing before the end of the boot; then it sends a text at once."""
     board = SimulatedBoard(BoardSettings(boot_time_s=0.3))
     board.receive(WAKE_UP + b"S")
     assert run(board, 0.29) == b""
@@ -48,7 +48,7 @@ def test_a_paused_board_counts_once_a_second() -> None:
 
 
 def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
-    """The first S after the boot is lost when fewer than three bytes went before."""
+    """The first S after the boot is lost if fewer than three bytes came before it."""
     board = booted(BoardSettings())
     board.receive(b"SSS")
     assert mode_of(board) is BoardMode.PAUSED
@@ -57,7 +57,7 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """Three bytes during the boot, and the first S afterwards is obeyed."""
+    """After three bytes during the boot, the first S is obeyed."""
     board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
     board.receive(bytes(3))
     run(board, 0.3)
@@ -77,7 +77,7 @@ def test_p_pauses_and_unpauses() -> None:
 
 
 def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
-    """Start is idempotent, and a motion goes on through it."""
+    """Start is idempotent, and a motion continues after it."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + b"SS" + velocity(35, 0, 0))
     run(board, 1.0)
@@ -88,7 +88,7 @@ def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
 
 
 def test_r_reboots_the_board_but_not_the_robot() -> None:
-    """Odometry, SEQ and the wake-up start afresh; the true pose stays."""
+    """Odometry, SEQ and the wake-up begin again; the true pose stays."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
@@ -108,7 +108,7 @@ def test_r_reboots_the_board_but_not_the_robot() -> None:
 
 
 def test_a_power_cycle_does_what_r_does() -> None:
-    """`reboot` and the letter end in the same state."""
+    """``reboot`` and the letter R end in the same state."""
     by_letter, by_power = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
     by_letter.receive(b"R")
     by_power.reboot()
@@ -117,7 +117,7 @@ def test_a_power_cycle_does_what_r_does() -> None:
 
 
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
-    """A 0x52 within a command resets a paused board, a 0x50 sets it running."""
+    """A 0x52 within a command resets a paused board, and a 0x50 starts it."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
     assert mode_of(board) is BoardMode.BOOTING
@@ -129,7 +129,7 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """The frame that wakes the board can reset it, too."""
+    """The rest of the frame is read as letters, so a 0x52 in it resets the board."""
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
     assert [command.kind for command in board.commands] == ["reset"]
@@ -137,7 +137,7 @@ def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() ->
 
 
 def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -> None:
-    """The 0x50 acts, and the rest of the frame meets a board that looks for letters alone."""
+    """The first 0x50 pauses the board, which then reads letters only: the second one starts it."""
     board = SimulatedBoard(BoardSettings(running=True, receiver=ReceiverKind(letters="anywhere")))
     board.receive(wheels(0x50, 0, 0x50))
     assert [command.kind for command in board.commands] == ["pause", "pause"]
@@ -153,7 +153,7 @@ def test_a_running_board_takes_no_letters_out_of_frames() -> None:
 
 
 def test_an_unknown_control_mode_is_ignored() -> None:
-    """Its frame is taken whole and changes nothing."""
+    """All bytes of the frame are consumed, so a 0x50 in it is not a letter."""
     board = SimulatedBoard(RUNNING)
     board.receive(bytes.fromhex("FF FE 03 00 50 00 50 00 50"))
     assert not board.commands
@@ -161,7 +161,7 @@ def test_an_unknown_control_mode_is_ignored() -> None:
 
 
 def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
-    """The frame is taken off the line and ignored."""
+    """The frame is consumed and ignored."""
     board = SimulatedBoard(BoardSettings(running=True, obeys_estop=False))
     board.receive(velocity(35, 0, 0) + ESTOP)
     assert [command.kind for command in board.commands] == ["velocity"]
@@ -170,7 +170,7 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 
 
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
-    """By the time that the caller gives, or else by the ticks in between."""
+    """The pause is measured by the caller's times or, without them, by the ticks in between."""
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))
     timed.receive(STOP[:-1], 5.000)
@@ -183,7 +183,7 @@ def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() ->
 
 
 def test_what_was_received_and_obeyed_is_on_record() -> None:
-    """The record has all bytes, and commands with tick, kind and values."""
+    """The logs contain all bytes received, and each command with tick, kind and values."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)
     data = velocity(1, -2, 3) + b"x" + STOP
@@ -197,7 +197,7 @@ def test_what_was_received_and_obeyed_is_on_record() -> None:
 
 @pytest.mark.slow
 def test_the_record_of_received_bytes_is_bounded() -> None:
-    """The newest bytes are kept."""
+    """The newest bytes are kept, about a million at most."""
     board = SimulatedBoard(RUNNING)
     for _ in range(30):
         board.receive(bytes(100_000))
@@ -218,7 +218,7 @@ command_bytes = st.lists(
 @given(command_bytes, st.data())
 @settings(max_examples=60)
 def test_the_chunking_of_the_input_does_not_matter(stream: bytes, data: st.DataObject) -> None:
-    """The same bytes within one tick, however cut, are obeyed alike and answered alike."""
+    """The same bytes within one tick, in any chunks, have the same effects and replies."""
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=10)))
     whole, cut = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
     whole.receive(stream)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Control frames: velocities, wheels, stops, and poses with the switch on position."""
+"""Control frames: velocities, wheel speeds, stops, and poses (with the switch on position)."""
 
 from math import hypot
 
@@ -28,7 +28,7 @@ from omnibot_driver.simulator.omnibot import (
     ],
 )
 def test_a_commanded_velocity_is_reached(command: bytes, twist: tuple[float, float, float]) -> None:
-    """70 LSB are 1 m/s and 500 LSB are 1 rad/s, settled after two seconds."""
+    """70 LSB are 1 m/s and 500 LSB are 1 rad/s, reached after 2 s."""
     board = SimulatedBoard(RUNNING)
     board.receive(command)
     run(board, 2.0)
@@ -57,7 +57,7 @@ def test_a_wheel_command_drives_that_wheel_alone() -> None:
 
 
 def test_a_motion_goes_on_without_further_commands() -> None:
-    """The board does not stop by itself."""
+    """The board has no command timeout: after 60 s it still drives."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 60.0)
@@ -76,7 +76,7 @@ def test_stop_stops() -> None:
 
 @pytest.mark.parametrize("latches", [False, True])
 def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
-    """The motors are off within the tick, and the robot stands within 0.3 s."""
+    """The motors are off within the tick, and the robot is at rest within 0.3 s."""
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=latches))
     board.receive(velocity(35, 0, 0))
     run(board, 1.0)
@@ -90,7 +90,7 @@ def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
 
 
 def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> None:
-    """The next motion command moves the robot again."""
+    """A driver that relies on a latch would let this robot move again."""
     board = SimulatedBoard(RUNNING)
     board.receive(ESTOP + velocity(35, 0, 0))
     assert not board.estopped
@@ -99,7 +99,7 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 
 
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
-    """Setpoint, pause and start do not release it, a reset does; refused motion is not logged."""
+    """Only a reset releases it, not a command, pause or start; refused motion is not logged."""
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))
     run(board, 2.0)
@@ -121,7 +121,7 @@ POSITION = BoardSettings(running=True, control="position")
 def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
     goal: tuple[int, int, int],
 ) -> None:
-    """In mm and mrad of the board's own earth frame, whole turns included; then it stands."""
+    """The pose is in mm and mrad of the board's earth frame, with full turns; it stops there."""
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))
     run(board, 15.0)
@@ -134,7 +134,7 @@ def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
 
 
 def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
-    """The distance of the pose does not matter."""
+    """The speed is limited to 0.3 m/s, however far away the pose is."""
     board = SimulatedBoard(POSITION)
     board.receive(velocity(5000, 5000, 0))
     run(board, 5.0)
@@ -142,7 +142,7 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """The reason why Stop is a frame of mode two."""
+    """This is why Stop is a frame of mode 2."""
     board = SimulatedBoard(
         BoardSettings(running=True, control="position", initial_pose=BoardPose(1000.0))
     )
@@ -157,7 +157,7 @@ def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> Non
 
 @pytest.mark.parametrize("ending", [ESTOP, b"P", b"PS"])
 def test_an_emergency_stop_or_a_pause_forgets_the_pose_to_drive_to(ending: bytes) -> None:
-    """It does not drive on afterwards."""
+    """The robot does not continue to the pose afterwards."""
     board = SimulatedBoard(POSITION)
     board.receive(velocity(1000, 0, 0))
     run(board, 1.0)
@@ -169,7 +169,7 @@ def test_an_emergency_stop_or_a_pause_forgets_the_pose_to_drive_to(ending: bytes
 
 
 def test_a_pause_stops_the_motors_and_forgets_the_command() -> None:
-    """The robot stands after un-pausing until it is commanded anew."""
+    """After un-pausing, the robot is at rest until the next command."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 1.0)

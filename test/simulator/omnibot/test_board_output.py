@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a running board sends, when, and what its odometry makes of the encoders."""
+"""The output of a running board, its timing, and its odometry from the encoders."""
 
 from math import hypot, pi
 from random import Random
@@ -33,7 +33,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
-    """Ten seconds hold 1000 IMU frames, 250 deltas and 50 poses, and nothing else."""
+    """In 10 s it sends 1000 IMU frames, 250 deltas and 50 poses, and nothing else."""
     board = SimulatedBoard(RUNNING)
     data = run(board, 10.0)
     counts = [len(sent(board, header)) for header in (IMU, DELTA, POSE)]
@@ -42,7 +42,7 @@ def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
 
 
 def test_a_board_may_send_its_deltas_at_10_hz() -> None:
-    """The manual's other figure: ten IMU frames to each, which holds the motion of all of them."""
+    """The manual's other rate: one delta for ten IMU frames, with the motion of all ten ticks."""
     board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     board.receive(velocity(35, 0, 0))
     run(board, 10.0)
@@ -53,7 +53,7 @@ def test_a_board_may_send_its_deltas_at_10_hz() -> None:
 
 
 def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
-    """The third mode of the manual listens like the second."""
+    """In this mode the board obeys the same commands as in nominal mode."""
     board = booted(BoardSettings(imu_only=True))
     board.receive(WAKE_UP + b"S" + velocity(35, 0, 0))
     data = run(board, 2.0)
@@ -63,7 +63,7 @@ def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
 
 
 def test_within_a_tick_the_order_is_imu_delta_pose() -> None:
-    """The twentieth tick carries all three."""
+    """All three are sent in the twentieth tick."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.19)
     tick = board.step()
@@ -72,7 +72,7 @@ def test_within_a_tick_the_order_is_imu_delta_pose() -> None:
 
 
 def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
-    """Its frames in order are the bytes that left the board."""
+    """Its frames, joined in order, are the bytes that ``step`` returned."""
     board = SimulatedBoard(BoardSettings())
     first = run(board, 1.0)
     board.receive(WAKE_UP + b"S")
@@ -80,7 +80,7 @@ def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
 
 
 def test_both_sequences_count_by_themselves_and_wrap() -> None:
-    """Each SEQ is its own uint8, from zero."""
+    """Deltas and poses each have their own SEQ, a uint8 from zero."""
     board = SimulatedBoard(RUNNING)
     run(board, 52.0)
     assert [seq for *_, seq in deltas(board)] == [n % 256 for n in range(1300)]
@@ -104,7 +104,7 @@ def test_a_sequence_goes_on_after_a_pause() -> None:
 
 
 def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
-    """Ticks count from the end of the boot, whatever the mode is in them."""
+    """Ticks are counted from the end of the boot in every mode, so the phase does not change."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)
     board.receive(b"P")
@@ -119,7 +119,7 @@ def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
 
 
 def drive_square(board: SimulatedBoard) -> None:
-    """Drive four sides of a metre, two of them sideways, and turn by 90 degrees half way."""
+    """Drive four sides of 1 m, two of them sideways, and turn by 90 degrees half-way."""
     legs = [velocity(35, 0, 0), velocity(0, 35, 0)] * 2
     for leg, command in enumerate(legs):
         board.receive(command)
@@ -134,7 +134,7 @@ def drive_square(board: SimulatedBoard) -> None:
 
 
 def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
-    """They agree within a millimetre after four metres without slip and scale errors."""
+    """Without slip and scale errors, they agree to 1 mm after 4 m."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     truth, odometry = board.truth, board.odometry
@@ -146,7 +146,7 @@ def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
 
 
 def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
-    """The board believes in its wheels, the truth does not."""
+    """The board's odometry assumes nominal wheels; the true pose does not."""
     board = SimulatedBoard(
         BoardSettings(running=True, slip=0.05, wheel_radius_scale=(1.0, 1.01, 1.0))
     )
@@ -158,7 +158,7 @@ def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
 
 
 def test_earth_frame_deltas_add_up_to_the_pose() -> None:
-    """Summed unrotated, they are the board's own pose to half an LSB for each."""
+    """Their sum, without rotation, is the board's pose within half an LSB per delta."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     run(board, 0.2 - 0.01 * (board.tick % 20))
@@ -176,7 +176,7 @@ def test_earth_frame_deltas_add_up_to_the_pose() -> None:
 def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
     frame: str, expected: tuple[int, int, int]
 ) -> None:
-    """The robot drives at 0.5 m/s along the earth's y: 20 mm, along y or along x."""
+    """At 0.5 m/s along the earth's y axis, 20 mm appear in y (earth) or in x (body)."""
     board = SimulatedBoard(
         BoardSettings(
             running=True,
@@ -190,7 +190,7 @@ def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
 
 
 def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
-    """A board that has already driven sends its pose, and deltas of zero while it stands."""
+    """A board that has already driven sends its pose, and zero deltas while it is at rest."""
     board = SimulatedBoard(
         BoardSettings(running=True, initial_pose=BoardPose(1500.0, -250.0, 8000.0))
     )
@@ -201,7 +201,7 @@ def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
 
 
 def test_the_heading_is_sent_unwrapped() -> None:
-    """Two turns are more than 2 pi, in mrad."""
+    """After more than two turns it exceeds 4 pi, in mrad."""
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(-40, -40, -40))
     run(board, 4.0)
@@ -209,7 +209,7 @@ def test_the_heading_is_sent_unwrapped() -> None:
 
 
 def test_the_pose_can_be_sent_little_endian() -> None:
-    """The setting turns the bytes of the floats round."""
+    """The setting reverses the bytes of each float."""
     pose = BoardPose(1000.0, 0.0, 0.0)
     board = SimulatedBoard(BoardSettings(running=True, pose_byte_order="little", initial_pose=pose))
     run(board, 0.2)
@@ -217,7 +217,7 @@ def test_the_pose_can_be_sent_little_endian() -> None:
 
 
 def test_equal_settings_and_input_give_equal_bytes() -> None:
-    """The seed decides over everything random."""
+    """The seed determines all random numbers."""
 
     def stream(seed: int) -> bytes:
         board = SimulatedBoard(BoardSettings(seed=seed, running=True, slip=0.1))

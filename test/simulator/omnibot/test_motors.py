@@ -10,7 +10,7 @@ from omnibot_driver.simulator.omnibot.motors import DEAD_ZONE_PWM, PWM_LIMIT, Mo
 
 
 class Wheel:
-    """A motor under its controller, seen through its encoder as in the firmware."""
+    """A motor with its controller, which sees it through the encoder as in the firmware."""
 
     def __init__(self) -> None:
         self.motor = Motor()
@@ -20,7 +20,7 @@ class Wheel:
         self._encoder = self.motor.encoder
 
     def hold(self, target: float, ticks: int) -> list[float]:
-        """Control for some ticks; return the true speed after each of them."""
+        """Run the controller for some ticks; return the true speed after each of them."""
         speeds = []
         for _ in range(ticks):
             self.motor.advance(self.pwm)
@@ -42,7 +42,7 @@ def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target:
 
 @pytest.mark.parametrize("target", [12.2, 41.6, 73.4, 300.0])
 def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
-    """Two seconds after the stop the wheel stands, and no limit cycle moves it again."""
+    """Two seconds after the stop the wheel is at rest, and no limit cycle moves it again."""
     wheel = Wheel()
     wheel.hold(target, 200)
     wheel.hold(0.0, 200)
@@ -50,7 +50,7 @@ def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
 
 
 def test_saturation_does_not_wind_up_the_integrator() -> None:
-    """After ten seconds of an unreachable speed a slow one is reached as soon as after one."""
+    """A slow speed is reached as soon after 10 s of saturation as after 1 s."""
     long, short = Wheel(), Wheel()
     long.hold(300.0, 1000)
     short.hold(300.0, 100)
@@ -64,7 +64,7 @@ def test_the_effort_saturates() -> None:
 
 
 def test_efforts_within_the_dead_zone_move_nothing() -> None:
-    """A resting wheel breaks away only beyond the dead zone."""
+    """A resting wheel starts to turn only beyond the dead zone."""
     motor = Motor()
     assert motor.advance(DEAD_ZONE_PWM) == 0.0
     assert motor.advance(-DEAD_ZONE_PWM) == 0.0
@@ -89,7 +89,7 @@ def test_friction_never_drives_a_wheel(efforts: list[float]) -> None:
 @given(st.floats(-90, 90))
 @settings(max_examples=50)
 def test_a_motor_without_power_stops_within_a_third_of_a_second(speed: float) -> None:
-    """Friction ends every motion, without a step back."""
+    """Friction ends every motion without reversing it."""
     motor = Motor()
     motor.speed = speed
     turned = [motor.advance(0.0) for _ in range(33)]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Names of the simulator that moved, for one release."""
+"""Old names of the simulator that can still be imported for one release."""
 
 import subprocess
 import sys
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[3]
 def test_a_name_is_found_where_it_was_with_a_warning(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is the same object, and the warning says where it is now."""
+    """It is the same object, and the warning gives the new place."""
     monkeypatch.delitem(vars(simulator), name, raising=False)
     with pytest.warns(DeprecationWarning, match=r"from omnibot_driver\.simulator\.omnibot"):
         assert getattr(simulator, name) is getattr(omnibot, name)
@@ -26,13 +26,13 @@ def test_a_name_is_found_where_it_was_with_a_warning(
 
 
 def test_a_name_that_never_was_there_is_not_found() -> None:
-    """It raises as in any module."""
+    """An AttributeError is raised, as in any module."""
     with pytest.raises(AttributeError, match="has no attribute 'wheels'"):
         _ = simulator.wheels
 
 
 def test_no_board_is_imported_before_it_is_asked_for() -> None:
-    """A program that simulates another board does not load this one."""
+    """A program that simulates another board does not load the OmniBot."""
     program = "import sys, omnibot_driver.simulator; print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT

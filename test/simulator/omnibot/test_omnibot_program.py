@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated OmniBot as a program of its own."""
+"""The simulated OmniBot as a separate program."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from simulator_program import PATIENCE_S, line, say, simulator
 
 
 def test_the_first_line_is_the_path_and_nothing_else() -> None:
-    """A script can open what it reads; the hints for people name it on stderr."""
+    """A script can open the path that it reads; the hints for people are on stderr."""
     with simulator() as process:
         path = line(process)
         os.close(os.open(path, os.O_RDWR | os.O_NOCTTY))
@@ -22,7 +22,7 @@ def test_the_first_line_is_the_path_and_nothing_else() -> None:
 
 
 def test_the_console_tells_the_truth() -> None:
-    """`truth` answers with one line of JSON that holds pose and mode."""
+    """``truth`` prints one line of JSON that contains pose and mode."""
     with simulator("--running") as process:
         line(process)
         say(process, "truth")
@@ -34,7 +34,7 @@ def test_the_console_tells_the_truth() -> None:
 
 
 def test_the_console_reboots_the_board() -> None:
-    """After `reboot` a running board boots."""
+    """After ``reboot``, a running board is booting, or paused."""
     with simulator("--running") as process:
         line(process)
         say(process, "reboot\ntruth")
@@ -45,7 +45,7 @@ def test_the_console_reboots_the_board() -> None:
 
 
 def test_the_end_of_the_input_does_not_end_it() -> None:
-    """The board runs through its boot and beyond with /dev/null as stdin."""
+    """With /dev/null as stdin, the board still runs after its boot."""
     with simulator(stdin=subprocess.DEVNULL) as process:
         port = os.open(line(process), os.O_RDONLY | os.O_NOCTTY)
         try:
@@ -56,7 +56,7 @@ def test_the_end_of_the_input_does_not_end_it() -> None:
 
 
 def test_the_options_reach_the_board() -> None:
-    """An IMU-only board with a running start says so."""
+    """With ``--running`` and ``--imu-only`` it starts in IMU only mode."""
     with simulator("--running", "--imu-only") as process:
         line(process)
         say(process, "truth")

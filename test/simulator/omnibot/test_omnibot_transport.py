@@ -17,7 +17,7 @@ PATIENCE_S = 20.0
 
 
 def read(transport: SimulatedTransport) -> bytes:
-    """The next bytes."""
+    """Return the next bytes."""
     deadline_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline_s:
         if data := transport.read()[1]:
@@ -26,7 +26,7 @@ def read(transport: SimulatedTransport) -> bytes:
 
 
 def test_a_board_boots_and_obeys() -> None:
-    """It says that it is paused, and sends data once it is woken and started."""
+    """It sends its paused text, and data frames after it is woken and started."""
     with closing(SimulatedTransport("sim://", OMNIBOT)) as transport:
         assert read(transport) == b"Paused: 0 \n"
         transport.write([(0, bytes(8)), (0, b"S")])
@@ -45,7 +45,7 @@ def test_a_board_boots_and_obeys() -> None:
     ],
 )
 def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
-    """The message names the option, the whole list and an example."""
+    """The message says what is wrong and names the command that lists the options."""
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, OMNIBOT)
     assert why in str(refusal.value)

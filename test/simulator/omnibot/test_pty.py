@@ -14,7 +14,7 @@ RUNNING = BoardSettings(running=True)
 
 
 def read_until(descriptor: int, wanted: bytes) -> bytes:
-    """What comes out of a descriptor up to the first chunk that holds the wanted bytes."""
+    """Return what a descriptor yields, up to the first chunk that contains the wanted bytes."""
     data = b""
     deadline_s = time.monotonic() + PATIENCE_S
     while wanted not in data:
@@ -25,7 +25,7 @@ def read_until(descriptor: int, wanted: bytes) -> bytes:
 
 
 def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
-    """A predicate: the board is in this mode."""
+    """Return a predicate: the board is in this mode."""
     return lambda board: board.mode is mode
 
 
@@ -46,7 +46,7 @@ def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> N
 
 
 def test_the_stream_read_is_the_stream_sent() -> None:
-    """No byte is changed, added or lost while somebody reads."""
+    """No byte is changed, added or lost while a program reads."""
     with PtyBoard(SimulatedBoard(RUNNING)) as pty:
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
         try:
@@ -62,7 +62,7 @@ def test_the_stream_read_is_the_stream_sent() -> None:
 
 
 def test_the_terminal_outlives_the_program_that_opened_it() -> None:
-    """A second program finds the board as the first one left it."""
+    """A second program finds the board in the state in which the first one left it."""
     with PtyBoard(SimulatedBoard(RUNNING)) as pty:
         for letter, mode in ((b"P", BoardMode.PAUSED), (b"S", BoardMode.NOMINAL)):
             port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)

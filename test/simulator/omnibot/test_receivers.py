@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated receivers against bytes typed by hand: what each makes of damaged commands."""
+"""The simulated receivers, with damaged commands typed by hand as input."""
 
 import pytest
 from hypothesis import given
@@ -40,7 +40,7 @@ def understood(
     control_frames: bool = True,
     pause_s: float = 0.05,
 ) -> list[Command]:
-    """What a fresh receiver makes of bytes in hexadecimal, with a pause between the writes."""
+    """Return the commands that a fresh receiver finds in hexadecimal writes with pauses between."""
     receiver = CommandReceiver(kind, awake=awake)
     commands: list[Command] = []
     now_s = 0.0
@@ -57,7 +57,7 @@ def understood(
 def test_every_receiver_understands_each_command_of_the_appendix(
     typed: str, mode: int, values: tuple[int, int, int], kind: ReceiverKind
 ) -> None:
-    """Frames are undamaged, with zero bytes before them or without."""
+    """The frames are undamaged, with or without zero bytes before them."""
     assert understood(typed, kind=kind) == [ControlFrame(mode, values)]
     assert understood("00 00 00" + typed, kind=kind) == [ControlFrame(mode, values)]
 
@@ -77,7 +77,7 @@ def test_frames_back_to_back_are_all_understood(typed: list[str], kind: Receiver
 def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(
     noise: bytes, awake: bool, control_frames: bool, kind: ReceiverKind
 ) -> None:
-    """Eight zeros bring every receiver back to listening for letters, after any bytes."""
+    """After any bytes, eight zeros make every receiver ready for a letter again."""
     data = (noise + bytes(8)).hex() + "53"
     commands = understood(data, kind=kind, awake=awake, control_frames=control_frames)
     assert commands[-1] is START
@@ -87,7 +87,7 @@ def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(
 
 
 def test_letters_act_between_control_frames_and_not_within() -> None:
-    """A frame full of P, R and S is one frame; the letters around it are letters."""
+    """A frame that contains P, R and S is one frame; only the letters around it act."""
     assert understood("53 FF FE 01 00 50 00 52 00 53 50") == [
         START,
         ControlFrame(0x01, (0x50, 0x52, 0x53)),
@@ -96,7 +96,7 @@ def test_letters_act_between_control_frames_and_not_within() -> None:
 
 
 def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
-    """The same bytes: each letter acts, and the frame is complete with the last of them."""
+    """Each letter within a frame acts, and the last byte still completes the frame."""
     assert understood("53 FF FE 01 00 50 00 52 00 53 50", kind=LETTERS_ANYWHERE) == [
         START,
         PAUSE,
@@ -109,13 +109,13 @@ def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
 
 @every_kind
 def test_letters_within_a_control_frame_act_where_frames_are_not_obeyed(kind: ReceiverKind) -> None:
-    """Where only letters are obeyed, a motion frame acts by the letters it happens to contain."""
+    """While only letters are obeyed, each byte of a motion frame that is a letter acts."""
     frame = "FF FE 01 00 50 00 52 00 53"
     assert understood(frame, kind=kind, control_frames=False) == [PAUSE, RESET, START]
 
 
 def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
-    """FF S is a stray byte and a start, unless the firmware takes the S for half a header."""
+    """FF S is a stray byte and a start; only the naive firmware loses the S as half a header."""
     assert understood("FF 53") == [START]
     assert understood("FF 53", kind=WINDOW) == [START]
     assert understood("FF 53", kind=NAIVE) == []
@@ -123,7 +123,7 @@ def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
 
 
 def test_the_window_takes_no_letter_soon_after_a_header() -> None:
-    """Nine bytes after FF FE have passed when the next letter acts."""
+    """A letter acts only when the FF FE has left the window of nine bytes."""
     assert understood("FF FE 02 00 00 00 53 00 00 53", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0x0053, 0)),
         START,
@@ -134,26 +134,26 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """Stop, one byte short, takes the next frame's FF: wheel C turns at 255 LSB."""
+    """A stop that lost a byte takes the FF of the next frame: wheel C turns at 255 LSB."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole) == [ControlFrame(0x02, (0, 0, 255))]
     assert understood(short, whole, pause_s=3600.0) == [ControlFrame(0x02, (0, 0, 255))]
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
-    """The P that was to pause the robot makes it spin."""
+    """The P that should pause the robot makes it turn instead."""
     assert understood("FF FE 02 00 00 00 00 00", "50") == [ControlFrame(0x02, (0, 0, 80))]
 
 
 def test_an_idle_gap_ends_half_a_frame() -> None:
-    """The next frame is understood as it is, and a letter is a letter."""
+    """The next frame is found, and a letter acts."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole, kind=IDLE_GAP) == [STOP]
     assert understood(short, "50", kind=IDLE_GAP) == [PAUSE]
 
 
 def test_a_pause_of_less_than_five_milliseconds_is_no_idle_gap() -> None:
-    """Then it counts on, as bytes may be late."""
+    """The receiver continues to count, because bytes may be late."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     false = [ControlFrame(0x02, (0, 0, 255))]
     assert understood(short, whole, kind=IDLE_GAP, pause_s=0.0048) == false
@@ -162,7 +162,7 @@ def test_a_pause_of_less_than_five_milliseconds_is_no_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """It forgets nothing, so the header whose first byte it took for a value is still seen."""
+    """It keeps the bytes, so it also finds the header whose first byte it used as a value."""
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
         STOP,
@@ -170,7 +170,7 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """The value -2 reads as FF FE; so 02 and six bytes after it are a second frame."""
+    """The value -2 is FF FE, so 02 and the six bytes after it form a second frame."""
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))
     assert understood(data, kind=WINDOW) == [first, second]
@@ -178,7 +178,7 @@ def test_a_window_finds_a_header_within_a_frame() -> None:
 
 
 def test_a_frame_without_its_header_acts_by_its_letters() -> None:
-    """FF or FE lost: the payload's 52 is R."""
+    """If FF or FE is lost, a 52 in the payload acts as R."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         assert understood("FE 01 00 52 00 00 00 00", kind=kind) == [RESET]
         assert understood("FF 01 00 52 00 00 00 00", kind=kind) == [RESET]
@@ -188,14 +188,14 @@ def test_a_frame_without_its_header_acts_by_its_letters() -> None:
 
 
 def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
-    """FF FF FE starts a frame with its second FF."""
+    """In FF FF FE, the frame starts with the second FF."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         typed = "FF FF FE 02 00 20 00 00 00 00"
         assert understood(typed, kind=kind) == [ControlFrame(0x02, (32, 0, 0))]
 
 
 def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None:
-    """Its second FF is gone as half a header; the payload is left, and a letter in it acts."""
+    """It discards the second FF; the payload is then read as letters."""
     assert understood("FF FF FE 02 00 20 00 00 00 00", kind=NAIVE) == []
     assert understood("FF FF FE 02 00 52 00 00 00 00", kind=NAIVE) == [RESET]
 
@@ -205,19 +205,19 @@ def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None
 
 @every_kind
 def test_the_first_three_bytes_after_power_up_are_swallowed(kind: ReceiverKind) -> None:
-    """The serial initialisation takes any three bytes, letters included."""
+    """The manual's serial initialization consumes any three bytes, even letters."""
     assert understood("52 50 53 53", kind=kind, awake=False) == [START]
 
 
 @every_kind
 def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> None:
-    """What is left of a motion frame after the wake-up is read as letters."""
+    """After the wake-up, the rest of the motion frame is read as letters."""
     assert understood("FF FE 01 00 52 00 00 00 00", kind=kind, awake=False) == [RESET]
 
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """Two of them; what is left of the three is swallowed afterwards."""
+    """After two bytes during the boot, one or three more are consumed afterwards."""
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()

@@ -59,12 +59,12 @@ def test_the_pose_frame_is_laid_out_as_in_the_manual() -> None:
 
 
 def test_the_pose_frame_can_be_little_endian() -> None:
-    """The other reading of the manual reverses each float and nothing else."""
+    """The other reading of the manual reverses the bytes of each float and nothing else."""
     sent = pose_frame(1000.0, -2.5, 1.0, 7, "little")
     assert sent == bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 07")
 
 
 def test_the_paused_text_is_the_one_of_the_manual() -> None:
-    """A space stands before the line feed."""
+    """It has a space before the line feed."""
     assert paused_text(0) == b"Paused: 0 \n"
     assert paused_text(255) == b"Paused: 255 \n"

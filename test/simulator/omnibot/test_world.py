@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Geometry, truth and the departures of the truth from what the board believes."""
+"""Geometry, the true pose, and its deviations from what the board assumes."""
 
 from math import cos, pi, sqrt
 
@@ -41,7 +41,7 @@ def test_a_pose_moves_at_the_mean_heading_of_the_step() -> None:
 
 
 def drive(settings: BoardSettings, ticks: int = 300) -> World:
-    """Turn all three wheels forward, which turns the robot clockwise on the spot."""
+    """Return a world whose wheels all turned forward: the robot turned clockwise on the spot."""
     world = World(settings)
     for _ in range(ticks):
         world.advance((1000.0, 1000.0, 1000.0))
@@ -49,21 +49,21 @@ def drive(settings: BoardSettings, ticks: int = 300) -> World:
 
 
 def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
-    """A radius scale changes the truth by its factor and leaves the encoders alone."""
+    """A radius scale multiplies the true motion and does not change the encoders."""
     plain, large = drive(BoardSettings()), drive(BoardSettings(wheel_radius_scale=(1.02,) * 3))
     assert large.encoders == plain.encoders
     assert large.truth.yaw_rad == pytest.approx(1.02 * plain.truth.yaw_rad)
 
 
 def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
-    """The base turns less by its factor, and the encoders do not show it."""
+    """A base radius scale divides the true turn and does not change the encoders."""
     plain, wide = drive(BoardSettings()), drive(BoardSettings(base_radius_scale=1.05))
     assert wide.encoders == plain.encoders
     assert wide.truth.yaw_rad == pytest.approx(plain.truth.yaw_rad / 1.05)
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """Over many wheel turns the loss averages to the setting, and it depends on the seed."""
+    """Over many wheel turns the loss averages to the setting; its details depend on the seed."""
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)
     second = drive(BoardSettings(slip=0.1, seed=2), 3000)
@@ -73,7 +73,7 @@ def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
 
 
 def test_the_twist_is_the_derivative_of_the_pose() -> None:
-    """The yaw grows by the yaw rate in a steady turn."""
+    """In a steady turn, the yaw grows by the yaw rate."""
     world = drive(BoardSettings())
     before = world.truth
     world.advance((1000.0, 1000.0, 1000.0))
@@ -81,7 +81,7 @@ def test_the_twist_is_the_derivative_of_the_pose() -> None:
 
 
 def test_a_force_moves_the_robot_in_its_direction() -> None:
-    """It acts like efforts of the motors in the pattern of that motion."""
+    """It acts like motor efforts that command a motion in this direction."""
     for force, moved in (((500.0, 0.0, 0.0), 0), ((0.0, 500.0, 0.0), 1), ((0.0, 0.0, 500.0), 2)):
         world = World(BoardSettings())
         world.force = Force(*force)
@@ -110,7 +110,7 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """The motors do not matter; afterwards they continue from there."""
+    """The motors have no effect while it is gripped; afterwards they continue from there."""
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
     for _ in range(100):
@@ -125,7 +125,7 @@ def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> N
 
 
 def test_swapped_motors_get_each_others_effort() -> None:
-    """The encoders stay where they are."""
+    """Each encoder stays with its wheel."""
     world = World(BoardSettings(motor_wiring=(2, -1, 3)))
     for _ in range(50):
         world.advance((1000.0, 500.0, 0.0))

@@ -1,14 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How well any fit could tell the time constants of a wheel from its records, by the Cramér-Rao
-bound, by hand:
+"""Calculate how exactly any fit could find a wheel's time constants, by the Cramér-Rao bound.
+
+Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-For the random robots of ``judge_step.py``, 24 starts of 120 ticks. Three kinds of noise of 10 %
-from one tick to the next: of each time by itself; of marks that are in other places in each record;
-of marks that are in the same places in each turn, beside which the board's steps of 0.1 ms and a
-load of 0.5 % are what is left. A change of the load is taken for one of the rate of each record.
+The robots are the random ones of ``judge_step.py``, with 24 starts of 120 ticks each. The noise of
+the times between marks is of three kinds. With "each time" it is 10 % and independent; with "other
+marks" it is 10 %, from misplaced marks that differ in each turn. With "same marks" the marks are
+the same in each turn, so that they can be found, and only the board's steps of 0.1 ms remain. In
+addition the load changes by 0.5 % from record to record, which is taken for a change of the rate.
 """
 
 from random import Random
@@ -27,20 +29,24 @@ Column = NDArray[np.float64]
 
 
 def times_s(values: Column) -> Column:
-    """When marks are passed: values are rate, slow, fast, then the places of the marks."""
+    """Return the times in s at which the marks are passed.
+
+    ``values`` are the rate in marks per s, the slow and the fast time constant in s, then the
+    places of the marks.
+    """
     rate, slow_s, fast_s = values[:3]
     grid_s = np.linspace(0.0, 1.0, 20_000) ** 2 * (SAMPLES + 3) / rate * 1.5
     return np.interp(values[3:], rate * turned(grid_s, slow_s, fast_s), grid_s)
 
 
 def bound(rate: float, slow_s: float, fast_s: float, kind: str) -> float:
-    """Least standard deviation of the fast time constant, relative."""
+    """Return the least relative standard deviation of the fast time constant."""
     information = np.zeros((3, 3))
     for record in range(RECORDS):
         places = (record + 0.5) / RECORDS + np.arange(SAMPLES + 1)
         values = np.array([rate, slow_s, fast_s, *places])
         slopes = np.array([_slope(values, place) for place in range(3)]).T
-        begin = _slope(values, slice(3, None))  # all marks alike: where the record begins
+        begin = _slope(values, slice(3, None))  # all marks shifted alike: where the record begins
         ways_s = np.diff(times_s(values))
         jacobian = np.diff(np.column_stack((slopes, begin, rate * slopes[:, 0])), axis=0)
         jacobian /= ways_s[:, None]
@@ -59,7 +65,7 @@ def _slope(values: Column, place: int | slice) -> Column:
 
 
 def _covariance(kind: str, ways_s: Column) -> Column:
-    """Of the relative errors of the times."""
+    """Return the covariance of the relative errors of the times."""
     count = len(ways_s)
     if kind == "each time":
         return NOISE**2 * np.eye(count)

@@ -1,11 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Plants and gains of robots that the fit does not know, as ``judge_step.py`` but without a driver:
+"""Judge fit and tuning on random robots whose plants the fit does not know.
+
+Run this by hand, with the number of robots and optionally the seed of the first one:
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_fit.py 20
 
-Ten seconds for a wheel. Motors and encoders are those of the simulated board; the steps are made by
-the whole board with the public firmware. A second number is the robot to begin with.
+Unlike ``judge_step.py`` it needs no driver, and takes ten seconds for each wheel. Motors and
+encoders are those of the simulated board; the steps are made by the complete board with the public
+firmware.
 """
 
 import sys
@@ -33,7 +36,7 @@ FREQUENCY_HZ = 11.0
 
 
 def starts(motor: MotorSettings, wheel: int, random: Random) -> list[Column]:
-    """Records of starts at full duty; after each the wheel rolls out somewhere."""
+    """Return records of starts at full duty; after each the wheel rolls to a random place."""
     short, long = CORRECTIONS[wheel]
     encoder = Encoder(TICKS, long / (short + long), noise=MARK_NOISE, random=random)
     found = []
@@ -55,7 +58,7 @@ def starts(motor: MotorSettings, wheel: int, random: Random) -> list[Column]:
 
 
 def stepped(motor: MotorSettings, gains: PiGains, target_rpm: float) -> Column:
-    """The true speed after a step, each 10 ms."""
+    """Return the true speed after a step, in RPM, every 10 ms."""
     board = SimulatedLois(LoisSettings(quirks=FIRMWARE, running=True, motors=(motor, motor)))
     for setting, value in (
         (Setting.RPM_LOW_PASS, 1.0),
@@ -77,14 +80,14 @@ def stepped(motor: MotorSettings, gains: PiGains, target_rpm: float) -> Column:
 
 
 def recorded(rpm: Column) -> Column:
-    """Times between ticks of a wheel with even marks at these speeds."""
+    """Return the times between ticks, in s, of a wheel with even marks at these speeds."""
     ticks = np.cumsum(rpm) * 0.01 * TICKS / 60
     at_s = np.interp(np.arange(0.4, ticks[-1]), ticks, 0.01 * np.arange(1, len(ticks) + 1))
     return np.diff(at_s, prepend=0.0)[:SAMPLES]
 
 
 def judge(motor: MotorSettings, wheel: int, random: Random) -> str:
-    """A row: errors of the time constants, overshoot, error of a step."""
+    """Return a row: errors of the time constants, overshoot, error of a step."""
     found = fit(starts(motor, wheel, random), TICKS)
     half_rpm = motor.rpm_per_percent * (50.0 - motor.dead_zone_percent)
     slope = (found.final_rpm - half_rpm) / 50.0
@@ -110,7 +113,7 @@ def judge(motor: MotorSettings, wheel: int, random: Random) -> str:
 
 
 def main(robots: int, first: int = 0) -> None:
-    """Print a row for each wheel."""
+    """Print a row for each wheel of ``robots`` robots, from the seed ``first`` on."""
     for seed in range(first, first + robots):
         for wheel, motor in enumerate(random_motors(seed)):
             row = judge(motor, wheel, Random(f"judge {seed} {wheel}"))

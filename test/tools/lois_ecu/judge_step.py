@@ -1,11 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step`` on robots with a LOIS ECU whose plants it does not know, by hand:
+"""Judge ``calibrate step`` on random robots with a LOIS ECU whose plants it does not know.
+
+Run this by hand, with the number of robots and optionally the seed of the first one:
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-About two minutes for each robot; a second number is the robot to begin with. The overshoot is that
-of the true speed, on a robot with the gains found and with marks in their places.
+It takes about two minutes for each robot. The overshoot is that of the true speed, on a robot with
+the gains found and with evenly spaced marks.
 """
 
 import contextlib
@@ -30,7 +32,7 @@ Motors = tuple[MotorSettings, MotorSettings]
 
 
 def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
-    """What the tool finds of both wheels."""
+    """Return what the tool finds for both wheels."""
     robot = SimulatedRobot(folder, motors, seed=seed)
     arguments = command_line().parse_args(["step", "--yes"])
     with (
@@ -43,7 +45,10 @@ def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
 
 
 def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) -> list[float]:
-    """Of a step with these gains, in parts of the speed that it comes to."""
+    """Return each wheel's true overshoot of a step with these gains.
+
+    It is a part of the final speed, or of the target if that is higher.
+    """
     robot = SimulatedRobot(folder, motors, mark_noise=0.0)
     found = pi_step._gains({wheel.name: wheel.tuned for wheel in wheels})
     robot.set_parameters(found | pi_step._corrections({one.name: one.levels for one in wheels}))
@@ -63,7 +68,7 @@ def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) 
 
 
 def main(robots: int, first: int = 0) -> None:
-    """Print a row for each wheel."""
+    """Print a row for each wheel of ``robots`` robots, from the seed ``first`` on."""
     for seed in range(first, first + robots):
         motors = random_motors(seed)
         with tempfile.TemporaryDirectory() as name:

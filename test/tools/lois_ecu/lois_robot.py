@@ -37,7 +37,10 @@ RPM = 0.10471975511965977
 
 
 def random_motors(seed: int, *, unequal: float = 0.05) -> tuple[MotorSettings, MotorSettings]:
-    """Second order, dead time, backlash; the wheels differ by ``unequal`` (standard deviation)."""
+    """Return random motors of second order, with dead time and backlash.
+
+    The two wheels differ by ``unequal`` (relative standard deviation).
+    """
     random = Random(f"plant {seed}")
     slow_s = random.uniform(0.15, 0.5)
     fast_s = slow_s * random.uniform(0.25, 0.6)
@@ -57,7 +60,7 @@ def random_motors(seed: int, *, unequal: float = 0.05) -> tuple[MotorSettings, M
 
 
 class SimulatedRobot:
-    """What a calibration needs of a ``Robot``."""
+    """Replacement for the ``Robot`` of a calibration, with a simulated LOIS ECU."""
 
     def __init__(
         self,
