@@ -56,11 +56,15 @@ JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
 """Largest change of a wheel's speed, in RPM and in RPM per s: a larger one shows a tick that waited
 while the board sent something else."""
+STRAY_RPM: Final = 2.0
+STRAY_PART: Final = 0.1
+"""A wheel that is commanded steadily, with gains that the user set, stays this near its speed. One
+reading that differs by more is of a tick that waited, or of the tick behind it."""
 BLIND_M: Final = 0.012
-SWINGING_M: Final = 0.035
+SWINGING_M: Final = 0.055
 """Standard deviations in m of a wheel's distance after 1 m without ticks, besides all other errors:
 usually, and at speeds that swing, of which the board reports too few."""
-SWERVED_M: Final = 0.025
+SWERVED_M: Final = 0.05
 """Standard deviation in m of the position after 1 m at such speeds, even with known distances."""
 COASTED_TICKS: Final = 1.0
 """Ticks by which a wheel that comes to rest has rolled less than at its last reported speed."""
@@ -235,8 +239,7 @@ class Comparison:
         if not sign or speed_mps * sign < 0:
             self._told[index] = speed_mps
             return
-        change_rpm = abs(speed_mps - self._told[index]) / rpm_mps
-        jumps = change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s
+        jumps = self._jumps(index, abs(speed_mps) / rpm_mps, duration_s)
         self._jumped[index] = jumps and not self._jumped[index]
         if self._jumped[index]:
             return
@@ -261,15 +264,26 @@ class Comparison:
         shown = abs(speed_mps) + (motion.rounded_mps(index) if speed_mps else 0.5 * rpm_mps)
         fast = shown > FASTER_RPM * rpm_mps and wheel.course.kind == "rpm"
         if ticked and fast and not wheel.rolls_on:
+            motion.learn_gain(index, shown)
             self._rolls_at(index, math.copysign(shown, sign), duration_s)
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
+
+    def _jumps(self, index: int, told_rpm: float, duration_s: float) -> bool:
+        """Return whether a speed is implausible after the last one, or for a steady wheel."""
+        motion, wheel = self._motion, self._motion.wheels[index]
+        change_rpm = abs(told_rpm - abs(self._told[index]) / motion.rpm_mps)
+        if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:
+            return True
+        expected_rpm = abs(motion.speed_mps(index)) / motion.rpm_mps
+        strays = abs(told_rpm - expected_rpm) > STRAY_RPM + STRAY_PART * expected_rpm
+        return motion.tuned and wheel.steady and strays
 
     def _rest(self, index: int, told_mps: float, duration_s: float, *, repeated: bool) -> None:
         """Decide whether this wheel is at rest by now, or rolls again."""
         motion, resting = self._motion, self._resting[index]
         wheel, tick_m, speed = motion.wheels[index], motion.tick_m, motion.speed_mps(index)
         sign = math.copysign(1.0, wheel.course.target_mps)
-        resting.tell(told_mps / motion.rpm_mps, duration_s)
+        resting.tell(told_mps / motion.rpm_mps, duration_s, tuned=motion.tuned)
         if not repeated:
             if wheel.rests:
                 wheel.rests = False

@@ -110,7 +110,7 @@ class LoisConversation:
             elif isinstance(report, GpsDate):
                 self._upkeep.writer.date_came()
             if isinstance(report, Ticks | BoardOdometry):
-                self._stall.heard(report, at)
+                self._stall.heard(report, at, self._translation.odometry.resting)
         if self._translation.odometry.appends and self._stall.looks_stalled(now):
             self._points.clear_again()
         found = self._translation.readings(reports, times, self._decoder.clock_unit, now)

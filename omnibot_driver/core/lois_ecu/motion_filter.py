@@ -28,6 +28,7 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
     STANDS_MPS,
     STATES,
     TURN,
+    UNSETTLED_S,
     WAY,
     Step,
     Terms,
@@ -50,6 +51,8 @@ START_STDDEV_TICKS: Final = 0.9
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
 """Mean and standard deviation of the fraction of an RPM that the firmware drops."""
+GAIN_PART: Final = 0.05
+GREATEST_GAIN: Final = 1.5
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
 
@@ -59,12 +62,11 @@ class MotionFilter:
 
     ``tick_m``, ``rpm_mps``: distance of a tick, and speed at one RPM, of a rim. ``turn_sign``: -1
     if the board's left wheel is the robot's right one. ``signed``: ticks always count in both
-    directions. ``holds``: a wheel at rest keeps its measured speed. ``reverse_gain``: speed over
-    target, backwards.
+    directions. ``holds``: a wheel at rest keeps its measured speed.
 
-    ``unsettled_s``: a wheel that is halted soon after a change of its set-point rolled at another
-    speed than the model says, perhaps in the other direction. Its distance has an error of that
-    change times this time.
+    ``tuned``: whether the controllers have gains that the user set. A wheel that is halted soon
+    after a change of its set-point rolled at another speed than the model says, perhaps in the
+    other direction. Its distance has an error of that change times ``UNSETTLED_S[tuned]``.
     """
 
     def __init__(self) -> None:
@@ -72,8 +74,8 @@ class MotionFilter:
         self.wheels = (Wheel(0), Wheel(PER_WHEEL))
         self.tick_m = self.rpm_mps = self.track_m = self.turn_sign = 1.0
         self.reverse_gain = 1.0
-        self.unsettled_s = 0.0
-        self.signed = self.holds = False
+        """Speed over target of a wheel that rolls backward steadily."""
+        self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
         """Least difference of both measured speeds since this was last reset, in m/s."""
@@ -189,6 +191,14 @@ class MotionFilter:
         counts = self.wheels[index].counts(self.speed_mps(index), signed=self.signed)
         return [*terms, (base + COUNT, counts)] if counts else terms
 
+    def learn_gain(self, index: int, speed_mps: float) -> None:
+        """Take a reported speed; if the wheel rolls backward steadily, it shows the gain."""
+        wheel = self.wheels[index]
+        target_mps = wheel.course.target_mps
+        if self.tuned and target_mps < 0 and wheel.steady:
+            change = GAIN_PART * (speed_mps / -target_mps - self.reverse_gain)
+            self.reverse_gain = min(max(self.reverse_gain + change, 1.0), GREATEST_GAIN)
+
     # Commands
 
     def _take_effect(self, now: float) -> None:
@@ -202,7 +212,8 @@ class MotionFilter:
             speed = self.speed_mps(index)
             if cleared:
                 if self.holds and not self.signed:
-                    self.filter.disturb(doubted, (self.unsettled_s * wheel.unsettled_mps) ** 2)
+                    unsettled_s = UNSETTLED_S[self.tuned]
+                    self.filter.disturb(doubted, (unsettled_s * wheel.unsettled_mps) ** 2)
                 self.filter.forget(wheel.base + HELD, 0.0, 0.0)
                 wheel.begin_anew(speed)
             step = abs(wheel.course.target_mps - speed)

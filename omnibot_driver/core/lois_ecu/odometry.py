@@ -24,7 +24,7 @@ from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.size_errors import LoisOdometrySettings, SizeErrors
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S, CommandKind
-from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, UNSETTLED_S, WAY, X, Y
+from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, WAY, X, Y
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
 
 __all__ = ["FusedOdometry", "LoisOdometry", "LoisOdometrySettings", "Source"]
@@ -80,7 +80,7 @@ class LoisOdometry:
         self._unheard_s = max(UNHEARD_S, UNHEARD_GROUPS * period_s)
         motion.tick_m, motion.rpm_mps = settings.tick_m, settings.rim_mps_per_rpm
         motion.track_m = settings.track_m
-        motion.unsettled_s = UNSETTLED_S[bool(own_gains(settings))]
+        motion.tuned = not own_gains(settings)
         motion.turn_sign = -1.0 if settings.inverted else 1.0
         motion.yaw0_rad += yaw_rad - motion.yaw_rad
         self._board = OdometryReader(settings.track_m, settings.rim_mps_per_rpm)
@@ -104,6 +104,12 @@ class LoisOdometry:
     def counting(self) -> bool:
         """Whether this board counts the ticks of both wheels now."""
         return self.signed_ticks or all(wheel.course.counting for wheel in self._motion.wheels)
+
+    @property
+    def resting(self) -> tuple[bool, bool]:
+        """Whether each wheel is taken to be at rest although it is commanded to turn backward."""
+        left, right = self._motion.wheels
+        return left.rests, right.rests
 
     def reset(self) -> None:
         """Begin the odometry frame at the robot's present pose."""

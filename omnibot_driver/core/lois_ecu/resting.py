@@ -13,27 +13,25 @@ from typing import Final
 
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
-FASTEST_RPM: Final = 19.5
+FASTEST_RPM: Final = 23.5
 """Range in RPM of the last speed of a wheel that came to rest: a wheel that starts shows less, and
 a faster one ticks once more before it is at rest."""
-STEEP_RPM: Final = 25.0
-FASTEST_STEEP_RPM: Final = 23.5
-"""Fall of speed in RPM after which a wheel comes to rest within one tick, and the greatest speed
-from which it does."""
+FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
 """Rate of the clock, as part of real time, while speeds are not reported."""
-STEEP: Final[tuple[float, ...]] = (0.0, 0.3, 1.0)
+FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Chances that the wheel is at rest, by the number of repetitions: of a fast wheel after a steep
-fall, after a far fall, after a far fall from a speed that was reported once, and after a shorter
-fall. Counted on the public firmware with the gains that it boots with, and with better ones, with
-which wheels never fall like this."""
+TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
+"""Chances that the wheel is at rest, by the number of repetitions: after a fall to a speed beyond
+``FAST_RPM``, after a far fall, after a far fall from a speed that was reported once, and after a
+shorter fall; ``TUNED``: after each of them with gains that the user set, as such wheels hardly ever
+come to rest unasked. Counted on simulated drives of the public firmware."""
 
 
 class RestingWheel:
@@ -63,8 +61,11 @@ class RestingWheel:
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
-    def tell(self, rpm: float, since_s: float) -> None:
-        """Take a reported speed without its sign, ``since_s`` after the one before."""
+    def tell(self, rpm: float, since_s: float, *, tuned: bool = False) -> None:
+        """Take a reported speed without its sign, ``since_s`` after the one before.
+
+        ``tuned``: whether the controller has gains that the user set.
+        """
         self._pass(since_s)
         if abs(rpm - self._told_rpm) < SAME_RPM:
             self._repeats += 1
@@ -78,20 +79,22 @@ class RestingWheel:
                 self._fell_at_s = self._clock_s
         self._told_rpm = rpm
         self._lately.append((self._clock_s, rpm))
-        self.chance = 0.0
-        steep = self._fell_rpm >= STEEP_RPM
-        if not SLOWEST_RPM < rpm < (FASTEST_STEEP_RPM if steep else FASTEST_RPM):
-            return
-        chances: tuple[float, ...] = (0.0,)
-        if steep and rpm > FASTEST_RPM:
-            chances = STEEP
-        elif self._fell_rpm >= FELL_FAR_RPM:
-            chances = FAR
-        elif self._lone:
-            chances = LONE
-        elif self._fell_rpm >= FELL_RPM:
-            chances = NEAR
-        self.chance = chances[min(self._repeats, len(chances) - 1)]
+        chances = self._chances(rpm)
+        if chances and tuned:
+            chances = TUNED
+        self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
+
+    def _chances(self, rpm: float) -> tuple[float, ...]:
+        """Return the chances by the number of repetitions of this speed; empty if it rolls."""
+        if not SLOWEST_RPM < rpm < FASTEST_RPM:
+            return ()
+        if rpm > FAST_RPM:
+            return FAST if self._fell_rpm >= FELL_RPM else ()
+        if self._fell_rpm >= FELL_FAR_RPM:
+            return FAR
+        if self._lone:
+            return LONE
+        return NEAR if self._fell_rpm >= FELL_RPM else ()
 
     def _pass(self, since_s: float) -> None:
         self._clock_s += since_s

@@ -27,6 +27,8 @@ TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
 """Limits above a set-point, as a factor and in RPM, beyond which a repeated speed is a kept one: a
 wheel that rolls backward is up to 10 % and one RPM faster than its set-point."""
+UNLIKE: Final = 1.15
+"""Greatest ratio of the speeds, each over its set-point, of two wheels that roll backward."""
 AT_LEAST: Final = 4
 """Number of groups that must agree, because few arrive on a bad line."""
 
@@ -56,7 +58,12 @@ class StallWatch:
                 self._seen_at[wheel], self._quiet[wheel] = now, 0
         self._targets = targets
 
-    def heard(self, report: Ticks | BoardOdometry, now: float) -> None:
+    def heard(
+        self,
+        report: Ticks | BoardOdometry,
+        now: float,
+        resting: tuple[bool, bool] = (False, False),
+    ) -> None:
         """Process a report: ticks show a forward wheel's motion, and odometry a backward one's."""
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
@@ -64,7 +71,8 @@ class StallWatch:
             for wheel in (0, 1):
                 if self._targets[wheel] < 0:
                     turns = pose != self._pose and not self._repeats(wheel, told)
-                    self._note(wheel, now, turns=turns)
+                    locked = resting[wheel] and self._lacks_power(wheel)
+                    self._note(wheel, now, turns=turns and not locked)
             self._pose = pose
             if told is not None and any(told):
                 self._told = told
@@ -97,8 +105,16 @@ class StallWatch:
         same = [abs(a - b) < SAME_MPS for a, b in zip(told, self._told, strict=True)]
         target = abs(self._targets[wheel])
         most_mps = max(TOO_FAST * target, target + TOO_FAST_RPM) * self._rpm_mps
+        if self._targets[1 - wheel] < 0:
+            gain_mps = abs(told[1 - wheel] / self._targets[1 - wheel])
+            most_mps = max(most_mps, UNLIKE * gain_mps * target)
         too_fast = abs(told[wheel]) > most_mps - SAME_MPS
         return abs(told[wheel]) > SAME_MPS and same[wheel] and (too_fast or not same[1 - wheel])
+
+    def _lacks_power(self, wheel: int) -> bool:
+        """Return whether the reported speed is that of the set-point or more."""
+        told_mps = 0.0 if self._told is None else abs(self._told[wheel])
+        return told_mps > abs(self._targets[wheel]) * self._rpm_mps - SAME_MPS
 
     def _note(self, wheel: int, now: float, *, turns: bool) -> None:
         self._quiet[wheel] += 1

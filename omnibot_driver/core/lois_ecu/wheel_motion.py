@@ -41,9 +41,10 @@ COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest time in s for which a wheel rolls on in the old direction after a change of sign."""
-UNSETTLED_S: Final = (0.06, 0.27)
-"""``MotionFilter.unsettled_s`` with gains that are set, and with the board's own: with those of the
-public firmware a wheel swings."""
+UNSETTLED_S: Final = (0.27, 0.06)
+"""Time in s, with the board's own gains and with gains that are set, for which a wheel that is
+halted rolled otherwise than the model says: with the public firmware's own gains it swings."""
+STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
 
@@ -105,6 +106,11 @@ class Wheel:
         self.rolled_mps, self.rolled_s = speed_mps, 0.0
         if abs(speed_mps) > STANDS_MPS:
             self.rolls_on, self.rolls_on_s = True, ROLLS_ON_S
+
+    @property
+    def steady(self) -> bool:
+        """Whether the set-point has been the same for long enough to be reached."""
+        return self.restless_mps < STEADY_PART * abs(self.course.target_mps)
 
     def counts(self, speed_mps: float, *, signed: bool) -> float:
         """Return the change of the count, in m, for each m rolled forward."""

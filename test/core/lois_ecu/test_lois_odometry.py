@@ -9,10 +9,10 @@ import math
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
-from statistics import mean
+from statistics import mean, median
 
 import pytest
-from lois_drives import CLASSES, STOP, Drive, Rig, drive, motion, nominal, wrong
+from lois_drives import CLASSES, HOST_GAINS, STOP, Drive, Rig, drive, motion, nominal, wrong
 
 from omnibot_driver.core.lois_ecu import (
     BoardOdometry,
@@ -83,10 +83,32 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the boot gains the firmware's right wheel swings, rests, and keeps its last speed."""
-    one = motion(wrong("firmware", 1000), name, LoisEcuSettings())
-    assert one.nees < 21.1
+    """With the boot gains the firmware's right wheel swings, rests, and keeps its last speed.
+
+    Half of all honest drives are below 2.4, and a few of these far beyond it.
+    """
+    seeds = range(1000, 1005)
+    drives = [motion(wrong("firmware", seed), name, LoisEcuSettings()) for seed in seeds]
+    assert median(one.nees for one in drives) < 2.4
+    assert max(one.sigmas for one in drives) < 3.5
+
+
+@pytest.mark.parametrize("seed", [2020, 9005])
+def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again(
+    seed: int,
+) -> None:
+    """It fell from 41 to 20 RPM at a set-point of -19: not noticed, that was 600° in 15 s."""
+    one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
+    assert abs(one.error.yaw_rad) < math.radians(60)
     assert one.sigmas < 3.5
+
+
+@pytest.mark.parametrize("seed", [9001, 9025])
+def test_set_gains_that_drive_backward_too_fast_are_learned(seed: int) -> None:
+    """At 46 RPM for 34, and where a wheel seemed to rest although it rolled on."""
+    one = motion(nominal("firmware", seed), "straight back", HOST_GAINS)
+    assert off_m(one) < 0.1 * one.way_m
+    assert one.sigmas < 3.0
 
 
 @BOTH

@@ -9,11 +9,11 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 GROUP_S = 0.1
 
 
-def told(*speeds_rpm: float) -> RestingWheel:
+def told(*speeds_rpm: float, tuned: bool = False) -> RestingWheel:
     """Return an estimator to which these speeds were reported, one in each group."""
     wheel = RestingWheel()
     for rpm in speeds_rpm:
-        wheel.tell(rpm, GROUP_S)
+        wheel.tell(rpm, GROUP_S, tuned=tuned)
     return wheel
 
 
@@ -24,12 +24,18 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
     assert told(31, 28, 19, 12, 12, 12).chance == 1.0
 
 
-def test_a_wheel_that_fell_steeply_rests_from_a_higher_speed() -> None:
-    """This wheel falls from 51 to 21 RPM within a second, and then its ticks end."""
-    assert told(51, 47, 31, 26, 21).chance == 0.0
-    assert 0.0 < told(51, 47, 31, 26, 21, 21).chance < 1.0
-    assert told(51, 47, 31, 26, 21, 21, 21).chance == 1.0
-    assert told(40, 31, 26, 21, 21, 21).chance == 0.0
+def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
+    """This wheel falls from 41 to 20 RPM within 0.4 s, and then its ticks end."""
+    assert told(43, 41, 29, 20).chance == 0.0
+    assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
+    assert 0.0 < told(43, 41, 29, 20, 20, 20).chance < 1.0
+    assert told(43, 41, 29, 20, 20, 20, 20).chance == 1.0
+
+
+def test_with_gains_that_the_user_set_it_takes_more_repetitions() -> None:
+    """Such wheels hardly ever come to rest unasked: in simulation a fall was another cause."""
+    assert told(31, 28, 19, 12, 12, 12, tuned=True).chance < 0.5
+    assert told(31, 28, 19, *[12] * 8, tuned=True).chance == 1.0
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
@@ -44,7 +50,7 @@ def test_one_tick_that_came_late_is_not_a_fall() -> None:
 
 @pytest.mark.parametrize("rpm", [1, 3, 25, 40])
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
-    """The last speed before a rest is between 4.5 and 19.5 RPM (23.5 RPM after a steep fall)."""
+    """The last speed before a rest is between 4.5 and 23.5 RPM."""
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
 

@@ -48,19 +48,24 @@ def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
 
 
-def looks_stalled(rpm: list[tuple[int, int]]) -> bool:
-    """Return whether a wheel looks stalled at -9 and 9 RPM, with these speeds in 0x20."""
+def looks_stalled(
+    rpm: list[tuple[int, int]],
+    *,
+    targets: tuple[int, int] = (-9, 9),
+    resting: tuple[bool, bool] = (False, False),
+) -> bool:
+    """Return whether a wheel with these set-points stalls at these speeds, one pair in 0.2 s."""
     watch, unit = StallWatch(0.47, UNIT_MPS), UNIT_MPS
-    watch.wrote(SetRpm(-9, 9), 0.0)
+    watch.wrote(SetRpm(*targets), 0.0)
     found = False
     for step, (left_rpm, right_rpm) in enumerate(rpm, 1):
         left, right = left_rpm * unit, right_rpm * unit
         turning = (right - left) / 0.47
         group = BoardOdometry(
-            0.0, 0.0, 0.1 * step, *heading(left, right, 0.1 * step), turning, appended=True
+            0.1 * step, 0.0, 0.1 * step, *heading(left, right, 0.1 * step), turning, appended=True
         )
-        watch.heard(group, 0.2 * step)
-        watch.heard(Ticks(200 * step, 0, 2 * step), 0.2 * step)
+        watch.heard(group, 0.2 * step, resting)
+        watch.heard(Ticks(200 * step, 0, 2 * step * (targets[1] > 0)), 0.2 * step)
         found |= watch.looks_stalled(0.2 * step)
     return found
 
@@ -81,6 +86,25 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
     """A wheel that rolls backward is up to 10 % too fast, and integer speeds repeat."""
     assert not looks_stalled([(-9, 9)] * 14)
     assert not looks_stalled([(-10, 9)] * 14)
+
+
+def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
+    """With some gains a robot rolls backward steadily at 1.3 times its set-points."""
+    assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
+    assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
+
+
+def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
+    """It kept a speed near its set-point when it fell to standstill, so it gets no power."""
+    still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
+    assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
+    assert not looks_stalled(still, targets=(-19, -19))
+
+
+def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
+    """The controller gives it power: it starts again by itself."""
+    still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
+    assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
 
 
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
