@@ -27,11 +27,12 @@ FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
+TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Chances that the wheel is at rest, by the number of repetitions: after a fall to a speed beyond
 ``FAST_RPM``, after a far fall, after a far fall from a speed that was reported once, and after a
-shorter fall; ``TUNED``: after each of them with gains that the user set, as such wheels hardly ever
-come to rest unasked. Counted on simulated drives of the public firmware."""
+shorter fall; ``TUNED``: after each of them with gains that the user set. Such a wheel hardly ever
+comes to rest unasked, and often rolls at a steady speed after it has overshot. Counted on the
+public firmware."""
 
 
 class RestingWheel:

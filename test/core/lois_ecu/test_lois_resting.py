@@ -32,10 +32,9 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
     assert told(43, 41, 29, 20, 20, 20, 20).chance == 1.0
 
 
-def test_with_gains_that_the_user_set_it_takes_more_repetitions() -> None:
-    """Such wheels hardly ever come to rest unasked: in simulation a fall was another cause."""
-    assert told(31, 28, 19, 12, 12, 12, tuned=True).chance < 0.5
-    assert told(31, 28, 19, *[12] * 8, tuned=True).chance == 1.0
+def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
+    """Such wheels overshoot, and then roll at a steady speed; they hardly ever rest unasked."""
+    assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
