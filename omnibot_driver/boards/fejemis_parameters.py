@@ -44,7 +44,8 @@ WHEELS: Final = (
         "gear",
         19.0,
         "",
-        "Turns of the motor for one of a driving wheel (confw). Unset: the board keeps its own.",
+        "Turns of the motor for one turn of a driving wheel (confw). Unset: the board keeps its"
+        " own.",
         low=1.0,
         high=1000.0,
         unset=True,
@@ -62,7 +63,7 @@ WHEELS: Final = (
         "track",
         0.4,
         "m",
-        "From one driving wheel to the other, B in the manual (confw, confs). Unset: the boards"
+        "Distance between the driving wheels, B in the manual (confw, confs). Unset: the boards"
         " keep their own.",
         low=0.01,
         high=10.0,
@@ -72,8 +73,8 @@ WHEELS: Final = (
         "steering_distance",
         0.42,
         "m",
-        "From the axle of the driving wheels to the steered wheel, F and S in the manual; written"
-        " to both boards with track (confs). Unset: the boards keep their own.",
+        "Distance from the axle of the driving wheels to the steered wheel, F and S in the"
+        " manual; written to both boards with track (confs). Unset: the boards keep their own.",
         low=0.01,
         high=10.0,
         unset=True,
@@ -82,8 +83,8 @@ WHEELS: Final = (
         "front_wheel_offset",
         0.0,
         "rad",
-        "What the angle sensor reads when the wheel is straight, written with front_wheel_inverted"
-        " (fwoffset). Unset: the board keeps its own.",
+        "Reading of the angle sensor when the front wheel is straight, written with"
+        " front_wheel_inverted (fwoffset). Unset: the board keeps its own.",
         low=-math.pi,
         high=math.pi,
         unset=True,
@@ -115,15 +116,15 @@ DRIVING: Final = (
         "allow_reverse",
         False,
         "",
-        "Pass negative speeds on. The manual does not say what the steering then does: first watch"
-        " it with the wheels off the ground (docs/boards/fejemis.md).",
+        "Send negative speeds to the board. The manual does not say how the steering behaves"
+        " then: test it first with the wheels off the ground (docs/boards/fejemis.md).",
     ),
     Parameter(
         "line_sums",
         "auto",
         "",
-        "Whether lines begin with a sum, ;NN: as the heartbeats of each Teensy have it (auto),"
-        " always (on) or never (off).",
+        "Whether lines begin with a checksum, ;NN. auto: as the heartbeats of each Teensy do;"
+        " on: always; off: never.",
         choices=("auto", "on", "off"),
         fixed=True,
     ),
@@ -131,7 +132,8 @@ DRIVING: Final = (
         "power_off_delay",
         10.0,
         "s",
-        "From ~/power_off until the board cuts the power, also of this computer if it hangs on it.",
+        "Time from ~/power_off until the board cuts the power, also that of this computer if"
+        " the board supplies it.",
         low=1.0,
         high=3600.0,
     ),
@@ -139,7 +141,7 @@ DRIVING: Final = (
         "low_cell_voltage",
         3.5,
         "V",
-        "Voltage of a cell of the battery below which there is a warning.",
+        "Voltage of a battery cell below which the driver warns.",
         low=1.0,
         high=5.0,
     ),
@@ -150,7 +152,7 @@ SENSORS: Final = (
         "acceleration_unit",
         "m/s^2",
         "",
-        "What the board's acc lines are in; some firmware sends g.",
+        "Unit of the board's acc lines; some firmware sends g.",
         choices=("m/s^2", "g"),
         fixed=True,
     ),
@@ -200,16 +202,60 @@ SENSORS: Final = (
         high=1.0,
     ),
     Parameter(
-        "tof_field_of_view", 0.44, "rad", "Of the time-of-flight sensor.", low=0.01, high=3.0
+        "tof_field_of_view",
+        0.44,
+        "rad",
+        "Field of view of the time-of-flight sensor.",
+        low=0.01,
+        high=3.0,
     ),
-    Parameter("tof_minimum", 0.03, "m", "Nearest that it tells.", low=0.0, high=20.0),
-    Parameter("tof_maximum", 2.0, "m", "Farthest.", low=0.1, high=20.0),
-    Parameter("sonar_field_of_view", 0.5, "rad", "Of the sonar.", low=0.01, high=3.0),
-    Parameter("sonar_minimum", 0.02, "m", "Nearest that it tells.", low=0.0, high=20.0),
-    Parameter("sonar_maximum", 4.0, "m", "Farthest.", low=0.1, high=20.0),
-    Parameter("ir_field_of_view", 0.1, "rad", "Of both infrared sensors.", low=0.01, high=3.0),
-    Parameter("ir_minimum", 0.1, "m", "Nearest that they tell.", low=0.0, high=20.0),
-    Parameter("ir_maximum", 0.8, "m", "Farthest.", low=0.1, high=20.0),
+    Parameter(
+        "tof_minimum",
+        0.03,
+        "m",
+        "Smallest distance that the time-of-flight sensor measures.",
+        low=0.0,
+        high=20.0,
+    ),
+    Parameter(
+        "tof_maximum",
+        2.0,
+        "m",
+        "Largest distance that the time-of-flight sensor measures.",
+        low=0.1,
+        high=20.0,
+    ),
+    Parameter("sonar_field_of_view", 0.5, "rad", "Field of view of the sonar.", low=0.01, high=3.0),
+    Parameter(
+        "sonar_minimum", 0.02, "m", "Smallest distance that the sonar measures.", low=0.0, high=20.0
+    ),
+    Parameter(
+        "sonar_maximum", 4.0, "m", "Largest distance that the sonar measures.", low=0.1, high=20.0
+    ),
+    Parameter(
+        "ir_field_of_view",
+        0.1,
+        "rad",
+        "Field of view of both infrared sensors.",
+        low=0.01,
+        high=3.0,
+    ),
+    Parameter(
+        "ir_minimum",
+        0.1,
+        "m",
+        "Smallest distance that the infrared sensors measure.",
+        low=0.0,
+        high=20.0,
+    ),
+    Parameter(
+        "ir_maximum",
+        0.8,
+        "m",
+        "Largest distance that the infrared sensors measure.",
+        low=0.1,
+        high=20.0,
+    ),
 )
 
 
@@ -262,8 +308,8 @@ def require_whole_settings(values: Mapping[str, Any]) -> None:
         values[name] is not None for name in (*_WHEELS, "steering_distance")
     ):
         raise ParameterError(
-            "parameter 'track' is written with others: set 'steering_distance' too, or"
-            " 'wheel_radii', 'gear' and 'encoder_ticks', or leave it unset"
+            "parameter 'track' must be set together with others: set 'steering_distance' too, or"
+            " 'wheel_radii', 'gear' and 'encoder_ticks', or leave 'track' unset"
         )
 
 

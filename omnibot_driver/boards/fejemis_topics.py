@@ -229,7 +229,7 @@ class FejemisTopics:
 
         def say(session: Session, now: float) -> str:
             if session.state in ("disconnected", "connecting"):
-                return f"{what} refused: the front board is not heard; connect it, then try again"
+                return f"{what} refused: no data from the front board; connect it, then try again"
             if needed and session.estop_active:
                 return f"{what} refused: the emergency stop is active; release it first (~/estop)"
             if needed and session.state != "nominal":

@@ -210,8 +210,8 @@ def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
         name,
         default_s,
         "s",
-        f"From one {what} to the next; 0 turns them off, shorter ones make the board deaf for more"
-        f" of the time.{note}",
+        f"Period of the {what}; 0 turns it off. The shorter it is, the more of the time the"
+        f" board cannot receive.{note}",
         low=0.0,
         high=LONGEST_PERIOD_S,
         unset=not default_s,
@@ -219,7 +219,7 @@ def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
 
 
 SENT: Final = (
-    _period("ticks_period", "message with the ticks (0x12), which odometry rests on,", 0.2),
+    _period("ticks_period", "message with the ticks (0x12), which odometry needs", 0.2),
     _period("odometry_period", "message with the board's own odometry (0x20)", 0.2),
     _period("heading_period", "heading (0x10)"),
     _period("position_period", "GPS position (0x0d)"),
@@ -265,5 +265,5 @@ def require_possible_periods(values: Mapping[str, Any]) -> None:
     if not 0.0 < values["ticks_period"] <= 0.5:
         raise ParameterError(
             "parameter 'ticks_period' must be above 0 and at most 0.5 s, not"
-            f" {values['ticks_period']:g}: odometry and the proof of standstill rest on the ticks"
+            f" {values['ticks_period']:g}: odometry and the proof of standstill need the ticks"
         )

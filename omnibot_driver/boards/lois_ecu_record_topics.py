@@ -94,7 +94,9 @@ class Recorder:
         try:
             saved = lois_ecu_records.save(reading, path, partial(self._is_current, token))
         except Exception as error:  # the caller must get an answer
-            self._end(token, False, f"the {NAMES[kind]} came, but is not saved: {error}")
+            self._end(
+                token, False, f"the {NAMES[kind]} was received, but could not be saved: {error}"
+            )
             return
         if saved:
             if remark := lois_ecu_records.remark(reading):

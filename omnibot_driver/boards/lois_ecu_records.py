@@ -61,12 +61,18 @@ def remark(reading: RecordReading) -> str:
     if reading.record.kind is not RecordKind.RPM:
         return ""
     if reading.count_s is None:
-        return "the record has counts alone: the unit of the board's time is not known yet"
+        return (
+            "the record has only the board's counts, no times and speeds: the unit of the board's"
+            " time is not known yet"
+        )
     slow = (*reading.record.left, *reading.record.right).count(SATURATED)
     if not slow:
         return ""
     longest_s = SATURATED * reading.count_s
-    return f"{slow} ticks of the record took longer than the {longest_s:.4g} s that the board tells"
+    return (
+        f"{slow} ticks of the record took longer than the {longest_s:.4g} s that the board can"
+        " report"
+    )
 
 
 def file_name(kind: RecordKind, at_s: float) -> str:

@@ -35,8 +35,8 @@ GPS_VARIANCE_M2: Final = 5.0**2
 ABSENT: Final = [-1.0] + [0.0] * 8
 TERMINAL_DEPTH: Final = 100
 LEFT: Final = (
-    "the board has left its terminal mode; check the e-stop button, as presses and releases"
-    " meanwhile are unknown"
+    "the board has left its terminal mode; check the e-stop button: its presses and releases in"
+    " that mode were not reported"
 )
 NOT_HEARD: Final = "no data from the board; connect it and switch it on, then call again"
 

@@ -49,8 +49,8 @@ DRIVING: Final = (
         "linear_scale",
         128.0,
         "unit/(m/s)",
-        "Units of motor speed (RM) for 1 m/s at nominal_voltage. It need not be exact: the speed is"
-        " closed by the encoder.",
+        "Units of motor speed (RM) for 1 m/s at nominal_voltage. It need not be exact: the"
+        " driver controls the speed by the encoder.",
         low=10.0,
         high=10_000.0,
         calibrated=True,
@@ -59,7 +59,8 @@ DRIVING: Final = (
         "nominal_voltage",
         24.0,
         "V",
-        "Battery voltage at which linear_scale holds; units are adapted to the measured voltage.",
+        "Battery voltage at which linear_scale holds; the driver adapts its motor speeds to the"
+        " measured voltage.",
         low=6.0,
         high=40.0,
     ),
@@ -140,7 +141,14 @@ SENSORS: Final = (
     Parameter(
         "range_minimum", 0.15, "m", "Smallest distance that a sonar measures.", low=0.0, high=5.0
     ),
-    Parameter("range_maximum", 6.45, "m", "Farthest (254 inches).", low=0.1, high=20.0),
+    Parameter(
+        "range_maximum",
+        6.45,
+        "m",
+        "Largest distance that a sonar measures (254 inches).",
+        low=0.1,
+        high=20.0,
+    ),
     Parameter(
         "record_directory",
         ".",

@@ -100,7 +100,8 @@ OMNIBOT: Final = (
         "base_radius",
         0.143,
         "m",
-        "From the centre of the robot to a wheel, for odometry from wheel counts and covariance.",
+        "Distance from the centre of the robot to a wheel, for odometry from wheel counts and"
+        " covariance.",
         low=0.01,
         high=10.0,
         calibrated=True,

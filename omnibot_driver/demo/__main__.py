@@ -119,8 +119,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="demo",
         description="Drives a square on a simulated board; no robot is needed.",
-        epilog="The environment variable DEMO_SECONDS says for how long; without it, until ctrl-C."
-        " Ends with 0, with 1 and a sentence on failure, with 2 on wrong usage.",
+        epilog="The environment variable DEMO_SECONDS sets the duration in seconds; without it the"
+        " demo runs until ctrl-C. Exit codes: 0 at the end, 1 with a message on failure, 2 on wrong"
+        " usage.",
     )
     parser.add_argument(
         "--board",

@@ -66,7 +66,7 @@ A simulated {capability.title} drives a square of 1 m, {turning}.
   driver     python -m omnibot_driver.driver --ros-args {options[1]}
   demo       steers by odom over cmd_vel, {ending}
 
-Where ROS 2 Jazzy is installed, look on and interfere from another terminal:
+Where ROS 2 Jazzy is installed, watch and intervene from another terminal:
 
   export {exports}{imu}
   ros2 topic echo {namespace}/odom --field pose.pose

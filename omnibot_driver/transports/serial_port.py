@@ -232,7 +232,7 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
     if code in (errno.EAGAIN, errno.EBUSY):
         return (
             f"{url} is in use by another program{_owner(url)}, perhaps a second driver; end it"
-            f" first (`fuser {url}` names it; the guard of a killed driver leaves by itself)"
+            f" first (`fuser {url}` names it; the guard of a killed driver ends by itself)"
         )
     # A text that pyserial makes of another error names the port twice.
     source = error.__context__ if isinstance(error.__context__, OSError) else error

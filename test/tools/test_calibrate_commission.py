@@ -52,7 +52,7 @@ def test_the_whole_walk_finds_what_was_planted(
         said = told(capsys)
         assert code == 0, said
         assert parameters_of(robot.driver)["motion_monitor"] is True
-        assert "That cannot be: wheel A alone was commanded" in said
+        assert "That is not possible: wheel A alone was commanded" in said
         assert "+y is reversed" in said
         assert "delta_frame is read at the start" in said
         assert robot.written() == {

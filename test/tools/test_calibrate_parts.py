@@ -85,8 +85,8 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
         (1.0, Pose(0.8, 0.8, 0.0), "1.13 m"),
         (1.0, Pose(0.0, 0.0, -2.1), "2.1 rad"),
         (11.0, Pose(), "11 s"),
-        (1.0, Pose(math.nan, 0.0, 0.0), "does not say where it is"),
-        (1.0, Pose(0.0, 0.0, math.inf), "does not say where it is"),
+        (1.0, Pose(math.nan, 0.0, 0.0), "contains NaN or infinity"),
+        (1.0, Pose(0.0, 0.0, math.inf), "contains NaN or infinity"),
     ):
         with pytest.raises(ToolError, match=sentence):
             BOUNDS.require_within(seconds, pose)
@@ -228,6 +228,6 @@ def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: s
     for subcommand in SUBCOMMANDS:
         require_able(subcommand, PARAMETERS.by_name)
     with pytest.raises(
-        ToolError, match=f"^calibrate {what} needs {thing}.* the board few has not$"
+        ToolError, match=f"^calibrate {what} needs {thing}.* the board few does not have$"
     ):
         require_able(what, {"board": "few", "odom_frame": "odom"})

@@ -82,7 +82,7 @@ def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
     (leap,) = troubles(drive)
-    assert "leapt 1 time, by up to 20 ms, first at 8.0 s" in leap.text
+    assert "jumped 1 time, by up to 20 ms, first at 8.0 s" in leap.text
     assert "no gap" in said(drive, "Gaps", "imu/data_raw").text
 
 
@@ -208,7 +208,7 @@ def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
     drive.imu.drop(6.0, 6.1)
     findings = judge(replace(drive.log(), alone=False))
     (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
-    assert "only /diagnostics of it alone tells" in gap.advice
+    assert "diagnostics of this robot alone" in gap.advice
     assert any("of several robots, on /dev/ttyUSB0" in finding.text for finding in findings)
 
 

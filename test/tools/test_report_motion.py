@@ -141,7 +141,7 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
     """The driver then stops the robot, so the note explains why it stood still."""
     drive.cmd_vel.drop(10.0, 10.8)
-    assert "1 time in motion" in said(drive, "Commands", "ceased").text
+    assert "1 time in motion" in said(drive, "Commands", "interrupted").text
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
@@ -183,7 +183,7 @@ def test_a_reset_of_the_odometry_is_noted_and_is_no_way(drive: Drive) -> None:
     way = said(drive, "Odometry", "Driven").text.split(",")[0]
     drive.odom.values[450:, :3] = 0.0
     assert not troubles(drive)
-    assert "1 time" in said(drive, "Odometry", "anew").text
+    assert "1 time" in said(drive, "Odometry", "began again").text
     assert said(drive, "Odometry", "Driven").text.startswith(way)
 
 

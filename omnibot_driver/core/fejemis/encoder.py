@@ -26,10 +26,10 @@ from omnibot_driver.core.fejemis.steering import (
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import Packets
 
-SIDEWAYS = "cmd_vel: sideways motion is set to zero, this base has none"
+SIDEWAYS = "cmd_vel: sideways speed is set to zero; this base cannot move sideways"
 REVERSE = (
-    "cmd_vel: a negative speed stands still, as `allow_reverse` is false; see"
-    " docs/boards/fejemis.md before setting it"
+    "cmd_vel: a negative speed is set to zero, because `allow_reverse` is false; read"
+    " docs/boards/fejemis.md before you set it to true"
 )
 
 
@@ -99,7 +99,7 @@ class Encoder:
             case Drive(twist):
                 return self._drive(twist)
             case TurnWheels() | GoTo():
-                raise CommandRefused("command rejected: this board takes cmd_vel alone")
+                raise CommandRefused("command refused: this board accepts only cmd_vel")
             case EmergencyStop():
                 return self.emergency_stop()
         return self.stop()

@@ -71,7 +71,7 @@ class Inbound:
             )
         if half.decoder.changed:
             half.decoder.changed = False
-            ended = "have sums now" if half.decoder.sums else "have no sums any more"
+            ended = "now have checksums" if half.decoder.sums else "no longer have checksums"
             self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
 
     def look(self, now: float, *, driving: bool) -> None:
@@ -113,7 +113,8 @@ class Inbound:
     def _heartbeat(self, half: Half, message: Heartbeat, now: float) -> None:
         if self._ports.identify() and self._ports.swapped:
             self._told.tell(
-                "the ports are swapped: the drive board is at `front_port`, which works as well",
+                "the ports are swapped: the drive board is at `front_port`; the driver works"
+                " with swapped ports",
                 now,
             )
         if trouble := self._ports.trouble:

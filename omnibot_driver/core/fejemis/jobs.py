@@ -158,9 +158,12 @@ class Jobs:
             self._heard.add(role)
             late = now - self._begun_at > SAID * AGAIN_S
             if job is Job.SAVE and late and {"drive", "front"} <= self._heard:
-                self._finish(True, "saved on both boards, which do not confirm it")
+                self._finish(True, "save request sent to both boards; they do not confirm it")
             elif job is Job.POWER_OFF and late and role == "drive":
-                self._finish(True, f"power ends {self._text[4:].decode('ascii')} s after the call")
+                self._finish(
+                    True,
+                    f"the board cuts the power {self._text[4:].decode('ascii')} s after the call",
+                )
         elif job is Job.LOAD and isinstance(message, WheelConfiguration):
             if now - self._begun_at > SAID * AGAIN_S:
                 self.reload = True
@@ -183,7 +186,7 @@ class Jobs:
         if numbers != self._before:
             self._finish(True, f"{job.value} done; offsets {shown}")
         elif after_s > UNCHANGED_S:
-            self._finish(True, f"{job.value} done; the offsets are what they were: {shown}")
+            self._finish(True, f"{job.value} done; the offsets are unchanged: {shown}")
 
     def _give_up(self) -> None:
         assert self.job is not None

@@ -73,7 +73,9 @@ class Machine:
         0 V stops it at once. Raises CommandRefused for NaN or infinity.
         """
         if not math.isfinite(volts):
-            raise CommandRefused("lift_cmd rejected: contains NaN or infinity; fix the sender")
+            raise CommandRefused(
+                "lift_cmd rejected: contains NaN or infinity; fix the publishing node"
+            )
         volts = max(-MOST_VOLTS, min(MOST_VOLTS, volts))
         self.volts = volts if abs(volts) >= LEAST_VOLTS else 0.0
         self._lift_line, seconds = lift_line(self.volts, longest_s)

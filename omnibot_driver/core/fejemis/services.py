@@ -57,7 +57,7 @@ class Services:
         Raises CommandRefused while it must not run.
         """
         if volts and (reason := self._why_not_turn()):
-            raise CommandRefused(f"lift_cmd rejected: {reason}")
+            raise CommandRefused(f"lift_cmd refused: {reason}")
         self._upkeep.machine.lift(volts, now, self._robot.settings.command_timeout_s)
 
     def set_led(self, red: int, green: int, blue: int, now: float) -> None:
@@ -69,13 +69,17 @@ class Services:
         """Begin a job, whose result comes as a JobDone. Raises RequestRefused."""
         robot, moving = self._robot, self._odometry.moving
         if robot.mode is Mode.UNKNOWN:
-            raise RequestRefused(f"{job.value} refused: a board is not heard; check both cables")
+            raise RequestRefused(
+                f"{job.value} refused: no data from one of the boards; check both cables"
+            )
         if robot.driving and job is not Job.LOAD:
             raise RequestRefused(
                 f"{job.value} refused: the robot is commanded; stop the sender, then call again"
             )
         if moving and job is not Job.LOAD:
-            raise RequestRefused(f"{job.value} refused: the robot moves; wait until it stands")
+            raise RequestRefused(
+                f"{job.value} refused: the robot moves; wait until it stands still"
+            )
         moves = robot.driving or moving
         self._upkeep.jobs.ask(
             job,

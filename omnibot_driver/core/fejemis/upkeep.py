@@ -119,26 +119,28 @@ class Upkeep:
             if configuration.failed:
                 names = ", ".join(setting.command for setting in configuration.failed)
                 return (
-                    f"the {configuration.role} board does not keep what was written with {names};"
-                    " check the values, and its firmware"
+                    f"the {configuration.role} board does not keep the values written with"
+                    f" {names}; check these values and the board's firmware"
                 )
         for half in self._ports.halves:
             if half.decoder.contradicted:
                 return (
                     f"the lines of the {half.role} board contradict `line_sums`"
-                    f" ({self._settings.line_sums}): set it to auto"
+                    f" ({self._settings.line_sums}), which says whether they have checksums: set"
+                    " it to auto"
                 )
             if unknown := half.unknown_streams:
                 return (
-                    f"the firmware of the {half.role} board does not know {', '.join(unknown)}:"
-                    " what rests on it is missing; update the firmware"
+                    f"the firmware of the {half.role} board does not know {', '.join(unknown)},"
+                    " so that data is missing; update the firmware"
                 )
         one, other = (self.configurations[role].geometry for role in ROLES)
         if one and other and _differ(one, other):
             return (
-                "the boards are configured to different steering geometries (confs): drive has"
-                f" B {one.track_m:g} m and F {one.wheelbase_m:g} m, front has B {other.track_m:g} m"
-                f" and F {other.wheelbase_m:g} m; set both by the parameters of the geometry"
+                "the boards are configured to different steering geometries (confs): drive has B"
+                f" {one.track_m:g} m and F {one.wheelbase_m:g} m, front has B {other.track_m:g} m"
+                f" and F {other.wheelbase_m:g} m; set both with the parameters `track` and"
+                " `steering_distance`"
             )
         return None
 

@@ -70,8 +70,8 @@ class Watch:
             other = self._ports.halves[1 - channel]
             if silent and now - self._begun_at > UNHEARD_S and other.role is not None:
                 self._told.halt(
-                    f"nothing is heard from the {self._ports.role(channel)} board at"
-                    f" `{parameter}`; check its power and cable",
+                    f"no data from the {self._ports.role(channel)} board at `{parameter}`; check"
+                    " its power and cable",
                     now,
                 )
             return False
@@ -79,7 +79,7 @@ class Watch:
         if unheard_s < FLOWS_S:
             half.ready = half.heartbeat is not None
         elif half.ready and unheard_s > SILENT_S:
-            what = "is silent" if silent else f"sends no `{NEEDED[role]}` any more"
+            what = "is silent" if silent else f"no longer sends `{NEEDED[role]}`"
             self._told.halt(
                 f"the {role} board {what}; robot stopped. Check its power and the cable at"
                 f" `{parameter}`",
@@ -109,9 +109,7 @@ class Watch:
         if trouble := self._ports.trouble or self._front.trouble:
             return trouble
         if self.blind:
-            return (
-                "nothing was heard of the angle of the front wheel for 60 ms; check the front board"
-            )
+            return "no angle of the front wheel for 60 ms; check the front board"
         if self.unposed:
-            return "nothing was heard of the pose for 0.25 s; check the drive board and its cable"
+            return "no pose from the drive board for 0.25 s; check the drive board and its cable"
         return ""

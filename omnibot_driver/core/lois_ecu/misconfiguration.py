@@ -22,9 +22,10 @@ GAINS: Final = (
 )
 """Gains of the speed controllers; the board does not report which values it has."""
 OWN_GAINS: Final = (
-    "the speed controllers run with the board's own {}; with those of the public firmware a wheel"
-    " swings, so the robot does not hold its course, and odometry is 0.04 m off in 5 m on average,"
-    " in a few drives 0.2 to 2 m: run calibrate step, or set these parameters"
+    "the speed controllers run with the board's own {}. With those of the public firmware a"
+    " wheel oscillates, so the robot does not hold its course, and after 5 m odometry is wrong"
+    " by 0.04 m on average, in a few drives by 0.2 to 2 m. Run calibrate step, or set these"
+    " parameters"
 )
 """Advice for missing gains. Its figures are from 150 forward drives of the compiled firmware with
 wheels of the right size."""

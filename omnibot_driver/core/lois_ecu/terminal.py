@@ -45,7 +45,7 @@ class ModeChange:
     def want(self, mode: TerminalMode) -> None:
         """Request a mode; a sensor's mode begins when the robot is at rest."""
         if mode in SENSORS and mode is not self.wanted:
-            self.stop_first(f"terminal_mode becomes {mode.name.lower()}")
+            self.stop_first(f"terminal_mode is changing to {mode.name.lower()}")
         self.wanted = mode
         self._again_at_s = -math.inf
 

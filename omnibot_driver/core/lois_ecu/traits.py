@@ -40,8 +40,8 @@ TRAITS: Final = Traits(
             " `low_pass`; in duty mode, `duty_scale`"
         ),
         Fault.HELD_BY_ESTOP: (
-            "check whether the e-stop button is held, and motor power; the board tells a press"
-            " and a release once"
+            "check whether the e-stop button is held, and motor power; the board reports each"
+            " press and release only once"
         ),
     },
 )

@@ -41,7 +41,7 @@ class Upkeep:
         """Use other settings: changed ones are written; another mode stops the robot first."""
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
-            self.change.stop_first(f"drive_mode becomes {settings.drive_mode}")
+            self.change.stop_first(f"drive_mode is changing to {settings.drive_mode}")
         if settings.terminal_mode is not before.terminal_mode:
             self.change.want(settings.terminal_mode)
         if _written(settings) != _written(before):

@@ -75,13 +75,13 @@ class Asking(Stops):
         elif abs(count - before[0]) > STRAY_COUNTS:
             self._sweep(now)
         else:
-            self._lose(now, "the stop port has ended a motion that the server still believes in")
+            self._lose(now, "the stop port has ended a motion, and the server does not know it")
 
     def _sweep(self, now: float) -> None:
         """Stop with SRM and SM, which cannot hang the server in this situation."""
         if self._lost_told:
             self._lost_told = False
-            self._notice("the server answers again; it is stopped first", halt=True)
+            self._notice("the server answers again; the driver first stops any motion", halt=True)
         self.state, self.motion = State.UNKNOWN, Motion.UNKNOWN
         self._halt(now)
 

@@ -172,7 +172,7 @@ class Health:
     def tripped(self) -> str:
         """What the motor board reports against driving the motors; empty if they may be driven."""
         if self._encoder_fails >= ENCODER_FAILS or self.status == NO_READ:
-            return "nothing (ENC or MCSTAT is not answered by it)"
+            return "nothing (it does not answer ENC or MCSTAT)"
         return self.bits if (self.status or 0) & HALTING else ""
 
     @property
@@ -184,8 +184,8 @@ class Health:
             return f"the motor board reports {self.tripped}: check motors, wiring and power"
         if self._imu.dead:
             return (
-                "the IMU does not answer (MPU6050 connection lost): check its wiring, and restart"
-                " server and driver if it stays so"
+                "the IMU does not answer (MPU6050 connection lost): check its wiring, and"
+                " restart server and driver if this persists"
             )
         if self.reference_fails >= REFERENCE_FAILS:
             return "this server answers 'fail' to RM although the robot moves: update the server"

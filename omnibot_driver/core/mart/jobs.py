@@ -109,8 +109,8 @@ class Jobs:
             raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
         if job is Job.LOG_FILE and not self.logging:
             raise RequestRefused(
-                "no log was started: call ~/start_log first; without one the server would end and"
-                " answer nothing"
+                "no log was started: call ~/start_log first; without a log the server would end"
+                " and send no file"
             )
         self.job, self._token = job, token
         self._request = WORD_OF[job].request(*arguments)
@@ -151,7 +151,7 @@ class Jobs:
         if self.job in REPEATED and self._tries < TIMES:
             self._waiting = False
         else:
-            self._finish(False, f"{word.text} was not answered")
+            self._finish(False, f"the controller did not answer {word.text}")
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
         """Evaluate the reply to a controlled move, and end the docking job if it was its move."""
@@ -160,7 +160,11 @@ class Jobs:
         if isinstance(reply, Fail):
             self._finish(False, f"the controller answers: {reply.reason or 'fail'}")
         else:
-            self._finish(True, "the move to the dock is over; `docked` tells whether it is reached")
+            self._finish(
+                True,
+                "the move to the dock has ended; the topic `docked` shows whether the robot is"
+                " docked",
+            )
 
     def piece(self, data: bytes, now: float) -> None:
         """Keep a datagram that arrived while pieces of a file are awaited, if its size fits."""

@@ -86,8 +86,8 @@ class Measuring(Starts):
             self._stray_s = now
             self._rescue = True
             self._notice(
-                "the robot moves, and the server knows of no motion: a turn by 1 degree is begun,"
-                " which ends with the motors off",
+                "robot moves, but the server knows of no motion; the driver starts a turn by 1"
+                " degree, at whose end the server switches the motors off",
                 halt=True,
             )
             return

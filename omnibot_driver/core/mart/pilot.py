@@ -45,7 +45,7 @@ class Pilot(Measuring):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace what was wanted by ``wanted``."""
         if wanted is not None:
-            self.jobs.cancel("a command came in meanwhile; call again when the robot is to stand")
+            self.jobs.cancel("a command arrived meanwhile; call again when none is active")
         if wanted is not self._wanted:
             self._move = None
             if self._wanted is None or wanted is None or stands(wanted):
@@ -231,7 +231,7 @@ class Pilot(Measuring):
         if self.state is State.ASKING:
             self._unanswered(word)
         elif word.kind is Kind.START:
-            self._halt(now, f"{word.text} was not answered")
+            self._halt(now, f"the controller did not answer {word.text}")
         elif word.kind is Kind.MOVE:
             self._halt(now)  # its reply is lost, or it takes too long; the way is planned again
         elif word.kind is Kind.CHECK:

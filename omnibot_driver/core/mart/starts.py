@@ -141,7 +141,7 @@ class Starts(Moves):
             return
         self._custom_refused = True
         self._once(
-            "the server has no speeds for turns on the spot but its own: they are faster than"
+            "the server cannot turn on the spot at a given speed; its own speeds are faster than"
             " commanded (`spin_speed`: fixed)"
         )
 

@@ -75,7 +75,9 @@ class Stops(Ground, ABC):
             return Motion.NONE, STANDING
         speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
         if order.twist.vy_mps:
-            self._once("cmd_vel: sideways motion is set to zero, this base has none (said once)")
+            self._once(
+                "cmd_vel: sideways speed is set to zero; this base cannot move sideways (said once)"
+            )
         if abs(speed) < SLOWEST_MPS and abs(rate) < SLOWEST_RADPS:
             return Motion.NONE, STANDING
         if turn_is_on_the_spot(speed, rate, self._settings.track_m):
@@ -118,9 +120,9 @@ class Stops(Ground, ABC):
         odometry = self.odometry
         blind_s = BLIND_S + TRIPS * self.conversation.trip_s
         if self._heading_is_told and now - max(odometry.heading.told_s, self._begun_s) > blind_s:
-            return "the relative heading is not answered while the robot drives"
+            return "the server does not report the relative heading while the robot drives"
         if now - max(odometry.wheel.told_s, self._begun_s) > blind_s:
-            return "the encoder is not answered while the robot drives"
+            return "the server does not report the encoder count while the robot drives"
         if (
             odometry.wheel.told_s - self._begun_s > NO_START_S
             and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3

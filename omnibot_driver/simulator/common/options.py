@@ -43,24 +43,26 @@ def command(module: str) -> str:
 
 def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> None:
     """Add all options of this board and of its lines to the parser."""
-    parser.add_argument("--seed", type=int, default=0, help="of all random numbers (default 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of all random numbers (default 0)"
+    )
     simulator.add_options(parser)
     serial = any(not channel.datagrams for channel in simulator.CHANNELS)
     datagrams = any(channel.datagrams for channel in simulator.CHANNELS)
-    lost = ["a byte the board sends"] * serial + ["a datagram, either way,"] * datagrams
+    lost = ["a byte the board sends"] * serial + ["a datagram, in either direction,"] * datagrams
     _add_rate(parser, "lose", f"chance that {' or '.join(lost)} is lost")
     if serial:
         burst = "begins a burst of up to 200 lost bytes"
         _add_rate(parser, "burst", f"chance that a byte the board sends {burst}")
         _add_rate(parser, "flip", "chance that a byte the board sends arrives with one bit changed")
     if datagrams:
-        _add_rate(parser, "duplicate", "chance that a datagram, either way, comes twice")
+        _add_rate(parser, "duplicate", "chance that a datagram, in either direction, arrives twice")
         parser.add_argument(
             "--delay",
             type=_delay,
             default=0.0,
             metavar="SECONDS",
-            help="a datagram, either way, is late by up to this; later ones may overtake it"
+            help="largest delay of a datagram, in either direction; later ones may overtake it"
             " (default 0)",
         )
 

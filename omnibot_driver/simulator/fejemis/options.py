@@ -14,10 +14,10 @@ from omnibot_driver.simulator.fejemis.settings import Fault, FejemisSettings, Fi
 
 _DEFAULT = FejemisSettings()
 _SWITCHES = (
-    ("timed-velocity", "vel has the time first"),
+    ("timed-velocity", "vel lines begin with the time"),
     ("acceleration-in-g", "acc is in g instead of m/s²"),
     ("tilt", "pose has a fifth number"),
-    ("start-resumes", "after start the last rc holds again"),
+    ("start-resumes", "after start the last rc command applies again"),
     ("confirms", "a command behind ! is confirmed"),
     ("single-precision", "times are float32"),
 )
@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--reverse",
         choices=get_args(Reverse),
         default="mirrored",
-        help="what becomes of the front wheel's angle when driving backward (default mirrored)",
+        help="what the steering does with the front wheel's angle in reverse (default mirrored)",
     )
     for name, effect in _SWITCHES:
         parser.add_argument(f"--{name}", action="store_true", help=effect)
@@ -48,24 +48,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=_ids,
         default=_DEFAULT.ids,
         metavar="DRIVE,FRONT",
-        help="what the two call themselves in their heartbeats (default 90,91)",
+        help="ids of the two boards in their heartbeats (default 90,91)",
     )
     parser.add_argument(
         "--uptime",
         type=float,
         default=0.0,
         metavar="SECONDS",
-        help="since when the boards run; without it they boot (default 0)",
+        help="how long the boards have been running at the start; without it they boot (default 0)",
     )
     parser.add_argument(
-        "--volts", type=float, default=_DEFAULT.volts, help="of the battery (default 24.9)"
+        "--volts", type=float, default=_DEFAULT.volts, help="battery voltage (default 24.9)"
     )
     parser.add_argument(
         "--front-m",
         type=float,
         default=_DEFAULT.front_m,
         metavar="M",
-        help="from the start to a wall in front (default none)",
+        help="distance from the start to a wall in front (default none)",
     )
     parser.add_argument(
         "--lose-inbound",

@@ -18,8 +18,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--firmware",
         choices=get_args(Firmware),
         default="documented",
-        help="whether it does what the manual says (documented, the default) or what the public"
-        " firmware does (firmware)",
+        help="behaviour of the board: as in the manual (documented, the default) or that of the"
+        " public firmware (firmware)",
     )
     parser.add_argument(
         "--running", action="store_true", help="start as a board that has booted already"

@@ -22,12 +22,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--firmware",
         choices=get_args(Firmware),
         default="firmware",
-        help="whether it does what the manual says (documented), what the public server was seen to"
-        " do (firmware, the default), or that and what only its source says (source)",
+        help="behaviour of the server: as in the manual (documented), as observed on the public"
+        " server (firmware, the default), or also with what only its source shows (source)",
     )
     for name, number, metavar, effect in _NUMBERS:
         default = getattr(_DEFAULT, name)
-        shown = "never" if default == inf else f"{default:g}"
+        shown = "none" if default == inf else f"{default:g}"
         parser.add_argument(
             f"--{_WORDS.get(name, name).replace('_', '-')}",
             dest=name,
@@ -43,13 +43,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="motors that do not turn (default none)",
     )
     parser.add_argument(
-        "--encoder-inverted", action="store_true", help="the encoder counts down forward"
+        "--encoder-inverted",
+        action="store_true",
+        help="the encoder counts down when the robot drives forward",
     )
     parser.add_argument(
         "--motor-board-silent", action="store_true", help="the motor board does not answer or obey"
     )
     parser.add_argument(
-        "--reference-start-fails", action="store_true", help="RM is answered by fail, and moves"
+        "--reference-start-fails",
+        action="store_true",
+        help="the server answers fail to RM, and the robot moves nevertheless",
     )
 
 
@@ -98,18 +102,28 @@ _WORDS = {
     "dock_m": "dock",
 }
 _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
-    ("speed_mps_per_unit", _within(0.0001, 1.0), "M/S", "of a speed unit, at 24 V"),
-    ("metres_per_count", _within(1e-6, 1.0), "M", "of an encoder count"),
-    ("track_m", _within(0.01, 10.0), "M", "between the wheels"),
-    ("volts", _within(0.0, 40.0), "V", "of the battery; the speed grows with them"),
-    ("dead_zone_units", _within(0.0, 127.0), "UNITS", "below which a motor stands"),
+    ("speed_mps_per_unit", _within(0.0001, 1.0), "M/S", "speed for one unit, at 24 V"),
+    ("metres_per_count", _within(1e-6, 1.0), "M", "distance for one encoder count"),
+    ("track_m", _within(0.01, 10.0), "M", "distance between the wheels"),
+    ("volts", _within(0.0, 40.0), "V", "battery voltage; the speed grows with it"),
+    (
+        "dead_zone_units",
+        _within(0.0, 127.0),
+        "UNITS",
+        "motor speed below which a motor does not turn",
+    ),
     ("motor_inequality", _within(-1.0, 1.0), "PART", "how much faster the left motor is"),
-    ("gyro_bias_dps", _within(-50.0, 50.0), "DEG/S", "that the server finds with SB"),
-    ("gyro_noise_dps", _within(0.0, 50.0), "DEG/S", "of a sample while the robot moves"),
-    ("imu_dies_s", _within(0.0, inf), "SECONDS", "when the IMU dies"),
-    ("imu_returns_s", _within(0.0, inf), "SECONDS", "when it lives again"),
-    ("front_m", _within(0.0, inf), "M", "from the start to a wall in front"),
-    ("rear_m", _within(0.0, inf), "M", "from the start to a wall behind"),
-    ("dock_m", _within(0.0, inf), "M", "from the start to the dock in front"),
-    ("motor_status", _bits, "BITS", "of MCSTAT; 4, 8: tripped, 16, 32: short"),
+    (
+        "gyro_bias_dps",
+        _within(-50.0, 50.0),
+        "DEG/S",
+        "bias of the gyro, which the server measures with SB",
+    ),
+    ("gyro_noise_dps", _within(0.0, 50.0), "DEG/S", "noise of a gyro sample while the robot moves"),
+    ("imu_dies_s", _within(0.0, inf), "SECONDS", "time at which the IMU stops working"),
+    ("imu_returns_s", _within(0.0, inf), "SECONDS", "time at which the IMU works again"),
+    ("front_m", _within(0.0, inf), "M", "distance from the start to a wall in front"),
+    ("rear_m", _within(0.0, inf), "M", "distance from the start to a wall behind"),
+    ("dock_m", _within(0.0, inf), "M", "distance from the start to the dock in front"),
+    ("motor_status", _bits, "BITS", "status bits of MCSTAT; 4, 8: tripped, 16, 32: short"),
 )

@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=_ticks,
         default=0.04,
         metavar="SECONDS",
-        help="from one such frame to the next (default 0.04; the manual also has 0.1)",
+        help="period of that frame (default 0.04; the manual also has 0.1)",
     )
     parser.add_argument(
         "--control",
@@ -56,7 +56,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="bytes that arrive while the board boots count for its three wake-up bytes",
     )
     parser.add_argument(
-        "--ignore-estop", action="store_true", help="the firmware knows no emergency stop"
+        "--ignore-estop", action="store_true", help="the firmware does not know the emergency stop"
     )
     parser.add_argument(
         "--latching-estop",

@@ -37,7 +37,8 @@ def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
     wanted, thing = NEEDS[subcommand]
     if not any(parameter in parameters for parameter in wanted):
         raise ToolError(
-            f"calibrate {subcommand} needs {thing}, which the board {parameters['board']} has not"
+            f"calibrate {subcommand} needs {thing}, which the board {parameters['board']} does"
+            " not have"
         )
 
 
@@ -45,12 +46,12 @@ def command_line() -> argparse.ArgumentParser:
     """Return the parser of the command line; it exits with 2 and a message on wrong usage."""
     parser = argparse.ArgumentParser(
         prog="calibrate",
-        description="Finds what the driver's parameters ought to be, with uncertainties.",
+        description="Measures values for the driver's parameters, with uncertainties.",
     )
     parser.epilog = (
-        "WHAT --help lists the options. ROS's own arguments follow --ros-args. Ends with 0, with 1"
-        " and a sentence when nothing was found, with 2 on wrong usage, with 130 when interrupted."
-        " See docs/tools/calibrate.md."
+        "WHAT --help lists the options. ROS's own arguments follow --ros-args. Exit codes: 0"
+        " with a result, 1 with a message if nothing was found, 2 on wrong usage, 130 when"
+        " interrupted. See docs/tools/calibrate.md."
     )
     subparsers = parser.add_subparsers(dest="subcommand", required=True, metavar="WHAT")
     for name, (summary, add_arguments) in SUBCOMMANDS.items():
@@ -71,10 +72,13 @@ def command_line() -> argparse.ArgumentParser:
         subparser.add_argument(
             "--apply",
             action="store_true",
-            help="also set what was found in the running driver, as far as it may change there",
+            help="also set the results in the running driver, where they may change while it runs",
         )
         subparser.add_argument(
-            "--namespace", default="", metavar="NAME", help="the driver's, such as /robot1"
+            "--namespace",
+            default="",
+            metavar="NAME",
+            help="namespace of the driver, such as /robot1",
         )
     return parser
 
@@ -95,61 +99,76 @@ def _imu(parser: argparse.ArgumentParser) -> None:
         "--minutes",
         type=_positive,
         default=1.0,
-        help="to rest (default 1; for a wandering bias ten and more)",
+        help="minutes at rest (default 1; ten or more show how the bias drifts)",
     )
     parser.add_argument(
         "--gravity",
         type=_positive,
         default=STANDARD_GRAVITY,
         metavar="M/S²",
-        help="where you are (default %(default)s)",
+        help="gravity where you are (default %(default)s)",
     )
 
 
 def _scale(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--speed", type=_positive, default=0.25, help="fastest, m/s (default %(default)s)"
+        "--speed", type=_positive, default=0.25, help="highest speed, m/s (default %(default)s)"
     )
     parser.add_argument(
-        "--turning", type=_positive, default=0.5, help="fastest, rad/s (default %(default)s)"
+        "--turning",
+        type=_positive,
+        default=0.5,
+        help="highest yaw rate, rad/s (default %(default)s)",
     )
     parser.add_argument(
-        "--levels", type=_whole, default=3, help="speeds along each axis (default %(default)s)"
+        "--levels",
+        type=_whole,
+        default=3,
+        help="number of speeds along each axis (default %(default)s)",
     )
     parser.add_argument(
-        "--seconds", type=_positive, default=2.0, help="at each speed (default %(default)s)"
+        "--seconds", type=_positive, default=2.0, help="seconds at each speed (default %(default)s)"
     )
     _by_tape(parser.add_argument_group("where the board has no unit of its own for speeds"))
 
 
 def _by_tape(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
-        "--side", type=_positive, default=1.0, help="of lines and squares, m (default %(default)s)"
+        "--side",
+        type=_positive,
+        default=1.0,
+        help="length of lines and of the sides of squares, m (default %(default)s)",
     )
     parser.add_argument(
-        "--turns", type=_whole, default=3, help="on the spot, each way (default %(default)s)"
+        "--turns",
+        type=_whole,
+        default=3,
+        help="turns on the spot in each direction (default %(default)s)",
     )
     parser.add_argument(
         "--tape",
         type=_positive,
         default=2.0,
-        help="how exact your tape is, mm (default %(default)s)",
+        help="standard deviation of your tape readings, mm (default %(default)s)",
     )
     parser.add_argument(
         "--angle",
         type=_positive,
         default=1.0,
-        help="how exactly you read a heading, degrees (default %(default)s)",
+        help="standard deviation of your heading readings, degrees (default %(default)s)",
     )
 
 
 def _geometry(parser: argparse.ArgumentParser) -> None:
     _by_tape(parser)
     parser.add_argument(
-        "--speed", type=_positive, default=0.2, help="fastest, m/s (default %(default)s)"
+        "--speed", type=_positive, default=0.2, help="highest speed, m/s (default %(default)s)"
     )
     parser.add_argument(
-        "--turning", type=_positive, default=0.5, help="fastest, rad/s (default %(default)s)"
+        "--turning",
+        type=_positive,
+        default=0.5,
+        help="highest yaw rate, rad/s (default %(default)s)",
     )
     parser.add_argument(
         "--without-squares", action="store_true", help="lines and turns only: faster, less certain"
@@ -164,37 +183,40 @@ def _step(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         default=(4.0, 12.0),
         metavar=("SLOW", "FAST"),
-        help="of a wheel, in rad/s (default 4 12)",
+        help="two speeds of a wheel, in rad/s (default 4 12)",
     )
     parser.add_argument(
         "--hold", type=_positive, default=1.5, help="seconds at each speed (default 1.5)"
     )
     parser.add_argument(
-        "--steps", type=_whole, default=8, help="up and down together, each direction (default 8)"
+        "--steps",
+        type=_whole,
+        default=8,
+        help="number of steps, up and down together, in each direction (default 8)",
     )
     parser.add_argument(
         "--gains",
         type=_positive,
         nargs=3,
         metavar=("K_FF", "K_VP", "K_VI"),
-        help="what the firmware was built with (default: the manual's 40 10 1.5)",
+        help="gains in the firmware (default: the manual's 40 10 1.5)",
     )
     tuning = parser.add_argument_group("on a board whose gains are parameters")
     for name, default, words in (
-        ("records", 24, "starts at full duty that are recorded"),
-        ("responses", 3, "steps of the set-point that are recorded with the same gains"),
-        ("samples", 120, "ticks of each wheel in a record"),
+        ("records", 24, "number of recorded starts at full duty"),
+        ("responses", 3, "number of recorded steps of the set-point with the same gains"),
+        ("samples", 120, "number of ticks of each wheel in a record"),
     ):
         tuning.add_argument(
             f"--{name}", type=_whole, default=default, help=f"{words} (default %(default)s)"
         )
     for name, value, words in (
-        ("overshoot", 5.0, "most of a step, %%"),
-        ("band", 5.0, "within which a step is over, %%"),
-        ("destination", 50.0, "of the step, %% of the speed at full duty"),
-        ("settling", 2.0, "within which a step is to be over, s"),
-        ("phase-margin", 60.0, "least, degrees"),
-        ("control-frequency", 11.0, "of the controller in the firmware, Hz"),
+        ("overshoot", 5.0, "largest overshoot of a step, %%"),
+        ("band", 5.0, "band around the set-point within which a step is over, %%"),
+        ("destination", 50.0, "set-point of the step, %% of the speed at full duty"),
+        ("settling", 2.0, "time within which a step should be over, s"),
+        ("phase-margin", 60.0, "smallest phase margin, degrees"),
+        ("control-frequency", 11.0, "rate of the controller in the firmware, Hz"),
     ):
         tuning.add_argument(
             f"--{name}", type=_positive, default=value, help=f"{words} (default %(default)s)"

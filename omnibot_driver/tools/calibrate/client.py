@@ -134,7 +134,7 @@ class Client:
         client = self._node.create_client(kind, name)
         try:
             if not self._wait(client.service_is_ready, FOUND_WITHIN_S):
-                raise ToolError(f"{name} is not there: does the driver still run?")
+                raise ToolError(f"{name} is not available: does the driver still run?")
             future = client.call_async(request)
             if not self._wait(future.done, ANSWER_WITHIN_S):
                 raise ToolError(f"{name} does not answer: does the driver still run?")

@@ -104,8 +104,9 @@ class Walk:
         found.control_method = control_method(slow, fast, slow_mps)
         if found.control_method == "position":
             say(
-                f"Told {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, it went {slow.late_mps:.3f}"
-                f" and {fast.late_mps:.3f} in the end: positional control."
+                f"Commanded {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, the robot moved at"
+                f" {slow.late_mps:.3f} and {fast.late_mps:.3f} m/s in the end: positional"
+                " control."
             )
             return
         say(f"{slow.speed_mps:.3f} m/s, then {fast.speed_mps:.3f}: velocity control.")
@@ -118,8 +119,8 @@ class Walk:
         if not deltas_are_understood(turning, found.before["base_radius"]):
             found.delta_frame = "earth" if frame == "wheel_counts" else "wheel_counts"
             say(
-                f"By the deltas it went {turning.speed_mps:.3f} m/s sideways in a turn on the spot:"
-                f" they are not what delta_frame: {frame} says, but {found.delta_frame}."
+                f"In a turn on the spot the deltas show {turning.speed_mps:.3f} m/s sideways:"
+                f" delta_frame is not {frame}, but {found.delta_frame}."
             )
             self._obeys = False  # no speed that the driver tells is right
             return
@@ -129,8 +130,8 @@ class Walk:
         again = drift(log.odometry, began_s + SETTLING_S, began_s + JOG_S)
         right = frame == "wheel_counts" or frame_is_right(fast, again, turned_rad)
         found.delta_frame = frame if right else {"earth": "body", "body": "earth"}[frame]
-        verdict = "as before" if right else "and by the deltas it went elsewhere"
-        say(f"Turned by {turned_rad:.2f} rad, {verdict}: the deltas are {found.delta_frame}.")
+        verdict = "as set" if right else "because a forward drive then shows another direction"
+        say(f"Turned by {turned_rad:.2f} rad: the deltas are {found.delta_frame}, {verdict}.")
 
     # Found by looking at the wheels
 
@@ -151,7 +152,7 @@ class Walk:
                 " a single wheel; check how its motor and encoder are connected, then begin again"
             )
         if found.control_method == "position":
-            self._console.say("The axes cannot be looked at with the switch on positional control.")
+            self._console.say("The axes cannot be checked with the switch on positional control.")
             return
         seen = [self._until_possible(lambda n=axis: self._axis(n)) for axis in range(3)]  # type: ignore[misc]
         x, y, yaw = (now * sign for now, sign in zip(found.before["axis_signs"], seen, strict=True))
@@ -229,8 +230,8 @@ class Walk:
                 return find()
             except Contradiction as error:
                 said = str(error)
-                self._console.say(f"That cannot be: {said}. Once more.")
-        raise ToolError(f"{said}; this does not become clear, see docs/commissioning.md")
+                self._console.say(f"That is not possible: {said}. Please try again.")
+        raise ToolError(f"{said}; no clear result after several tries, see docs/commissioning.md")
 
     def _drive(
         self, plan: list[tuple[float, Vector3]], *, topic: str = "cmd_vel", obeys: bool

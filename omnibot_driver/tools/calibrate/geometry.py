@@ -150,21 +150,22 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     ]  # fmt: skip
     before, after = misses(readings, found, was["base_radius"])
     notes = [
-        f"The odometry was off by {before * 1000:.0f} mm in the mean; with these values it would"
-        f" have been by {after * 1000:.0f} mm.",
-        "Speeds are another matter: now run `calibrate scale`, with these values loaded.",
+        f"The mean error of the odometry was {before * 1000:.0f} mm; with these values it would"
+        f" have been {after * 1000:.0f} mm.",
+        "These values do not correct the speeds: load them, then run `calibrate scale`.",
     ]
     notes += [
         f"Wheel {wheel} is {abs(more):.1%} {'larger' if more > 0 else 'smaller'} than the mean,"
-        " which no parameter corrects; look at its rollers, and whether all wheels carry alike."
+        " which no parameter corrects; check its rollers, and whether all wheels carry the same"
+        " load."
         for wheel, more, sigma in zip(WHEELS, found.unlike, found.unlike_sigma, strict=True)
         if abs(more) > max(PLAIN, 3 * sigma)
     ]
     if found.excess > 2.0:
         notes.append(
-            f"The readings scatter {found.excess:.1f} times as much as they should by --tape,"
-            " --angle and odom_wheel_drift,"
-            " and the uncertainties are that much larger: was one misread, or does the robot slip?"
+            f"The readings scatter {found.excess:.1f} times as much as --tape, --angle and"
+            " odom_wheel_drift predict, so the uncertainties are larger by this factor: was one"
+            " misread, or does the robot slip?"
         )
     return Result(
         findings=findings,

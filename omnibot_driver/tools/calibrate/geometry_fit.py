@@ -100,7 +100,8 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
     if not found.success or max(abs(wheels - 1), abs(base - 1)) > UNKNOWN:
         raise ToolError(
             "the readings do not fit this robot (wheel or base radius off by more than"
-            f" {UNKNOWN:.0%}): check their signs and units, and that forward is forward, then again"
+            f" {UNKNOWN:.0%}): check their signs and units, and that the robot's forward is"
+            " forward, then try again"
         )
     excess = max(1.0, 2 * found.cost / max(1, count + 3 - 4)) ** 0.5
     covariance = excess**2 * np.linalg.inv(found.jac.T @ found.jac)

@@ -117,8 +117,8 @@ def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> R
         },
         notes=[
             f"{found.readings} readings in {found.readings * found.period_s:.0f} s. Of the"
-            " accelerometer's bias only the part along gravity can be seen at rest. Roll and pitch"
-            " hold the slope of the floor as well; for the robot's description:"
+            " accelerometer's bias only the part along gravity can be seen at rest. Roll and"
+            " pitch include the slope of the floor; for the robot's description:"
             f" imu_rpy:='{roll_rad % math.tau:.4f} {pitch_rad:.4f} <yaw>'."
         ],
         draw=lambda figure: draw(figure, found, imu),

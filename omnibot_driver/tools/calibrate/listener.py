@@ -110,8 +110,8 @@ class Listener(Client):
                 )
         if lost := self._lost():
             raise ToolError(
-                f"nothing came on {' and '.join(lost)} for {LOST_S:g} s: is the driver still there,"
-                " the computer too busy, the network too slow?"
+                f"no messages on {' and '.join(lost)} for {LOST_S:g} s: check that the driver"
+                " still runs, and that computer and network are not overloaded"
             )
 
     def _lost(self) -> list[str]:

@@ -111,9 +111,9 @@ def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     if abs(change_rad - abs(math.remainder(turned_rad, math.tau))) < ALIKE * abs(turned_rad):
         return False
     raise ToolError(
-        f"the odometry makes no sense: after a turn of {math.degrees(turned_rad):.0f}° the same"
-        f" command leads {math.degrees(change_rad):.0f}° elsewhere; see /diagnostics, and"
-        " docs/internals/omnibot_protocol.md"
+        f"the odometry contradicts itself: after a turn of {math.degrees(turned_rad):.0f}° the"
+        f" same command leads in a direction that differs by {math.degrees(change_rad):.0f}°; see"
+        " /diagnostics, and docs/internals/omnibot_protocol.md"
     )
 
 

@@ -70,19 +70,19 @@ class Bounds:
         """Raise ToolError if the robot is too far from its start, or drives for too long."""
         if not pose.finite:
             raise ToolError(
-                "the robot was stopped, `odom` does not say where it is (NaN or infinite): see who"
-                " publishes that"
+                "the robot was stopped, because `odom` contains NaN or infinity: find the node"
+                " that publishes it"
             )
         if pose.way_m > self.way:
-            where = f"{pose.way_m:.2f} m from where it began, {self.way:.2f} m allowed"
+            where = f"{pose.way_m:.2f} m from its start, {self.way:.2f} m allowed"
         elif abs(pose.yaw_rad) > self.turn:
             where = f"turned by {abs(pose.yaw_rad):.1f} rad, {self.turn:.1f} rad allowed"
         elif seconds > self.seconds:
-            where = f"under way for {seconds:.0f} s, {self.seconds:.0f} s allowed"
+            where = f"driving for {seconds:.0f} s, {self.seconds:.0f} s allowed"
         else:
             return
         raise ToolError(
-            f"the robot was stopped, it went too far ({where}): check `linear_scale`,"
+            f"the robot was stopped, because it went too far ({where}): check `linear_scale`,"
             " `angular_scale` and that `odom` is right (docs/commissioning.md)"
         )
 

@@ -75,11 +75,12 @@ def rest(imu: Imu) -> Rest:
     lost = 1 - (len(rates) - 1) * period_s / (imu.stamp_s[-1] - imu.stamp_s[0])
     if lost > LOST_PART:
         raise ToolError(
-            f"{lost:.0%} of the IMU readings were lost: see the rates in /diagnostics, then again"
+            f"{lost:.0%} of the IMU readings were lost: see the rates in /diagnostics, then try"
+            " again"
         )
     if not (np.ptp(rates, axis=0).all() and np.ptp(forces, axis=0).all()):
         raise ToolError(
-            "an axis of the IMU has said exactly the same all the time: it is stuck; switch the"
+            "an axis of the IMU gave identical readings all the time: it is stuck; switch the"
             " board off and on"
         )
     size = max(2, round(BLOCK_S / period_s))

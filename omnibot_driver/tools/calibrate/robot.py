@@ -280,8 +280,8 @@ class Robot(Listener):
                 )
             } - {self._node.get_fully_qualified_name()}
             raise ToolError(
-                f"somebody else commands the robot on {self._foreign}"
-                f" ({', '.join(sorted(others))}): end that first"
+                f"another node commands the robot on {self._foreign}"
+                f" ({', '.join(sorted(others))}): end it first"
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
@@ -289,8 +289,8 @@ class Robot(Listener):
         robot."""
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(
-                f"this program was held up for {silence_s:.1f} s, and the driver has stopped the"
-                " robot meanwhile: begin again, on a computer with less to do"
+                f"this program did not run for {silence_s:.1f} s, so the driver stopped the"
+                " robot: reduce the load of this computer, then begin again"
             )
 
 

@@ -96,11 +96,12 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
     if abs(ratio - 1) > GYRO_TOLERANCE + UNLIKE * ratio_sigma:
         notes.append(
             f"Gyro and odometry differ by {abs(ratio - 1):.1%}, more than the gyro's tolerance of"
-            f" {GYRO_TOLERANCE:.0%}: run `calibrate geometry`, load what it finds, then this again."
+            f" {GYRO_TOLERANCE:.0%}: run `calibrate geometry`, load its values, then run this"
+            " again."
         )
     notes.append(
-        "These hold for speeds as `odom` has them: if `calibrate geometry` changes what `odom`"
-        " says, run this again after it."
+        "These values are correct for the speeds in the present `odom`: if `calibrate geometry`"
+        " changes what `odom` says, run this again after it."
     )
     return Result(
         findings=[

@@ -49,8 +49,8 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
     notes = [sentence for wheel in found for sentence in _remarks(wheel)]
     notes += [
         f"With the gains that it has, {_told([behaviour(motor, now) for motor in motors])}.",
-        f"With the better ones, {_told([behaviour(motor, better) for motor in motors])}.",
-        "No message sets them: they are constants of the firmware.",
+        f"With the better gains, {_told([behaviour(motor, better) for motor in motors])}.",
+        "No message to the board sets the gains: they are constants of the firmware.",
     ]
     return Result(
         findings=findings,
@@ -107,7 +107,7 @@ def _remarks(wheel: WheelFound) -> list[str]:
     remarks = [
         f"Wheel {wheel.name}: residuals of {first.rms_radps:.3f} rad/s with the first order,"
         f" {second.rms_radps:.3f} with the second, {motor.rms_radps:.3f} with a motor in the"
-        f" manual's loop; by AIC the {wheel.answer.model.title} tells the answer."
+        f" manual's loop; by AIC the {wheel.answer.model.title} fits best."
     ]
     if wheel.left_out:
         remarks.append(
@@ -122,8 +122,9 @@ def _remarks(wheel: WheelFound) -> list[str]:
         )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
-            f"Wheel {wheel.name}: no motor explains this in the manual's loop. Was the firmware"
-            " built with other gains (--gains)? What is said of motor and gains does not hold."
+            f"Wheel {wheel.name}: no motor in the manual's loop explains these steps. Was the"
+            " firmware built with other gains (--gains)? The results for motor and gains are not"
+            " valid."
         )
     if abs(gain - 1.0) > UNLIKE_ONE:
         remarks.append(
@@ -148,7 +149,7 @@ def _told(wheels: list[Behaviour]) -> str:
         for values in ([wheel.overshoot for wheel in wheels], [wheel.ms for wheel in wheels])
     )
     return (
-        f"a step of command rises within {rise_ms:.0f} ms at the most, overshoots by"
-        f" {100 * overshoot:.0f} % and leaves {command_ms:.0f} ms of itself as error, a load"
-        f" {load_ms:.0f} ms; Ms is {ms:.2f}"
+        f"a step of the command rises within {rise_ms:.0f} ms at most and overshoots by"
+        f" {100 * overshoot:.0f} %; the integrated error is {command_ms:.0f} ms times the step,"
+        f" and {load_ms:.0f} ms times a load; Ms is {ms:.2f}"
     )

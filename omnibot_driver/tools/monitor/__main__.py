@@ -45,11 +45,11 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     parser = argparse.ArgumentParser(
         prog="monitor",
         description="A running driver on one screen, with an e-stop under the space bar.",
-        epilog="ROS's own arguments follow --ros-args. Ends with 0, with 1 and a sentence when"
-        " something is missing or wrong, with 2 on wrong usage. See docs/tools/monitor.md.",
+        epilog="ROS's own arguments follow --ros-args. Exit codes: 0 at the end, 1 with a message"
+        " when something is missing or wrong, 2 on wrong usage. See docs/tools/monitor.md.",
     )
     parser.add_argument(
-        "--namespace", default="", metavar="NAME", help="the driver's, such as /robot1"
+        "--namespace", default="", metavar="NAME", help="namespace of the driver, such as /robot1"
     )
     parser.add_argument(
         "--driver",

@@ -122,8 +122,8 @@ class Feed:
         if count < 2:
             return ""
         return (
-            f"there are {count} drivers called {self.driver}: what is shown mixes them, and both do"
-            " what is asked; end all but one, or give them namespaces"
+            f"there are {count} drivers called {self.driver}: the display mixes their data, and"
+            " each obeys the requests; end all but one, or give them namespaces"
         )
 
     def diagnoses(self) -> bool:

@@ -26,8 +26,8 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="report",
         description="What a drive was like: a page with pictures, and a verdict in words.",
-        epilog="Ends with 0, with 3 where the report says that something is wrong, with 1 where"
-        " there is nothing to report on, with 2 on wrong usage. See docs/tools/report.md.",
+        epilog="Exit codes: 0 with a report, 3 if it says that something is wrong, 1 with a message"
+        " if there is nothing to report on, 2 on wrong usage. See docs/tools/report.md.",
     )
     parser.add_argument("bag", nargs="?", type=Path, help="folder of a rosbag2, or a file of it")
     parser.add_argument(
@@ -36,12 +36,14 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
         metavar="SECONDS",
         help="instead of a bag, listen to a running driver for this time, or until ctrl-C",
     )
-    parser.add_argument("--namespace", metavar="NAME", help="of the robot, where there are several")
+    parser.add_argument(
+        "--namespace", metavar="NAME", help="namespace of the robot, if there are several"
+    )
     parser.add_argument(
         "--output",
         type=Path,
         metavar="FOLDER",
-        help="to write page and pictures into (default: BAG_report or live_report here)",
+        help="folder for page and pictures (default: BAG_report or live_report here)",
     )
     parsed = parser.parse_args(given)
     if (parsed.bag is None) == (parsed.live is None):

@@ -53,7 +53,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
                     damaged += 1
         progress(total, total)
     if damaged:
-        troubles.append(f"{counted(damaged, 'message')} damaged, and passed over")
+        troubles.append(f"{counted(damaged, 'message')} damaged and skipped")
     if not recorder.count:
         why = "; ".join(troubles) or "its topics are empty"
         raise ToolError(f"{path} has no message of the robot {robot}: {why}")
@@ -120,7 +120,7 @@ def _open_file(file: Path, stack: ExitStack, troubles: list[str]) -> Reader:
         whole = make_whole(file, Path(stack.enter_context(TemporaryDirectory())))
     reader = stack.enter_context(Reader(whole))
     if broken:
-        troubles.append(f"the file {file.name} breaks off; what is whole of it is reported on")
+        troubles.append(f"the file {file.name} is incomplete; the report covers its undamaged part")
     return reader
 
 

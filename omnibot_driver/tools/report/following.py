@@ -203,9 +203,9 @@ def _ceased(log: Log, pair: Pair) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Commands",
-            f"{pair.topic} ceased {counted(len(ceased), 'time')} in motion for more than"
-            f" {COMMAND_TIMEOUT_S:g} s, first at {commands.arrived_s[ceased[0]]:.1f} s: the driver"
-            " stopped the robot.",
+            f"{pair.topic} was interrupted {counted(len(ceased), 'time')} in motion for more"
+            f" than {COMMAND_TIMEOUT_S:g} s, first at {commands.arrived_s[ceased[0]]:.1f} s: the"
+            " driver stopped the robot.",
             "If that was not meant, publish at a steady rate of 10 Hz or more.",
         )
 

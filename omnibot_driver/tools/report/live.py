@@ -56,7 +56,7 @@ def listen(
         rclpy.try_shutdown()
     if not recorder.count:
         raise ToolError(
-            f"the driver of {robot} said nothing for {seconds:g} s: is it still running?"
+            f"the driver of {robot} sent nothing for {seconds:g} s: is it still running?"
         )
     return recorder.log(alone=alone)
 

@@ -189,10 +189,10 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         yield Finding(
             Level.WARN,
             "Timing",
-            f"Stamps of {stream.name} leapt {counted(len(rhythm.leap_s), 'time')}, by up to"
+            f"Stamps of {stream.name} jumped {counted(len(rhythm.leap_s), 'time')}, by up to"
             f" {1e3 * (rhythm.leap_s.max() - rhythm.period_s):.0f} ms, first at"
             f" {rhythm.leap_at_s[0]:.1f} s, and came back: nothing is missing.",
-            "The driver was kept from reading for a while: relieve the computer.",
+            "The driver could not read for a while: reduce the load of the computer.",
         )
     even = rhythm.steps_s[(rhythm.steps_s > 0.0) & (rhythm.steps_s <= GAP * rhythm.period_s)]
     if len(even) < FEWEST:
@@ -220,14 +220,19 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 
 def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     if not len(rhythm.gap_s):
-        yield Finding(Level.GOOD, "Gaps", f"{stream.name} has no gap while it should come.")
+        yield Finding(
+            Level.GOOD, "Gaps", f"{stream.name} has no gap while the board should send it."
+        )
         return
     lost = int(rhythm.missing.sum())
     longest = int(rhythm.gap_s.argmax())
     share = lost / (lost + len(rhythm.steps_s))
     counted_lost = grown(log, stream.lost)
     if counted_lost is None:
-        advice = "Whether the line or the recorder lost them, only /diagnostics of it alone tells."
+        advice = (
+            "Record /diagnostics of this robot alone: it shows whether the line or the recorder"
+            " lost them."
+        )
     elif counted_lost == 0:
         advice = (
             "The driver counts no loss, so the network, the recorder or a busy computer lost them:"
@@ -264,7 +269,8 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         "Timing",
         f"{stream.name} arrives {1e3 * over_s:.2f} ms later than at best on average,"
         f" and by less than {1e3 * most_s:.1f} ms in 99 of 100 cases.",
-        "Set the adapter's latency_timer to 1 (udev/99-omnibot.rules); relieve the computer."
+        "Set the adapter's latency_timer to 1 (udev/99-omnibot.rules), or reduce the load of the"
+        " computer."
         if late
         else "",
     )

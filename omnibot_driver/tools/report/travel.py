@@ -102,19 +102,19 @@ def _leaps(odom: Series, found: Steps) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Odometry",
-            f"It began anew at zero {counted(int(found.reset.sum()), 'time')}, first at"
+            f"The pose began again at zero {counted(int(found.reset.sum()), 'time')}, first at"
             f" {at_s[found.reset][0]:.1f} s: ~/reset_odometry, or another driver.",
         )
     leap = found.leap & ~found.reset
     if not leap.any():
-        yield Finding(Level.GOOD, "Odometry", "Pose and twist agree; no leap.")
+        yield Finding(Level.GOOD, "Odometry", "Pose and twist agree; no jump.")
         return
     worst = int(np.where(leap, found.off_m / LEAP_M + found.off_rad / LEAP_RAD, 0.0).argmax())
     yield Finding(
         Level.BAD,
         "Odometry",
-        f"The pose leaps {counted(int(leap.sum()), 'time')} where the twist does not lead:"
-        f" at {at_s[worst]:.1f} s by {found.off_m[worst]:.2f} m and"
+        f"The pose jumps {counted(int(leap.sum()), 'time')} to places where the twist does not"
+        f" lead: at {at_s[worst]:.1f} s by {found.off_m[worst]:.2f} m and"
         f" {np.degrees(found.off_rad[worst]):.0f}°.",
         "Do two nodes publish odom? If not, look at the gaps and at fastest_linear_speed.",
     )

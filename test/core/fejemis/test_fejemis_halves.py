@@ -133,7 +133,7 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
     bench.speaks = {1 - HALVES[half]}
     bench.open()
     bench.run(5.0)
-    assert sum(f"nothing is heard from the {half} board" in text for text in bench.notices) == 1
+    assert sum(f"no data from the {half} board" in text for text in bench.notices) == 1
 
 
 @pytest.mark.parametrize("begins", [False, True])
@@ -148,7 +148,7 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
     bench.run_until(lambda: bench.session.state == "nominal")
     bench.drive_on()
     assert not bench.robot.standing
-    words = "have sums now" if begins else "have no sums any more"
+    words = "now have checksums" if begins else "no longer have checksums"
     assert sum(words in text for text in bench.notices) == 2
 
 

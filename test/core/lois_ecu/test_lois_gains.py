@@ -31,7 +31,7 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
     """The log has one notice, and the diagnostics name the gains as long as they are not set."""
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)
-    assert "in a few drives 0.2 to 2 m: run calibrate step" in sentence
+    assert "in a few drives by 0.2 to 2 m. Run calibrate step" in sentence
     assert bench.session.board.figures.own["Gains"].startswith(
         "left_kp, left_tn, left_td, right_kp"
     )
@@ -42,7 +42,7 @@ def test_gains_that_are_set_need_no_words() -> None:
     assert told(opened(HOST_GAINS)) == []
     written = {name: one for name, one in HOST_GAINS.written.items() if name != Setting.RIGHT_TN}
     (sentence,) = told(opened(replace(HOST_GAINS, written=written)))
-    assert "the board's own right_tn;" in sentence
+    assert "the board's own right_tn." in sentence
 
 
 def test_without_a_speed_controller_its_gains_do_not_matter() -> None:

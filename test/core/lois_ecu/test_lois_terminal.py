@@ -93,7 +93,7 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
     configure(bench, LoisEcuSettings(drive_mode="duty"))
-    with pytest.raises(CommandRefused, match="drive_mode becomes duty"):
+    with pytest.raises(CommandRefused, match="drive_mode is changing to duty"):
         bench.drive()
     bench.run_until(lambda: bench.robot.stands)
     with pytest.raises(CommandRefused, match="wait"):

@@ -28,7 +28,7 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     with driven(probe, robot):
         robot.unplug(channel)
         probe.wait_for_state("connecting")
-        driver.wait_for_line(rf"lost.*{name}|{name}.*(lost|missing|not heard)")
+        driver.wait_for_line(rf"lost.*{name}|{name}.*(lost|missing|no data)")
         if channel == FRONT:
             robot.stands_for_good()
         else:
