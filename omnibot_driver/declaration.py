@@ -3,6 +3,7 @@
 """A board's parameters declared on a node: read at start, described, and checked when set."""
 
 import re
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -44,7 +45,17 @@ def declare(node: Node) -> dict[str, Any]:
     return values
 
 
-def ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, Any]:
+def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
+    """Return all of the driver's values after a change; ``values``: those before it.
+
+    Each has its parameter's own type: ROS also passes an integer for a real number, which a message
+    would publish as 0.
+    """
+    table = boards.table_for(values)
+    return table.check_all({**values, **_ours(changed, table)})
+
+
+def _ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, Any]:
     """Return the values of the changed parameters that are the driver's own."""
     return {item.name: item.value for item in changed if item.name in table.by_name}
 
@@ -83,7 +94,7 @@ def _check(
     """Check the changed values, each alone and together with the unchanged ones."""
     present = {item.name: item.value for item in node.get_parameters(list(table.by_name))}
     try:
-        table.check_all({**present, **ours(changed, table)})
+        table.check_all({**present, **_ours(changed, table)})
     except ParameterError as error:
         return SetParametersResult(successful=False, reason=str(error))
     return SetParametersResult(successful=True)

@@ -151,8 +151,7 @@ class OmniBotDriver(Node):
         return messages.MessageSettings.from_parameters(self._values, wheels)
 
     def _apply_parameters(self, changed: list[rclpy.Parameter]) -> None:
-        table = self._profile.PARAMETERS
-        self._values = table.check_all({**self._values, **declaration.ours(changed, table)})
+        self._values = declaration.updated(self._values, changed)
         self._publishing.settings = self._message_settings()
         self._link.reconnect_interval_s = self._values["reconnect_interval"]
         wheels = self._profile.kinematics(self._values)

@@ -16,7 +16,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState, MagneticField, Range
 from std_msgs.msg import ColorRGBA, Float32, Header
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver import messages
+from omnibot_driver import declaration, messages
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis import (
     BatteryReading,
@@ -81,7 +81,7 @@ class FejemisTopics:
         node.add_post_set_parameters_callback(self._apply)
 
     def _apply(self, changed: list[rclpy.Parameter]) -> None:
-        self._values = {**self._values, **{item.name: item.value for item in changed}}
+        self._values = declaration.updated(self._values, changed)
 
     # From the boards
 

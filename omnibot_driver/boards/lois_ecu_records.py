@@ -69,10 +69,8 @@ def remark(reading: RecordReading) -> str:
     if not slow:
         return ""
     longest_s = SATURATED * reading.count_s
-    return (
-        f"{slow} ticks of the record took longer than the {longest_s:.4g} s that the board can"
-        " report"
-    )
+    ticks = f"{slow} tick{'' if slow == 1 else 's'}"
+    return f"{ticks} of the record took longer than the {longest_s:.4g} s that the board can report"
 
 
 def file_name(kind: RecordKind, at_s: float) -> str:

@@ -12,7 +12,7 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
 from std_msgs.msg import Bool, Float32MultiArray, Header, String
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver import messages
+from omnibot_driver import declaration, messages
 from omnibot_driver.boards.lois_ecu_record_topics import Recorder
 from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
@@ -71,7 +71,7 @@ class LoisEcuTopics:
         node.add_post_set_parameters_callback(self._apply)
 
     def _apply(self, changed: list[rclpy.Parameter]) -> None:
-        self._values = {**self._values, **{item.name: item.value for item in changed}}
+        self._values = declaration.updated(self._values, changed)
         self._make_what_the_modes_need()
 
     def _make_what_the_modes_need(self) -> None:

@@ -62,7 +62,6 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
         odom_rate_hz=values["odom_rate"],
         spin_speed=values["spin_speed"],
         allow_reverse_goals=values["allow_reverse_goals"],
-        dock_distance_m=values["dock_distance"],
         wheel_scale=values["odom_wheel_scale"],
         gyro_drift_radps=values["gyro_drift"],
     )

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, cast
 
+import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -18,7 +19,7 @@ from sensor_msgs.msg import BatteryState, Range
 from std_msgs.msg import Bool, Header
 from std_srvs.srv import Trigger
 
-from omnibot_driver import messages
+from omnibot_driver import declaration, messages
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.board import MartBoard
 from omnibot_driver.core.mart.goal import INCH_M
@@ -72,6 +73,10 @@ class MartTopics:
         if values["set_host_time"]:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(TIME_EVERY_S, self._set_time, clock=steady)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def _apply(self, changed: list[rclpy.Parameter]) -> None:
+        self._values = declaration.updated(self._values, changed)
 
     # From the board
 

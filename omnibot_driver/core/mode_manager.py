@@ -265,7 +265,9 @@ class ModeManager:
             elif self._wanted is Wanted.RUNNING and not mode.running:
                 self._begin(now)
         if self.phase is Phase.STARTING:
-            reason += " (S is repeated until data flows)"
+            reason += " (the start is repeated until data flows)"
         elif self.phase is Phase.PAUSING:
-            reason += " (P is repeated until it is paused, and motion is refused until ~/start)"
+            reason += (
+                " (the pause is repeated until it is paused, and motion is refused until ~/start)"
+            )
         self._answer(False, reason)

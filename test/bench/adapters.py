@@ -67,4 +67,3 @@ ADAPTERS: Final[dict[str, Adapter]] = {
     "16 ms timer": packets(0.016),
     "whole ticks": whole,
 }
-PIECES: Final = "pieces of 1 to 16 bytes"

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from random import Random
 
 import pytest
-from any_board import BOARDS, TICK_S, AnyBench, nominal
+from any_board import BOARDS, MAKERS, TICK_S, AnyBench, nominal
 
+from omnibot_driver.boards import PROFILES
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 
@@ -19,6 +20,12 @@ ENDS_S = 1.0
 @pytest.fixture(params=BOARDS)
 def bench(request: pytest.FixtureRequest) -> AnyBench:
     return nominal(request.param)
+
+
+def test_every_board_of_the_driver_is_among_them() -> None:
+    """A board that is missing would not be tested here."""
+    missing = set(PROFILES) - {name.split()[0] for name in MAKERS}
+    assert not missing, "add a robot and an entry of MAKERS to test/core/any_board.py"
 
 
 def assert_stands_for_good(bench: AnyBench) -> None:

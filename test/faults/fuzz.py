@@ -71,10 +71,6 @@ def parameters(random: Random) -> SetParameters.Request:
     return SetParameters.Request(parameters=[Parameter(name=name, value=value)])
 
 
-def coin(random: Random) -> bool:
-    return random.random() < 0.5
-
-
 def fuzz(rig: Rig, count: int, random: Random) -> None:
     """Send messages and calls; check that calls are answered and that the node publishes on."""
     probe = rig.probe

@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, cast
 
 Sent = Callable[[Any], list[bytes]]
-NOTHING: Final[Mapping[str, object]] = {}
 
 
 @dataclass(frozen=True, kw_only=True)

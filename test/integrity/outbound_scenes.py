@@ -23,7 +23,6 @@ from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
 """Time at which the board runs and the driver knows it, in s."""
-TIMEOUT_S: Final = 0.5
 STANDS_S: Final = 1.2
 """Time after the last command until the robot must be at rest, in s."""
 ESTOPPED_S: Final = 0.3

@@ -10,7 +10,6 @@ whether the drive board obeys, ``upkeep.py`` keeps both boards sending and confi
 """
 
 import math
-from typing import Final
 
 from omnibot_driver.core.board import Board, BoardFigures, Mode
 from omnibot_driver.core.commands.stop_proof import StopProof
@@ -32,9 +31,6 @@ from omnibot_driver.core.fejemis.upkeep import Upkeep
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import Reading
 from omnibot_driver.core.traits import Traits
-
-STOPS_WITHIN_S: Final = 0.5
-"""Time after Stop before a configuration is loaded, in s."""
 
 
 class FejemisBoard(Board):

@@ -132,12 +132,16 @@ class Configuration:
 
     @property
     def geometry(self) -> Geometry | None:
-        """Track B and wheelbase F in m: as set by the user, else as reported, else None."""
-        if Written.STEERING in self.written:
-            return Geometry(*self.written[Written.STEERING])
-        if "confs" not in self.told:
+        """Track B and wheelbase F in m: as reported, else as set by the user, else None.
+
+        A board that has not taken the user's values goes on with its own.
+        """
+        told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
+        if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):
+            return Geometry(*wanted)
+        if told is None:
             return None
-        front_m, track_m = self.told["confs"][:: -1 if self.turned else 1]
+        front_m, track_m = told[:: -1 if self.turned else 1]
         return Geometry(track_m, front_m)
 
     def _missing(self) -> list[bytes]:
@@ -159,16 +163,21 @@ class Configuration:
             told = told[::-1]
         if setting is Written.ACCELEROMETER:
             wanted = wanted[:3]
-        return len(told) >= len(wanted) and all(
-            abs(one - other) <= max(DIGIT, NEAR * abs(other))
-            for one, other in zip(told, wanted, strict=False)
-        )
+        return _near(told, wanted)
 
 
 def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
     """Return the line that writes the setting."""
     words = " ".join(f"{number:.6g}" for number in numbers)
     return f"{setting.command} {words}".encode("ascii")
+
+
+def _near(told: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
+    """Return whether the numbers read back are the wanted ones but for their few digits."""
+    return len(told) >= len(wanted) and all(
+        abs(one - other) <= max(DIGIT, NEAR * abs(other))
+        for one, other in zip(told, wanted, strict=False)
+    )
 
 
 _KEY: Final[Mapping[bytes, str]] = {

@@ -113,7 +113,10 @@ class FejemisDecoder:
 
     def _learn(self, *, with_sum: bool) -> None:
         """Learn from heartbeats whether lines have sums: each board sends them unrequested."""
-        if self._line_sums != "auto" or with_sum is self.sums:
+        if self._line_sums != "auto":
+            self.contradicted = with_sum is not self.sums
+            return
+        if with_sum is self.sums:
             self._otherwise = 0
             return
         self._otherwise += 1

@@ -79,7 +79,6 @@ class Half:
         self._left = False
         self._at: dict[str, float] = {}
         self._next_at = -math.inf
-        self._asked_at = -math.inf
 
     @property
     def sums(self) -> bool:

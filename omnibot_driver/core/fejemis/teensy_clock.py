@@ -42,7 +42,6 @@ class TeensyClock:
         self._odds = 0
         """The first of the implausible times, with its arrival, and their count."""
         self._last_s = 0.0
-        self._low_s = 0.0
 
     @property
     def known(self) -> bool:

@@ -15,7 +15,7 @@ from omnibot_driver.core.fejemis.machine import Machine
 from omnibot_driver.core.fejemis.messages import Message
 from omnibot_driver.core.fejemis.polls import Polls
 from omnibot_driver.core.fejemis.ports import ROLES, Ports
-from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.fejemis.steering import Geometry
 
 GEOMETRIES_DIFFER_M: Final = 0.002
@@ -135,7 +135,8 @@ class Upkeep:
                     " so that data is missing; update the firmware"
                 )
         one, other = (self.configurations[role].geometry for role in ROLES)
-        if one and other and _differ(one, other):
+        told = Written.STEERING not in self._settings.written  # else `failed` tells it
+        if told and one and other and _differ(one, other):
             return (
                 "the boards are configured to different steering geometries (confs): drive has B"
                 f" {one.track_m:g} m and F {one.wheelbase_m:g} m, front has B {other.track_m:g} m"

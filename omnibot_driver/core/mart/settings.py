@@ -27,6 +27,5 @@ class MartSettings:
     odom_rate_hz: float = 20.0
     spin_speed: Literal["custom", "fixed"] = "custom"
     allow_reverse_goals: bool = False
-    dock_distance_m: float = 0.5
     wheel_scale: float = 0.01
     gyro_drift_radps: float = 0.001

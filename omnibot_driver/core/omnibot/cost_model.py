@@ -91,10 +91,11 @@ CONTRADICTED: Final = 1.5
 
 IMU_HEADER_WORD: Final = -6
 """FF FA, read as a signed word."""
-ROUNDING: Final = 4.0
-"""Largest rounding error of the sum of five deltas, in 0.1 mrad."""
-LARGEST_DELTA: Final = 4000
-"""Largest possible delta in 0.1 mm or 0.1 mrad: 10 m/s or 10 rad/s for 40 ms."""
+ROUNDING: Final = 1.5
+ROUNDING_PER_DELTA: Final = 0.5
+"""Largest rounding error of a sum of deltas in 0.1 mrad, and what each delta adds: 4 for five."""
+FASTEST: Final = 1e5
+"""Largest possible speed in 0.1 mm/s or 0.1 mrad/s: 10 m/s or 10 rad/s."""
 FARTHEST_POSE: Final = 1e7
 """Limit of a pose in mm or mrad: 10 km, or 1600 turns.
 
@@ -135,6 +136,10 @@ class Expectation:
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
         self.imus_per_delta = schedule.imus_per_delta
         self.deltas_per_pose = schedule.deltas_per_pose
+        self.largest_delta = round(FASTEST * schedule.delta_period_s)
+        """Largest possible delta in 0.1 mm or 0.1 mrad: 4000 for 40 ms."""
+        self.rounding = ROUNDING + ROUNDING_PER_DELTA * schedule.deltas_per_pose
+        """Largest rounding error of the sum of the deltas from pose to pose, in 0.1 mrad."""
         self._lightest = (0.5 * counts_per_g) ** 2
         self._heaviest = (2.5 * counts_per_g) ** 2
         self._accel_scatter = 300.0
@@ -185,7 +190,7 @@ class Expectation:
 
     def _weigh_delta(self, frame: DeltaFrame, before: Context) -> tuple[float, Context]:
         cost = 0.0
-        if max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) > LARGEST_DELTA:
+        if max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) > self.largest_delta:
             cost = IMPOSSIBLE
         imu, seq, pose, imus, deltas, shaken, turned = before
         next_one = seq is not None and frame.seq == (seq + 1) & 255
@@ -210,7 +215,7 @@ class Expectation:
         moved = max(abs(x - last.x), abs(y - last.y), abs(theta - last.theta))
         cost = IMPOSSIBLE if moved > LONGEST_STEP else 0.0
         turned = before.turned
-        if turned is not None and abs(10.0 * (theta - last.theta) - turned) > ROUNDING:
+        if turned is not None and abs(10.0 * (theta - last.theta) - turned) > self.rounding:
             cost += CONTRADICTED
         on_beat = before.deltas == self.deltas_per_pose and before.imus == 0
         return (cost if on_beat else cost + OFF_BEAT), after

@@ -12,9 +12,7 @@ from typing import Any, Final
 
 from omnibot_driver.core.omnibot.cost_model import (
     FARTHEST_POSE,
-    LARGEST_DELTA,
     LONGEST_STEP,
-    ROUNDING,
     Context,
     Expectation,
 )
@@ -177,11 +175,12 @@ def take_run(
             if end > size or seq is None:
                 break
             dx, dy, dtheta, count = _DELTA(held, at + 2)
+            largest = expectation.largest_delta
             if (
                 count != (seq + 1) & 255
-                or not -LARGEST_DELTA <= dx <= LARGEST_DELTA
-                or not -LARGEST_DELTA <= dy <= LARGEST_DELTA
-                or not -LARGEST_DELTA <= dtheta <= LARGEST_DELTA
+                or not -largest <= dx <= largest
+                or not -largest <= dy <= largest
+                or not -largest <= dtheta <= largest
                 or (end == size and count in LENT)
             ):
                 break
@@ -196,6 +195,7 @@ def take_run(
             if end > size or pose is None or turned is None:
                 break
             x_mm, y_mm, theta, count = _POSE[order](held, at + 2)
+            rounding = expectation.rounding
             if (
                 count != (pose.seq + 1) & 255
                 or not -FARTHEST_POSE < x_mm < FARTHEST_POSE
@@ -204,7 +204,7 @@ def take_run(
                 or not -LONGEST_STEP <= x_mm - pose.x <= LONGEST_STEP
                 or not -LONGEST_STEP <= y_mm - pose.y <= LONGEST_STEP
                 or not -LONGEST_STEP <= theta - pose.theta <= LONGEST_STEP
-                or not -ROUNDING <= 10.0 * (theta - pose.theta) - turned <= ROUNDING
+                or not -rounding <= 10.0 * (theta - pose.theta) - turned <= rounding
                 or (end == size and count in LENT)
             ):
                 break

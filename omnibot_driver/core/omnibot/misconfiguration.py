@@ -22,8 +22,8 @@ SURE: Final = 10
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
 """Limits of a coordinate in mm or mrad that is not 0; beyond them, bytes were misread."""
-MOST_DELTAS: Final = 10
-"""Largest number of deltas between two poses, one lost pose between them included."""
+POSE_PERIODS: Final = 2
+"""Longest time between two poses that are compared, one lost pose between them included."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """Least distance in m from the pose, and its least ratio to the distance with the other frame.
@@ -49,6 +49,7 @@ class MisconfigurationChecks:
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self.advice: str | None = None
         self._period_s, self._imus_per_delta = schedule.delta_period_s, schedule.imus_per_delta
+        self._most_deltas = POSE_PERIODS * schedule.deltas_per_pose
         self._seen_period_s: float | None = None
         self._seen_since_s, self._seen_deltas = 0.0, 0
         self._against_order = self._against_frame = 0
@@ -59,7 +60,7 @@ class MisconfigurationChecks:
         """Check the frame of a delta; ``reading``: the delta as the settings interpret it."""
         self._moved.append(reading)
         unbroken = not (reading.lost or reading.restarted or reading.duration_s is None)
-        if not unbroken or len(self._moved) > MOST_DELTAS:
+        if not unbroken or len(self._moved) > self._most_deltas:
             self._from = None
         if self._from is None:
             self._moved.clear()

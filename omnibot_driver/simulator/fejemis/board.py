@@ -98,7 +98,6 @@ class SimulatedFejemis:
         for half in (self.drive, self.front):
             half.powered = True
             half.reboot()
-        self.drive.off_at_s = None
 
     @property
     def facts(self) -> Mapping[str, object]:

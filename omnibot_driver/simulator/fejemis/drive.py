@@ -34,12 +34,12 @@ class DriveTeensy(Teensy[DriveConfig]):
     help_text = DRIVE_HELP
     pose: tuple[float, float, float]
     _last: tuple[int, int]
+    off_at_s: float | None
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self.imu = Imu(settings, vehicle)
         self.distances = Distances(settings, vehicle)
-        self.off_at_s: float | None = None
         super().__init__(
             settings,
             0,
@@ -54,7 +54,8 @@ class DriveTeensy(Teensy[DriveConfig]):
         )
 
     def boot(self) -> None:
-        """Clear reference, wheel speeds and pose; restart the sensors."""
+        """Clear reference, wheel speeds, pose and a requested power off; restart the sensors."""
+        self.off_at_s = None
         self.source = FREE
         self.reference = (0.0, 0.0)
         self.told_angle_deg = 0.0
@@ -63,7 +64,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.vehicle.powered = self._booted
         self._reset_pose()
         self.distances.trigger()
-        self.imu.boot(self.config)
+        self.imu.boot()
 
     def started(self) -> None:
         """Reset the pose, so that turns of the wheels during the boot are not counted."""
@@ -78,7 +79,7 @@ class DriveTeensy(Teensy[DriveConfig]):
             self.powered = self.vehicle.powered = False
             return
         self._odometry()
-        self.imu.cycle(STEP_S)
+        self.imu.cycle(STEP_S, self.config)
         if self.imu.calibrated is not None:
             self.config = replace(self.config, **self.imu.calibrated)
             self.imu.calibrated = None

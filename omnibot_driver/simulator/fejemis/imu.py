@@ -34,18 +34,16 @@ class Imu:
         self.calibrated: dict[str, Any] | None = None
         self._kind, self._left_s = "", 0.0
         self._samples: list[Vector] = []
-        self._cycles = 0
 
-    def boot(self, config: DriveConfig) -> None:
+    def boot(self) -> None:
         """Reset the orientation and give up a calibration in progress."""
         self.orientation = (0.0, 0.0, 0.0)
         self._kind, self._samples = "", []
-        self._offset_dps = config.gyro_offset_dps
 
-    def cycle(self, step_s: float) -> None:
+    def cycle(self, step_s: float, config: DriveConfig) -> None:
         """Integrate the yaw, and continue a calibration in progress."""
         truth = self._vehicle.truth
-        bias_dps = self._settings.gyro_bias_dps[2] - self._offset_dps[2]
+        bias_dps = self._settings.gyro_bias_dps[2] - config.gyro_offset_dps[2]
         roll, pitch, yaw = self.orientation
         yaw += (truth.yaw_rate_radps + radians(bias_dps)) * step_s
         self.orientation = (roll, pitch, (yaw + pi) % (2 * pi) - pi)
@@ -67,7 +65,6 @@ class Imu:
             return
         x, y, z = (sum(axis) / len(self._samples) for axis in zip(*self._samples, strict=True))
         if self._kind == "gyro":
-            self._offset_dps = (x, y, z)
             self.calibrated = {"gyro_offset_dps": (x, y, z)}
         else:
             self.calibrated = {"accel_offset_mps2": (x, y, z - GRAVITY_MPS2)}
@@ -75,7 +72,6 @@ class Imu:
 
     def gyro(self, config: DriveConfig) -> Iterator[float]:
         """Return the turn rates in deg/s, less the configured offsets."""
-        self._offset_dps = config.gyro_offset_dps
         return _minus(self._raw_gyro(), config.gyro_offset_dps)
 
     def accel(self, config: DriveConfig) -> Iterator[float]:

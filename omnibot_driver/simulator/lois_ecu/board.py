@@ -78,6 +78,7 @@ class SimulatedLois:
         self._boots_until_s = self.now_s + (BOOT_S if quirks.slow_boot else 0.0)
         self._reader = wire.LineReader(lenient=quirks.lenient_hex)
         self._uart.boot()
+        self._obedience.boot()
         self._pending: dict[int, tuple[bool, int]] = {}
         self._clock_ms = 0
         self._timers = Timers()

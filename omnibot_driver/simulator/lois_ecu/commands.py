@@ -43,13 +43,17 @@ class Parts:
 class Commands:
     """Carries out commands.
 
-    led: whether the LED is on. balls: number of balls dropped. Both survive a reboot.
+    led: whether the LED is on. balls: number of balls dropped, which survives a reboot.
     """
 
     def __init__(self, quirks: Quirks) -> None:
         self._quirks = quirks
-        self.led = False
         self.balls = 0
+        self.boot()
+
+    def boot(self) -> None:
+        """Switch the LED off, and forget when the last ball was dropped."""
+        self.led = False
         self._ball_at_s = -BALL_S
 
     def obey(self, parts: Parts, command: int, payload: int, now_s: float, clock_ms: int) -> None:

@@ -34,7 +34,6 @@ def stop_motors(server: "MartServer", motion: Motion) -> None:
     motion.right = motion.left = 128
     motion.samples = motion.same = 0
     motion.starting, motion.stopping = False, True
-    motion.stopped_s = server.now_s
     motion.clearance_in = motions.FRONT_CLEARANCE_IN
 
 

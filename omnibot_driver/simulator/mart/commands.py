@@ -21,6 +21,7 @@ Handler = Callable[["MartServer", str], str | None]
 
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
+BAD_DISTANCE = "fail bad distance value"
 
 
 class Row(NamedTuple):
@@ -99,7 +100,7 @@ def _timed(server: "MartServer", text: str) -> str | None:
         return MISSNG
     inches = wire.integer(numbers[0])
     if inches < 0 or (inches == 0 and not server.quirks.zero_distance_is_unlimited):
-        return "fail bad distance value"
+        return BAD_DISTANCE
     if not server.quirks.speed_word_first and text.endswith((" SLOW", " DOCK")):
         word, docking = "SLOW", text.endswith(" DOCK")
         no_clearance = docking
@@ -180,9 +181,12 @@ def _measured(server: "MartServer", text: str) -> str | None:
     numbers = wire.fields(text)
     if not numbers:
         return MISSNG if text[2] == "F" else MISSING
+    inches = wire.integer(numbers[0])
+    if inches <= 0 and not server.quirks.zero_distance_is_unlimited:
+        return BAD_DISTANCE
     moves.start_controlled(
         server,
-        wire.integer(numbers[0]),
+        inches,
         "NORMAL",
         kind=Kind.MEASURED_LINEAR,
         backward=text[2] == "B",

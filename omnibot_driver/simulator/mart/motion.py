@@ -55,8 +55,8 @@ class Motion:
     posts: notices of a start or a stop that are not consumed yet. error: failure text of this
     motion. right, left: what the server believes of the registers. encoder: the last reading, which
     the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
-    stopped_s, turned_s: when the wheel began to turn, when it was commanded to stop, and when it
-    last turned. angle_deg: turned since the start. released: whether the stop port ended it.
+    turned_s: when the wheel began to turn, and when it last turned. angle_deg: turned since the
+    start. released: whether the stop port ended it.
     """
 
     def __init__(self, kind: Kind) -> None:
@@ -78,7 +78,7 @@ class Motion:
         self.right = self.left = 128
         self.samples = self.same = self.encoder = self.last_encoder = self.sample_count = 0
         self.sampled_s = -1.0
-        self.started_s = self.moved_s = self.stopped_s = self.turned_s = now
+        self.started_s = self.moved_s = self.turned_s = now
         self.angle_deg = self.last_rate = self.angle_sum = self.last_angle = 0.0
         self.correction = 0
         self.first_sample = True

@@ -48,9 +48,8 @@ JOG_S: Final = 2.0
 WHEEL_RADPS: Final = 2.0
 """Speed of a wheel that is shown, in rad/s: docs/commissioning.md, step 5, as for the axes."""
 AXIS_SPEEDS: Final[tuple[Vector3, ...]] = ((0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3))
-SLOW_LSB, FAST_LSB = 4, 8
-"""Values of Vx, 0.06 and 0.11 m/s by default: whole words, so that one is exactly twice the other.
-"""
+SLOW_LSB: Final = 4
+"""Value of Vx, 0.06 m/s by default: a whole word, so that the next is exactly twice as fast."""
 TURN_RADPS: Final = 0.5
 TURN_RAD: Final = 1.6
 HELD_S: Final = 1.5

@@ -82,6 +82,17 @@ def test_the_order_of_the_steering_geometry_is_found_out() -> None:
         assert configuration.geometry == Geometry(track_m=0.4, wheelbase_m=0.42)
 
 
+def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_not_take() -> None:
+    """What the user set holds before the first reading, and once it was read back."""
+    configuration = Configuration("drive", {Written.STEERING: (0.35, 0.45)})
+    wanted, reported = Geometry(0.35, 0.45), Geometry(0.4, 0.42)
+    assert configuration.geometry == wanted
+    for text, expected in (("confs 0.4200 0.4000", reported), ("confs 0.4500 0.3500", wanted)):
+        configuration.hear(parse(text))
+        configuration.hear(parse(text))
+        assert configuration.geometry == expected
+
+
 def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
     """A sum does not detect one in 99 damaged answers."""
     configuration = Configuration("drive", {})

@@ -226,12 +226,16 @@ def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None
 
 
 @pytest.mark.parametrize(("setting", "sums"), [("on", True), ("off", False)])
-def test_a_setting_is_not_overruled_by_heartbeats(setting: str, *, sums: bool) -> None:
-    """The user's setting, on or off, has priority over what the lines look like."""
+def test_heartbeats_contradict_a_setting_but_do_not_overrule_it(
+    setting: str, *, sums: bool
+) -> None:
+    """A board that does not understand the driver's lines may send heartbeats alone."""
     decoder = FejemisDecoder(setting)  # type: ignore[arg-type]
-    feed(decoder, (BEAT if sums else with_sum(BEAT)) + b"\n")
-    feed(decoder, (BEAT if sums else with_sum(BEAT)) + b"\n")
-    assert decoder.sums is sums
+    right, wrong = (with_sum(BEAT), BEAT) if sums else (BEAT, with_sum(BEAT))
+    for beat in (wrong, wrong, right):
+        feed(decoder, beat + b"\n")
+        assert decoder.sums is sums
+        assert decoder.contradicted is (beat is wrong)
 
 
 def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None:

@@ -16,9 +16,6 @@ from omnibot_driver.core.readings import ImuReading
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware
 
-PERIOD_S = 0.02
-TRACK_M = 0.4
-
 
 def late(chance: random.Random) -> float:
     """Return the delay of a read in s: 0.36 ms on average, one in a hundred up to 20 ms more."""

@@ -16,7 +16,6 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 PLANTED_DPS = (1.5, -2.0, 3.0)
 PLANTED = tuple(map(math.radians, PLANTED_DPS))
-QUIET = {"accel_noise_g": 0.0, "gyro_noise_dps": 0.0}
 
 
 def running(**settings: object) -> Bench:

@@ -2,6 +2,7 @@
 
 """The LOIS decoder on undamaged and damaged streams."""
 
+import itertools
 from random import Random
 
 import pytest
@@ -81,16 +82,21 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     assert decoder.resolves_at == float("inf")
 
 
-@pytest.mark.parametrize("name", GROUPS)
-@pytest.mark.parametrize("damage", ["lost", "doubled", "foreign", "cut", "foreign of its kind"])
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        *itertools.product(GROUPS, ["lost", "doubled", "foreign", "cut"]),
+        ("0x12", "foreign of its kind"),
+        ("0x0d", "foreign of its kind"),
+    ],
+)
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """Any line may be damaged; a second copy of the last line never makes a false group.
+    """Any line may be damaged; a group that has come before its last line comes again is kept.
 
+    A GPS fix waits for what follows it, so that copy costs it.
     A line of another odometry group could pass for one of this group. Damage does not move lines,
     so this case is left out.
     """
-    if (name, damage) == ("0x20", "foreign of its kind"):
-        return
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
     lines = whole[2].splitlines(keepends=True)
@@ -113,10 +119,8 @@ def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damag
             found += decoder.feed(data, 0.4 * step)
         found += decoder.flush(2.0)
         found = [report for report in found if not isinstance(report, EStopButton)]
-        if damage == "doubled" and at == len(lines) - 1:
-            assert rounded(found) == [data for data in whole if data in rounded(found)]
-            continue
-        assert rounded(found) == [whole[0], whole[1], whole[3]], at
+        came_before = damage == "doubled" and at == len(lines) - 1 and name != "0x0d"
+        assert rounded(found) == [*whole[: 3 if came_before else 2], whole[3]], at
         statistics = decoder.group_statistics
         assert statistics.damaged_groups + statistics.implausible >= 1
 

@@ -26,7 +26,9 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
         "1,0.1000000,0.0010000,10.00,1000.00,1000,10",
         "2,,,,,65535,",
     ]
-    assert "1 ticks" in remark(RecordReading(RPM, 1e-4, 60))
+    assert remark(RecordReading(RPM, 1e-4, 60)).startswith("1 tick of the record")
+    slow = Record(RecordKind.RPM, (0xFFFF, 500), (0xFFFF,))
+    assert remark(RecordReading(slow, 1e-4, 60)).startswith("2 ticks of the record")
 
 
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:

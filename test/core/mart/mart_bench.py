@@ -3,7 +3,6 @@
 """A session and a simulated MART controller in simulated time, with a bad network between them."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from any_board import TICK_S as BENCH_TICK_S
@@ -197,6 +196,3 @@ def steer_along(bench: MartBench, corners: list[tuple[float, float]], near_m: fl
             bench.run(0.05)
         else:
             raise AssertionError((x_m, y_m, bench.odometry[-1].pose))
-
-
-Predicate = Callable[[], bool]

@@ -110,6 +110,26 @@ def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_1
             assert (expectation.weigh(pose, after)[0] == 0.0) is on_beat
 
 
+@EVERY_PERIOD
+def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
+    """At a lower rate a delta is a longer way."""
+    expectation = Expectation(16384.0, Schedule(period_s))
+    for speed_mps, possible in ((9.9, True), (10.1, False)):
+        delta = DeltaFrame(round(speed_mps * period_s * 1e4), 0, 0, 8)
+        assert (expectation.weigh(delta, Context())[0] == 0.0) is possible
+
+
+@EVERY_PERIOD
+def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
+    """Each may be off by half a digit, 0.05 mrad; twice as much contradicts it."""
+    schedule = Schedule(period_s)
+    expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
+    before = Context(seq=7, pose=PoseFrame(0.0, 0.0, 0.0, 4), deltas=deltas, turned=0)
+    for off_mrad, contradicts in ((0.05 * deltas, False), (0.1 * deltas + 0.2, True)):
+        cost, _ = expectation.weigh(PoseFrame(0.0, 0.0, off_mrad, 5), before)
+        assert (cost > 0.0) is contradicts
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])

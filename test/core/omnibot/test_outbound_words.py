@@ -20,7 +20,6 @@ from omnibot_driver.core.omnibot.outbound import MAX_WORD, harmless, nearest
 from omnibot_driver.core.packets import joined
 
 COUNTS = st.floats(-32767.0, 32767.0)
-LETTERS = b"SPR"
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
 

@@ -2,12 +2,10 @@
 
 """Devices of the simulated Fejemis: brush, lift, LEDs, distances, IMU, stored settings."""
 
-from math import pi
+from math import degrees, pi
 
 import pytest
 from fejemis_rig import DRIVE, FRONT, Rig
-
-MODULE = "omnibot_driver.simulator.fejemis"
 
 
 def test_brush_and_lift() -> None:
@@ -95,6 +93,21 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
     rig.drive("rc 2 0.3 20", 4.0)
     yaw = float(rig.ask(DRIVE, "imuposei")[0].split()[3])
     assert (yaw - rig.board.truth.yaw_rad + pi) % (2 * pi) - pi == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("loads", ["eer", "setid 0"])
+def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
+    loads: str,
+) -> None:
+    """Both load a configuration without offset, so the yaw grows by the gyro's bias again."""
+    rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
+    rig.say(DRIVE, "gyroc")
+    rig.run(1.2)
+    rig.say(DRIVE, loads)
+    rig.run(0.01)
+    before = rig.board.drive.imu.orientation[2]
+    rig.run(2.0)
+    assert degrees(rig.board.drive.imu.orientation[2] - before) == pytest.approx(6.0, abs=0.1)
 
 
 def test_the_answer_to_confs_has_the_steering_first() -> None:

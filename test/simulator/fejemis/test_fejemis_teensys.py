@@ -226,6 +226,16 @@ def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
     assert {port for port, _ in rig.run(1.0)} == {DRIVE, FRONT}
 
 
+def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> None:
+    """The delay of ``off`` ends without effect."""
+    rig = Rig().booted()
+    rig.say(DRIVE, "off 2")
+    rig.run(0.5)
+    rig.board.befall("drive", "restart")
+    rig.run(3.0)
+    assert rig.board.drive.powered
+
+
 # What a user chooses
 
 

@@ -218,6 +218,17 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
     assert rig.board.standing
 
 
+def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> None:
+    """The firmware refuses a second ball within 6 s; a restarted board does not know the first."""
+    rig = Rig().booted()
+    rig.say(SetLed(True), DistributeBall())
+    rig.board.reboot()
+    assert not rig.board.led
+    rig.booted()
+    rig.say(DistributeBall())
+    assert rig.board.balls == 2
+
+
 def test_input_while_booting_is_kept_up_to_600_characters() -> None:
     """Of 700 characters, the last 100 are lost."""
     rig = Rig()

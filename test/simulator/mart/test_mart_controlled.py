@@ -2,8 +2,12 @@
 
 """Controlled moves of the public server: TF, TB, MCR and MCL."""
 
+from dataclasses import replace
+
 import pytest
 from mart_rig import INCH_M, Rig
+
+from omnibot_driver.simulator.mart import FIRMWARE
 
 
 @pytest.mark.parametrize(("text", "sign"), [("TF 12", 1), ("TB 12", -1)])
@@ -58,6 +62,16 @@ def test_a_negative_distance_is_refused() -> None:
     """The reply is "fail bad distance value"."""
     assert Rig().ask("TF -5") == "fail bad distance value"
     assert Rig().ask("TB SLOW -5") == "fail bad distance value"
+
+
+@pytest.mark.parametrize("text", ["TF 0", "TB 0", "MCF 0", "MCB 0", "MCF far"])
+def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
+    """It depends on the server's quirk; a word counts as zero."""
+    rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
+    assert rig.ask(text) == "fail bad distance value"
+    rig = Rig()
+    assert rig.ask(text, 30.0) is None
+    assert rig.moving
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from driver_process import Driver
 from probe import Probe
@@ -14,7 +14,6 @@ from two_ports import TwoPorts
 from omnibot_driver.simulator.fejemis import FejemisSettings, SimulatedFejemis
 
 Start = Callable[..., Any]
-NODE: Final = "omnibot_driver"
 
 
 def robot_of(stack: ExitStack, folder: Path, **settings: Any) -> TwoPorts:

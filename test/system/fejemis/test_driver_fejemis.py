@@ -16,6 +16,8 @@ from driver_process import Driver
 from fejemis_driver import driven, moves_again, robot_of, started
 from nav_msgs.msg import Odometry
 from probe import Probe
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import BatteryState, Imu, JointState, MagneticField, Range
 from std_msgs.msg import ColorRGBA, Float32
 from std_srvs.srv import SetBool, Trigger
@@ -80,6 +82,15 @@ def test_its_sensors_are_published(
     assert last["range/sonar"].range == pytest.approx(1.5, abs=0.01)
     assert math.isinf(last["range/ir1"].range)
     assert last["range/ir2"].header.frame_id == "range_ir2_link"
+
+
+def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: Probe) -> None:
+    """``ros2 param set ... tof_maximum 2`` sends an integer."""
+    ranges = probe.listen(Range, "range/tof")
+    whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=2)
+    changes = [Parameter(name="tof_maximum", value=whole)]
+    assert probe.call(SetParameters, "set_parameters", parameters=changes).results[0].successful
+    probe.wait_for(lambda: ranges and ranges[-1].max_range == 2.0)
 
 
 def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe: Probe) -> None:

@@ -63,11 +63,12 @@ def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterato
         yield
 
 
-def set_parameter(probe: Probe, name: str, value: str) -> None:
-    """While it runs."""
-    client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
-    assert client.wait_for_service(PATIENCE_S)
-    text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
-    future = client.call_async(SetParameters.Request(parameters=[Parameter(name=name, value=text)]))
-    probe.wait_for_future(future)
-    assert future.result().results[0].successful, future.result().results[0].reason
+def set_parameter(probe: Probe, name: str, value: str | float) -> None:
+    """Set a parameter of the running driver; a number is set as a double."""
+    if isinstance(value, str):
+        given = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+    else:
+        given = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=float(value))
+    request = [Parameter(name=name, value=given)]
+    (result,) = probe.call(SetParameters, "set_parameters", parameters=request).results
+    assert result.successful, result.reason

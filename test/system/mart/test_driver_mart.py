@@ -14,6 +14,8 @@ from driver_process import Driver
 from geometry_msgs.msg import PoseStamped, Twist
 from nav_msgs.msg import Odometry
 from probe import Probe
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import BatteryState, Range
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
@@ -170,6 +172,25 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
     assert done.success, done.message
     assert "must be started again" in done.message
     assert mart.do(lambda board: board.server.crashed) == "EXIT"
+
+
+def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
+    mart: Mart, probe: Probe
+) -> None:
+    """An integer will do for a real number; 0.1 m are 3 whole inches."""
+    ranges = probe.listen(Range, "range/front")
+    whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
+    real = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.1)
+    changes = [
+        Parameter(name="range_maximum", value=whole),
+        Parameter(name="dock_distance", value=real),
+    ]
+    results = probe.call(SetParameters, "set_parameters", parameters=changes).results
+    assert all(result.successful for result in results)
+    probe.wait_for(lambda: ranges and ranges[-1].max_range == 4.0)
+    mart.stands_for_good()
+    assert probe.call(Trigger, "dock").success
+    assert "TF DOCK 3" in mart.do(lambda board: list(board.server.executed))
 
 
 def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:

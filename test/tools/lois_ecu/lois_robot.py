@@ -33,7 +33,6 @@ SETTINGS = SessionSettings(
     odometry=OdometrySettings(),
     motion_monitor=False,
 )
-RPM = 0.10471975511965977
 
 
 def random_motors(seed: int, *, unequal: float = 0.05) -> tuple[MotorSettings, MotorSettings]:
@@ -111,7 +110,6 @@ class SimulatedRobot:
         board.record(RecordKind.RPM, self.parameters["record_samples"])
         bench.settle()
         bench.run(0.6)
-        rates = [one * RPM for one in command]
         if topic == "duty_cmd":
             settings = board.settings
             rates = [one / (settings.duty_scale * settings.wheel_radius_m) for one in command]
