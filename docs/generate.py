@@ -23,18 +23,21 @@ ROOT: Final = Path(__file__).resolve().parent.parent
 PARAMETERS_INTRODUCTION: Final = """\
 # Parameters
 
-Give them one by one (`--ros-args -p max_linear_speed:=0.3`) or in a file:
-`config/<board>.yaml` has all that a board has, [omnibot.yaml](../config/omnibot.yaml) for the
-OmniBot. `board` (default `omnibot`) is read first; a parameter that another board has and this one
-has not is refused with a sentence that says whose it is. *Dynamic* ones can be set while the driver
-runs (`ros2 param set /omnibot_driver max_linear_speed 0.3`) and count at once; *fixed* ones are
-given at the start. An unknown name, a wrong type or a value out of its range is refused with a
-sentence that says what would be right.
+Give parameters one by one (`--ros-args -p max_linear_speed:=0.3`) or in a file.
+`config/<board>.yaml` has all parameters of a board: for the OmniBot it is
+[omnibot.yaml](../config/omnibot.yaml). The driver reads `board` (default `omnibot`) first.
 
-In an array of doubles every element has a decimal point, `[0.1, 0.0, 0.0]`: ROS itself refuses a
-mixed one, `[0.1, 0, 0]`. A word such as `on` or `no` that is meant as a string is put in quotes.
-A parameter file begins with `/**:`; if its first line names another node or namespace, ROS passes
-it over without a word.
+- You can set a *dynamic* parameter while the driver runs
+  (`ros2 param set /omnibot_driver max_linear_speed 0.3`). It takes effect at once.
+- You can set a *fixed* parameter only at the start.
+
+The driver rejects an unknown name, a wrong type and a value out of its range. The message says
+which values are valid. The driver also rejects a parameter of another board, and names that board.
+
+In an array of doubles, write every element with a decimal point: `[0.1, 0.0, 0.0]`. ROS itself
+rejects a mixed array such as `[0.1, 0, 0]`. Put a word such as `on` or `no` in quotes if it is a
+string. A parameter file begins with `/**:`. If its first line names another node or namespace, ROS
+ignores the file without a message.
 """
 TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 
@@ -42,9 +45,9 @@ TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 def parameter_file(board: str) -> str:
     """Return config/<board>.yaml: every parameter with its default, and its range in a comment."""
     lines = [
-        f"# Every parameter with the board {board}, and its default. Give the file with",
+        f"# All parameters of the board {board}, with their defaults. Load the file with",
         f"#   ros2 run omnibot_driver driver --ros-args --params-file {board}.yaml",
-        "# or change a copy of it. (fixed) marks what cannot change while the driver runs.",
+        "# or change a copy of it. You can set a (fixed) parameter only at the start.",
         "/**:",
         "  ros__parameters:",
     ]

@@ -70,8 +70,8 @@ EVERY_ROW = [
 ]
 DIMENSIONLESS = {
     "gear", "ir_calibration", "left_feed_forward", "left_kp", "left_long_correction",
-    "left_short_correction", "left_td", "left_tn", "low_pass", "right_feed_forward", "right_kp",
-    "right_long_correction", "right_short_correction", "right_td", "right_tn", "steering_gains",
+    "left_short_correction", "low_pass", "right_feed_forward", "right_kp",
+    "right_long_correction", "right_short_correction", "steering_gains",
 }  # fmt: skip
 """Real numbers that have no unit, or whose items have different ones."""
 

@@ -162,12 +162,15 @@ _RANGES: Final = {
 """Allowed values: a negative gain makes a wheel run away, and the controller divides by Tn."""
 
 
+_UNITS: Final = {"tn": "s", "td": "s"}
+
+
 def _setting(name: str, what: str) -> Parameter:
     low, high = _RANGES[name.partition("_")[2]]
     return Parameter(
         name,
         1.0,
-        "",
+        _UNITS.get(name.partition("_")[2], ""),
         f"{what}. Unset: the board keeps its own.",
         low=low,
         high=high,
@@ -182,8 +185,8 @@ SETTINGS: Final[Mapping[str, Setting]] = {
 """Settings that the board keeps, by the name of the parameter."""
 _WORDS: Final = {
     "kp": "Gain Kp of the {} wheel's speed controller",
-    "tn": "Integral time Tn of the {} wheel's speed controller, in s",
-    "td": "Time constant Td of the {} wheel's speed controller, in s",
+    "tn": "Integral time Tn of the {} wheel's speed controller",
+    "td": "Time constant Td of the {} wheel's speed controller",
     "short_correction": "Factor for the short level of the {} encoder",
     "long_correction": "Factor for the long level of the {} encoder",
     "feed_forward": "Feed-forward of the {} wheel's speed controller",

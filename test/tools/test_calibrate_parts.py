@@ -11,7 +11,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver import calibration
+from omnibot_driver import boards, calibration
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.readings import Vector3
@@ -231,3 +231,9 @@ def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: s
         ToolError, match=f"^calibrate {what} needs {thing}.* the board few does not have$"
     ):
         require_able(what, {"board": "few", "odom_frame": "odom"})
+
+
+def test_step_is_refused_where_the_control_of_a_wheel_is_not_known() -> None:
+    """MART has a ``linear_scale`` as the OmniBot has, but no commands for single wheels."""
+    with pytest.raises(ToolError, match=r"the board mart does not have$"):
+        require_able("step", boards.check_all({"board": "mart"}))

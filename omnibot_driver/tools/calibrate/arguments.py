@@ -27,7 +27,7 @@ NEEDS: Final = {
         ("base_radius", "odom_linear_scale"),
         "wheels around its centre, or a scale of its odometry",
     ),
-    "step": (("linear_scale", GAINS), "a firmware whose control of a wheel it knows"),
+    "step": (("delta_frame", GAINS), "a firmware whose control of a wheel it knows"),
 }
 """For each subcommand the parameters, of which the driver must have one, and their meaning."""
 
