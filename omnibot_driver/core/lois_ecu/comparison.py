@@ -13,25 +13,26 @@ from typing import Final
 
 from omnibot_driver.core.lois_ecu.board_odometry import Told
 from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
-from omnibot_driver.core.lois_ecu.resting import RestingWheel
+from omnibot_driver.core.lois_ecu.reported_speed import (
+    DOUBT,
+    LONGEST_LAG_S,
+    LONGEST_PAUSE_S,
+    ODOMETRY_AGE_S,
+    ReportedSpeed,
+)
 from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
-    BIAS,
     COUNT,
     HELD,
     PER_WHEEL,
-    PUSH,
     SPEED,
     TURN,
-    WINDUP_M,
     X,
     Y,
 )
 
 TICKS_AGE_S: Final = 0.005
-ODOMETRY_AGE_S: Final = 0.0135
-"""Ages in s of ticks and odometry when their last line arrives: a line of 14 characters takes 1.2
-ms, and the content is from the beginning of the first line."""
+"""Age in s of ticks when their last line arrives, as ``ODOMETRY_AGE_S`` of odometry."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
@@ -39,42 +40,20 @@ ALONG_VARIANCE: Final = 0.15
 COUNT_READ_S: Final = 0.003
 SAME_TICKS: Final = 0.6
 """Residual in ticks within which an unchanged count is not a measurement."""
-DOUBT: Final = 3.0
-"""Residual, in standard deviations, beyond which it is not noise: the estimate is wrong."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """Residual, in standard deviations and in m, beyond which a heading is discarded: it has integrated
 a kept speed for the time of a rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
-FASTER_RPM: Final = 2.5
-"""Lowest speed in RPM to compare: a slower one may be that of a tick that lasted for a rest."""
-LONGEST_PAUSE_S: Final = 0.5
-LONGEST_LAG_S: Final = 0.3
-SPEED_PART: Final = 0.04
-JUMP_RPM: Final = 8.0
-JUMP_RPM_PER_S: Final = 200.0
-"""Largest change of a wheel's speed, in RPM and in RPM per s: a larger one shows a tick that waited
-while the board sent something else."""
-STRAY_RPM: Final = 2.0
-STRAY_PART: Final = 0.1
-"""A wheel that is commanded steadily, with gains that the user set, stays this near its speed. One
-reading that differs by more is of a tick that waited, or of the tick behind it."""
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
 """Standard deviations in m of a wheel's distance after 1 m without ticks, besides all other errors:
 usually, and at speeds that swing, of which the board reports too few."""
 SWERVED_M: Final = 0.05
 """Standard deviation in m of the position after 1 m at such speeds, even with known distances."""
-COASTED_TICKS: Final = 1.0
-"""Ticks by which a wheel that comes to rest has rolled less than at its last reported speed."""
 EQUAL_RPM: Final = 3.0
 """Standard deviation in RPM of the true difference of two speeds that are reported as equal."""
-SWINGS_RPM: Final = 4.0
-SWINGS_PART: Final = 0.4
-"""Part of its time for which an unexpected change of speed may have lasted."""
-UNSEEN_PART: Final = 0.6
-"""Largest part of ``WINDUP_M`` by which a wheel without a seen tick has wound up."""
 
 
 class Comparison:
@@ -86,12 +65,7 @@ class Comparison:
         self._counted = [False, False]
         """Whether the ticks of each wheel counted at the last group."""
         self._turned_m = 0.0
-        self._told = [0.0, 0.0]
-        self._repeats = [0, 0]
-        self._jumped = [False, False]
-        self._resting = RestingWheel(), RestingWheel()
-        self._changed_at_m = [0.0, 0.0]
-        """Distance in m of each wheel when its reported speed changed last."""
+        self._speeds = ReportedSpeed(motion, 0), ReportedSpeed(motion, 1)
 
     # Ticks
 
@@ -150,7 +124,7 @@ class Comparison:
         for index, wheel in enumerate(motion.wheels):
             if wheel.blind and motion.holds:
                 rolled_m = abs(motion.speed_mps(index)) * duration_s
-                swings = wheel.rests or self._resting[index].swings
+                swings = wheel.rests or self._speeds[index].resting.swings
                 part = SWINGING_M if swings else BLIND_M
                 motion.shift(index, 0.0, part * math.sqrt(min(rolled_m, 1.0)))
                 for state in (X, Y) if swings else ():
@@ -170,8 +144,8 @@ class Comparison:
         left, right = (wheel.course.measured_sign for wheel in motion.wheels)
         differ = abs(shown[1] - shown[0]) > DIFFERING_RPM * motion.rpm_mps
         if any(told.speeds_mps) or left * right <= 0 or (differ and told.still):
-            for index, speed in enumerate(told.speeds_mps):
-                self._speed(index, speed, duration_s)
+            for wheel_speed, speed_mps in zip(self._speeds, told.speeds_mps, strict=True):
+                wheel_speed.take(speed_mps, duration_s)
         else:
             self._equal(duration_s)
 
@@ -179,13 +153,12 @@ class Comparison:
         """Correct the filter by the fact that both speeds are equal, whatever they are."""
         motion = self._motion
         sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
-        if sure and not any(resting.chance for resting in self._resting):
+        if sure and not any(speed.resting.chance for speed in self._speeds):
             terms = [(SPEED, 1.0), (PER_WHEEL + SPEED, -1.0)]
             residual = motion.speed_mps(1) - motion.speed_mps(0)
             motion.filter.measure(terms, residual, (EQUAL_RPM * motion.rpm_mps) ** 2)
-        for index, resting in enumerate(self._resting):
-            if not motion.wheels[index].rests:
-                resting.note(abs(motion.speed_mps(index)) / motion.rpm_mps, duration_s)
+        for speed in self._speeds:
+            speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
         """Correct the filter by the fact that neither wheel has rolled further than ``ticks``."""
@@ -229,96 +202,3 @@ class Comparison:
         if (whole or beyond) and residual * residual < LEAP**2 * unsure:
             estimate.measure([(ALONG, 1.0)], residual, variance)
         self._begin_way(variance)
-
-    def _speed(self, index: int, speed_mps: float, duration_s: float) -> None:
-        """Correct a wheel by the speed of its last tick, which the board keeps until the next."""
-        motion, estimate = self._motion, self._motion.filter
-        wheel, base = motion.wheels[index], PER_WHEEL * index
-        rpm_mps, tick_m = motion.rpm_mps, motion.tick_m
-        sign = wheel.course.measured_sign
-        if not sign or speed_mps * sign < 0:
-            self._told[index] = speed_mps
-            return
-        jumps = self._jumps(index, abs(speed_mps) / rpm_mps, duration_s)
-        self._jumped[index] = jumps and not self._jumped[index]
-        if self._jumped[index]:
-            return
-        before, self._told[index] = self._told[index], speed_mps
-        repeated = abs(speed_mps - before) < 0.1 * rpm_mps
-        self._repeats[index] = self._repeats[index] + 1 if repeated else 0
-        if motion.holds and wheel.course.kind == "rpm" and wheel.blind and speed_mps:
-            self._rest(index, abs(speed_mps), duration_s, repeated=repeated)
-            if wheel.rests:
-                return
-        expected = motion.speed_mps(index)
-        ticked = not repeated or abs(expected) * duration_s > 3.0 * tick_m
-        if not expected and motion.holds:
-            if repeated:
-                wheel.wound_m = min(wheel.wound_m, UNSEEN_PART * WINDUP_M)
-                variance = (tick_m / max(duration_s, 0.01)) ** 2
-                estimate.measure([(base + SPEED, 1.0)], 0.0, variance)
-            elif not wheel.rolls_on:
-                wheel.wound_m = WINDUP_M
-        if wheel.rolls_on and not repeated and not wheel.rolls_on_s:
-            wheel.rolls_on = ticked = False
-        shown = abs(speed_mps) + (motion.rounded_mps(index) if speed_mps else 0.5 * rpm_mps)
-        fast = shown > FASTER_RPM * rpm_mps and wheel.course.kind == "rpm"
-        if ticked and fast and not wheel.rolls_on:
-            motion.learn_gain(index, shown)
-            self._rolls_at(index, math.copysign(shown, sign), duration_s)
-        estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
-
-    def _jumps(self, index: int, told_rpm: float, duration_s: float) -> bool:
-        """Return whether a speed is implausible after the last one, or for a steady wheel."""
-        motion, wheel = self._motion, self._motion.wheels[index]
-        change_rpm = abs(told_rpm - abs(self._told[index]) / motion.rpm_mps)
-        if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:
-            return True
-        expected_rpm = abs(motion.speed_mps(index)) / motion.rpm_mps
-        strays = abs(told_rpm - expected_rpm) > STRAY_RPM + STRAY_PART * expected_rpm
-        return motion.tuned and wheel.steady and strays
-
-    def _rest(self, index: int, told_mps: float, duration_s: float, *, repeated: bool) -> None:
-        """Decide whether this wheel is at rest by now, or rolls again."""
-        motion, resting = self._motion, self._resting[index]
-        wheel, tick_m, speed = motion.wheels[index], motion.tick_m, motion.speed_mps(index)
-        sign = math.copysign(1.0, wheel.course.target_mps)
-        resting.tell(told_mps / motion.rpm_mps, duration_s, tuned=motion.tuned)
-        if not repeated:
-            if wheel.rests:
-                wheel.rests = False
-                motion.shift(index, sign * tick_m, 2 * tick_m)
-                spread = 2 * motion.rpm_mps + told_mps / 2
-                motion.filter.forget(wheel.base + SPEED, sign * told_mps, spread**2)
-            self._changed_at_m[index] = motion.way_m(index)
-        elif resting.chance == 1.0 and not wheel.rests:
-            wheel.rests = True
-            rolled_m = motion.way_m(index) - self._changed_at_m[index]
-            too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
-            motion.shift(index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
-            for state in (X, Y):  # it may have had another heading then
-                motion.filter.disturb([(state, 1.0)], (too_far_m / 4) ** 2)
-            motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
-            motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
-        elif not wheel.rests and resting.chance:
-            motion.doubt(index, resting.chance * abs(speed) * duration_s)
-
-    def _rolls_at(self, index: int, speed_mps: float, duration_s: float) -> None:
-        """Correct a wheel by its mean speed over the last tick."""
-        motion, estimate, base = self._motion, self._motion.filter, PER_WHEEL * index
-        push = estimate.mean[base + PUSH]
-        lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)
-        terms = [
-            (base + SPEED, 1.0),
-            (base + PUSH, -lag_s),
-            (BIAS + index, -math.copysign(1.0, speed_mps)),
-        ]
-        residual = speed_mps - (motion.speed_mps(index) - push * lag_s)
-        variance = motion.rpm_mps**2 / 8 + (SPEED_PART * speed_mps) ** 2 + (push * lag_s) ** 2 / 4
-        variance *= 1 + self._repeats[index] ** 2
-        wheel = motion.wheels[index]
-        if wheel.blind and abs(residual) > SWINGS_RPM * motion.rpm_mps:
-            motion.doubt(index, SWINGS_PART * abs(residual) * min(duration_s, LONGEST_PAUSE_S))
-        if residual**2 > DOUBT**2 * (estimate.variance_of(terms) + variance):
-            estimate.disturb([(base + SPEED, 1.0)], (residual / 2) ** 2)
-        estimate.measure(terms, residual, variance)

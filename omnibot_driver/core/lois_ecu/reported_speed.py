@@ -1,0 +1,156 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Corrections of one wheel by the speeds that a LOIS ECU reports for it.
+
+A speed is that of the wheel's last tick, which the board keeps until the next. It is a measurement
+only if the wheel has ticked since, if the tick did not wait while the board sent, and if the wheel
+is not at rest. Works on reported speeds and the motion filter, without messages.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
+from omnibot_driver.core.lois_ecu.resting import RestingWheel
+from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
+
+ODOMETRY_AGE_S: Final = 0.0135
+"""Age in s of odometry when its last line arrives: a line of 14 characters takes 1.2 ms, and the
+content is from the beginning of the first line."""
+DOUBT: Final = 3.0
+"""Residual, in standard deviations, beyond which it is not noise: the estimate is wrong."""
+FASTER_RPM: Final = 2.5
+"""Lowest speed in RPM to compare: a slower one may be that of a tick that lasted for a rest."""
+LONGEST_PAUSE_S: Final = 0.5
+LONGEST_LAG_S: Final = 0.3
+SPEED_PART: Final = 0.04
+JUMP_RPM: Final = 8.0
+JUMP_RPM_PER_S: Final = 200.0
+"""Largest change of a wheel's speed, in RPM and in RPM per s: a larger one shows a tick that waited
+while the board sent something else."""
+STRAY_RPM: Final = 2.0
+STRAY_PART: Final = 0.1
+"""A wheel that is commanded steadily, with gains that the user set, stays this near its speed. One
+reading that differs by more is of a tick that waited, or of the tick behind it."""
+COASTED_TICKS: Final = 1.0
+"""Ticks by which a wheel that comes to rest has rolled less than at its last reported speed."""
+SWINGS_RPM: Final = 4.0
+SWINGS_PART: Final = 0.4
+"""Part of its time for which an unexpected change of speed may have lasted."""
+UNSEEN_PART: Final = 0.6
+"""Largest part of ``WINDUP_M`` by which a wheel without a seen tick has wound up."""
+
+
+class ReportedSpeed:
+    """The reported speed of the wheel with this index, which corrects ``motion``."""
+
+    def __init__(self, motion: MotionFilter, index: int) -> None:
+        self._motion, self._index = motion, index
+        self._wheel = motion.wheels[index]
+        self._told = 0.0
+        self._repeats = 0
+        self._jumped = False
+        self.resting = RestingWheel()
+        self._changed_at_m = 0.0
+        """Distance in m of the wheel when its reported speed changed last."""
+
+    def note(self, duration_s: float) -> None:
+        """Note the estimated speed for a time in which none was reported."""
+        if not self._wheel.rests:
+            rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
+            self.resting.note(rpm, duration_s)
+
+    def take(self, speed_mps: float, duration_s: float) -> None:
+        """Correct a wheel by the speed of its last tick, which the board keeps until the next."""
+        motion, estimate = self._motion, self._motion.filter
+        wheel, base = self._wheel, self._wheel.base
+        rpm_mps, tick_m = motion.rpm_mps, motion.tick_m
+        sign = wheel.course.measured_sign
+        if not sign or speed_mps * sign < 0:
+            self._told = speed_mps
+            return
+        jumps = self._jumps(abs(speed_mps) / rpm_mps, duration_s)
+        self._jumped = jumps and not self._jumped
+        if self._jumped:
+            return
+        before, self._told = self._told, speed_mps
+        repeated = abs(speed_mps - before) < 0.1 * rpm_mps
+        self._repeats = self._repeats + 1 if repeated else 0
+        if motion.holds and wheel.course.kind == "rpm" and wheel.blind and speed_mps:
+            self._rest(abs(speed_mps), duration_s, repeated=repeated)
+            if wheel.rests:
+                return
+        expected = motion.speed_mps(self._index)
+        ticked = not repeated or abs(expected) * duration_s > 3.0 * tick_m
+        if not expected and motion.holds:
+            if repeated:
+                wheel.wound_m = min(wheel.wound_m, UNSEEN_PART * WINDUP_M)
+                variance = (tick_m / max(duration_s, 0.01)) ** 2
+                estimate.measure([(base + SPEED, 1.0)], 0.0, variance)
+            elif not wheel.rolls_on:
+                wheel.wound_m = WINDUP_M
+        if wheel.rolls_on and not repeated and not wheel.rolls_on_s:
+            wheel.rolls_on = ticked = False
+        shown = abs(speed_mps) + (motion.rounded_mps(self._index) if speed_mps else 0.5 * rpm_mps)
+        fast = shown > FASTER_RPM * rpm_mps and wheel.course.kind == "rpm"
+        if ticked and fast and not wheel.rolls_on:
+            motion.learn_gain(self._index, shown)
+            self._rolls_at(math.copysign(shown, sign), duration_s)
+        estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
+
+    def _jumps(self, told_rpm: float, duration_s: float) -> bool:
+        """Return whether a speed is implausible after the last one, or for a steady wheel."""
+        motion, wheel = self._motion, self._wheel
+        change_rpm = abs(told_rpm - abs(self._told) / motion.rpm_mps)
+        if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:
+            return True
+        expected_rpm = abs(motion.speed_mps(self._index)) / motion.rpm_mps
+        strays = abs(told_rpm - expected_rpm) > STRAY_RPM + STRAY_PART * expected_rpm
+        return motion.tuned and wheel.steady and strays
+
+    def _rest(self, told_mps: float, duration_s: float, *, repeated: bool) -> None:
+        """Decide whether this wheel is at rest by now, or rolls again."""
+        motion, resting = self._motion, self.resting
+        wheel, tick_m, speed = self._wheel, motion.tick_m, motion.speed_mps(self._index)
+        sign = math.copysign(1.0, wheel.course.target_mps)
+        resting.tell(told_mps / motion.rpm_mps, duration_s, tuned=motion.tuned)
+        if not repeated:
+            if wheel.rests:
+                wheel.rests = False
+                motion.shift(self._index, sign * tick_m, 2 * tick_m)
+                spread = 2 * motion.rpm_mps + told_mps / 2
+                motion.filter.forget(wheel.base + SPEED, sign * told_mps, spread**2)
+            self._changed_at_m = motion.way_m(self._index)
+        elif resting.chance == 1.0 and not wheel.rests:
+            wheel.rests = True
+            rolled_m = motion.way_m(self._index) - self._changed_at_m
+            too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
+            motion.shift(self._index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
+            for state in (X, Y):  # it may have had another heading then
+                motion.filter.disturb([(state, 1.0)], (too_far_m / 4) ** 2)
+            motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
+            motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
+        elif not wheel.rests and resting.chance:
+            motion.doubt(self._index, resting.chance * abs(speed) * duration_s)
+
+    def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
+        """Correct a wheel by its mean speed over the last tick."""
+        motion, estimate, base = self._motion, self._motion.filter, self._wheel.base
+        push = estimate.mean[base + PUSH]
+        lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)
+        terms = [
+            (base + SPEED, 1.0),
+            (base + PUSH, -lag_s),
+            (BIAS + self._index, -math.copysign(1.0, speed_mps)),
+        ]
+        residual = speed_mps - (motion.speed_mps(self._index) - push * lag_s)
+        variance = motion.rpm_mps**2 / 8 + (SPEED_PART * speed_mps) ** 2 + (push * lag_s) ** 2 / 4
+        variance *= 1 + self._repeats**2
+        wheel = self._wheel
+        if wheel.blind and abs(residual) > SWINGS_RPM * motion.rpm_mps:
+            motion.doubt(
+                self._index, SWINGS_PART * abs(residual) * min(duration_s, LONGEST_PAUSE_S)
+            )
+        if residual**2 > DOUBT**2 * (estimate.variance_of(terms) + variance):
+            estimate.disturb([(base + SPEED, 1.0)], (residual / 2) ** 2)
+        estimate.measure(terms, residual, variance)
