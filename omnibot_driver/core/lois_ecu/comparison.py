@@ -149,6 +149,10 @@ class Comparison:
         else:
             self._equal(duration_s)
 
+    def came_to_rest(self, index: int) -> None:
+        """Take back what a wheel seemed to roll since its reported speed changed last."""
+        self._speeds[index].come_to_rest()
+
     def _equal(self, duration_s: float) -> None:
         """Correct the filter by the fact that both speeds are equal, whatever they are."""
         motion = self._motion

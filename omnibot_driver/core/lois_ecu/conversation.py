@@ -111,7 +111,9 @@ class LoisConversation:
                 self._upkeep.writer.date_came()
             if isinstance(report, Ticks | BoardOdometry):
                 self._stall.heard(report, at, self._translation.odometry.resting)
-        if self._translation.odometry.appends and self._stall.looks_stalled(now):
+        stalled = self._stall.stalled(now)
+        if self._translation.odometry.appends and any(stalled):
+            self._translation.odometry.stalled(stalled)
             self._points.clear_again()
         found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
         if self._translation.restarts != restarts:

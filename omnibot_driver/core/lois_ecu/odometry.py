@@ -156,6 +156,12 @@ class LoisOdometry:
         """Note that the board set both set-points to zero by itself, because of its button."""
         self.wrote(SetRpm(0, 0), now)
 
+    def stalled(self, wheels: tuple[bool, bool]) -> None:
+        """Believe that these wheels have been at rest since their reported speeds changed last."""
+        for index, stalled in enumerate(wheels):
+            if stalled and self._motion.wheels[index].blind and not self._motion.signed:
+                self._comparison.came_to_rest(index)
+
     # Inbound
 
     def heard_ticks(self, ticks: Ticks, now: float, late_s: float = 0.0) -> list[FusedOdometry]:

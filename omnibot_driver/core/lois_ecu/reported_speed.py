@@ -60,6 +60,21 @@ class ReportedSpeed:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
             self.resting.note(rpm, duration_s)
 
+    def come_to_rest(self) -> None:
+        """The wheel is at rest since its reported speed changed last: take back its way."""
+        motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
+        if wheel.rests:
+            return
+        wheel.rests = True
+        sign = math.copysign(1.0, wheel.course.target_mps)
+        rolled_m = motion.way_m(self._index) - self._changed_at_m
+        too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
+        motion.shift(self._index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
+        for state in (X, Y):  # it may have had another heading then
+            motion.filter.disturb([(state, 1.0)], (too_far_m / 4) ** 2)
+        motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
+        motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
+
     def take(self, speed_mps: float, duration_s: float) -> None:
         """Correct a wheel by the speed of its last tick, which the board keeps until the next."""
         motion, estimate = self._motion, self._motion.filter
@@ -122,14 +137,7 @@ class ReportedSpeed:
                 motion.filter.forget(wheel.base + SPEED, sign * told_mps, spread**2)
             self._changed_at_m = motion.way_m(self._index)
         elif resting.chance == 1.0 and not wheel.rests:
-            wheel.rests = True
-            rolled_m = motion.way_m(self._index) - self._changed_at_m
-            too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
-            motion.shift(self._index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
-            for state in (X, Y):  # it may have had another heading then
-                motion.filter.disturb([(state, 1.0)], (too_far_m / 4) ** 2)
-            motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
-            motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
+            self.come_to_rest()
         elif not wheel.rests and resting.chance:
             motion.doubt(self._index, resting.chance * abs(speed) * duration_s)
 

@@ -34,7 +34,7 @@ AT_LEAST: Final = 4
 
 
 class StallWatch:
-    """Watch of both wheels; ``looks_stalled`` once for each ``STALLED_S`` that one is at rest."""
+    """Watch of both wheels; ``stalled`` once for each ``STALLED_S`` that one is at rest."""
 
     def __init__(self, track_m: float = 0.47, rim_mps_per_rpm: float = 0.0136) -> None:
         self._track_m, self._rpm_mps = track_m, rim_mps_per_rpm
@@ -84,16 +84,16 @@ class StallWatch:
                 if self._targets[wheel] > 0 or ticked[wheel]:
                     self._note(wheel, now, turns=ticked[wheel])
 
-    def looks_stalled(self, now: float) -> bool:
-        """Return whether a commanded wheel has not turned for ``STALLED_S``; restart the time."""
-        stalled = any(
+    def stalled(self, now: float) -> tuple[bool, bool]:
+        """Return which commanded wheels have not turned for ``STALLED_S``; restart their time."""
+        left, right = (
             now - seen_at >= STALLED_S and quiet >= AT_LEAST
             for seen_at, quiet in zip(self._seen_at, self._quiet, strict=True)
         )
-        if stalled:
+        if left or right:
             self._seen_at = [at if at == math.inf else now for at in self._seen_at]
             self._quiet = [0, 0]
-        return stalled
+        return left, right
 
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether this wheel's reported speed is one that the board keeps.

@@ -103,6 +103,13 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
     assert one.sigmas < 3.5
 
 
+def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
+    """It kept 12 RPM at a set-point of -7, which is too fast for a wheel that rolls."""
+    one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
+    assert abs(one.error.yaw_rad) < math.radians(30)
+    assert one.sigmas < 3.5
+
+
 @pytest.mark.parametrize(
     ("name", "seed"), [("straight back", 9001), ("straight back", 9025), ("curve back", 9013)]
 )

@@ -27,7 +27,7 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
         watch.heard(Ticks(200 * step, ticks[0] * step, ticks[1] * step), now)
         watch.heard(pose(ways_m * step), now)
         watch.wrote(command, now)
-        if watch.looks_stalled(now):
+        if any(watch.stalled(now)):
             found.append(round(now, 1))
     return found
 
@@ -66,7 +66,7 @@ def looks_stalled(
         )
         watch.heard(group, 0.2 * step, resting)
         watch.heard(Ticks(200 * step, 0, 2 * step * (targets[1] > 0)), 0.2 * step)
-        found |= watch.looks_stalled(0.2 * step)
+        found |= any(watch.stalled(0.2 * step))
     return found
 
 
