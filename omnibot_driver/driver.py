@@ -151,6 +151,8 @@ def _run(ending: Ending, args: list[str]) -> None:
     stopping.set()
     executor.create_task(lambda: None)  # wake-ups alone do not end spin_once
     spinner.join(timeout=0.5)
+    if not spinner.is_alive():
+        executor.shutdown(timeout_sec=0.0)  # otherwise rclpy may print a traceback at exit
     driver.destroy_node()
 
 

@@ -72,6 +72,26 @@ def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
 
 
+REPORTS_EXECUTORS = """
+import atexit
+from rclpy.executors import Executor
+executors, begin = [], Executor.__init__
+def keep(self, *args, **kwargs):
+    begin(self, *args, **kwargs)
+    executors.append(self)
+Executor.__init__ = keep
+atexit.register(lambda: print("left running:", sum(bool(e._sigint_gc) for e in executors)))
+"""
+
+
+def test_the_executor_is_shut_down_before_python_ends(start_driver: Start) -> None:
+    """Python would destroy its parts in any order, and rclpy then sometimes prints a traceback."""
+    driver: Driver = start_driver("sim://", before=REPORTS_EXECUTORS)
+    driver.wait_for_line("state: nominal")
+    assert driver.end(signal.SIGTERM) == 0
+    assert "left running: 0\n" in driver.output
+
+
 EXPLODES = """
 import omnibot_driver.node as node
 def explode(self, message):
