@@ -36,7 +36,7 @@ def locate(file: str) -> Path:
 
 
 def load(path: Path, table: Table) -> dict[str, Value]:
-    """Return the parameters in the file that this board may have there; empty without a file.
+    """Return the file's values of calibrated parameters of this board; empty without a file.
 
     Raises ParameterError, with a remedy, for a file that cannot be read or has a wrong value.
     """
@@ -59,8 +59,8 @@ def names(path: Path) -> list[str]:
 def save(path: Path, values: Mapping[str, Any]) -> None:
     """Put these values into the file and keep the others. Raises ParameterError or OSError.
 
-    A reader, or a power failure, meanwhile finds the old file or the new one. Comments in the file
-    do not survive; a symbolic link does.
+    A concurrent reader finds either the old file or the new one, and so does the next start after a
+    power failure. Comments in the file are lost; a symbolic link to it is kept.
     """
     import tempfile  # takes 1 MB, and few drivers ever save
 

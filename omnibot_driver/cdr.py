@@ -2,8 +2,8 @@
 
 """Measurements serialised to CDR as rclpy does it, and velocity commands parsed from CDR.
 
-ROS messages are not made on the way. CDR, as DDS serialises, aligns every number to its own size,
-like a C struct on a 64-bit machine, so Python's ``struct`` with native alignment writes it. A
+No ROS message objects are made for this. CDR, as DDS serialises, aligns every number to its own
+size, like a C struct on a 64-bit machine, so Python's ``struct`` with native alignment writes it. A
 string is a length and its bytes with a NUL; a sequence is a length and its elements. Whether this
 holds on this machine is not assumed: ``difference`` compares the bytes with rclpy's own.
 """
@@ -106,8 +106,8 @@ class Serializer:
 def twist(data: bytes) -> BodyTwist:
     """Parse a serialised geometry_msgs/Twist; return its planar part as ``messages.body_twist``.
 
-    Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist, which another
-    middleware might let through.
+    Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist, which some
+    middlewares might deliver.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
@@ -167,9 +167,9 @@ def difference(settings: MessageSettings) -> str:
 
 
 def _same(ours: bytes, theirs: bytes, kind: type) -> bool:
-    """Return whether both bytes mean the same message.
+    """Return whether two serialisations mean the same message.
 
-    Padding is ignored: in it, and behind the end, rclpy leaves bytes that were there before.
+    Padding is ignored, because rclpy leaves arbitrary bytes in the padding and after the end.
     """
     try:
         alike = deserialize_message(ours, kind) == deserialize_message(theirs, kind)

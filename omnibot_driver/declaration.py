@@ -46,10 +46,10 @@ def declare(node: Node) -> dict[str, Any]:
 
 
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
-    """Return all of the driver's values after a change; ``values``: those before it.
+    """Return all of the driver's values after a change; ``values``: those before the change.
 
-    Each has its parameter's own type: ROS also passes an integer for a real number, which a message
-    would publish as 0.
+    Each value has its parameter's own type: ROS also passes an integer for a real number, which a
+    message would publish as 0.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})
@@ -61,10 +61,10 @@ def _ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, 
 
 
 def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, parameters.Value]:
-    """Return what the calibration file sets; log that, a missing file, and names that are not read.
+    """Return the parameters that the calibration file sets, and log their names.
 
-    Without the log a misspelt path would go unnoticed: it looks like a file that does not exist
-    yet.
+    A missing file, and names in it that are not read, are logged as warnings. Without the warning,
+    a misspelt path would look like a file that does not exist yet.
     """
     found, names = calibration.load(path, table), calibration.names(path)
     unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]
@@ -91,7 +91,7 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
 def _check(
     node: Node, table: parameters.Table, changed: list[rclpy.Parameter]
 ) -> SetParametersResult:
-    """Check the changed values, each alone and together with the unchanged ones."""
+    """Return whether the changed values are valid, alone and together with the others."""
     present = {item.name: item.value for item in node.get_parameters(list(table.by_name))}
     try:
         table.check_all({**present, **_ours(changed, table)})

@@ -27,7 +27,7 @@ Publish = Callable[[Sequence[Status]], None]
 class Diagnostics:
     """The publisher of the diagnostics of one link.
 
-    ``refusals`` is called for each message and returns the refusals so far. ``hardware_id``
+    ``refusals`` is called for each message and returns the refused commands so far. ``hardware_id``
     distinguishes robots. ``to_check`` says what may be wrong with a board whose data is not
     understood.
     """

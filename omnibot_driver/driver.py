@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver as a process: signals, executor and exit code. Does not know what the node does."""
+"""The driver process: signals, executor and exit code. Does not know what the node does."""
 
 import os
 import select
@@ -35,9 +35,9 @@ SETUP: Final = (
 class Ending:
     """The end of the driver: the main thread waits here until the driver is to end.
 
-    It is a pipe, because Python writes a signal's number into one from whichever thread the signal
-    hits. A thread that waits for a lock can miss a signal, and a signal handler must not touch a
-    lock at all. ``defect`` is the exception that ended the driver, or None.
+    The wait uses a pipe, because Python writes a signal's number into a pipe whichever thread the
+    signal hits. A thread that waits for a lock can miss a signal, and a signal handler must not
+    touch a lock at all. ``defect`` is the exception that ended the driver, or None.
     """
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ def main(args: list[str] | None = None) -> int:
 
     Returns the exit code: 0 when asked to end, or for help; 1 after a defect; 2 if it cannot start.
     The main thread only waits, so a signal takes effect however busy the executor is, and a second
-    one cannot interrupt the shutdown.
+    signal cannot interrupt the shutdown.
     """
     args = sys.argv if args is None else args
     with UnblockedOutput():

@@ -27,7 +27,7 @@ WORDS = b"="
 END = b"\n"
 """End of a message that begins with ``WORDS`` and replaces both stop commands."""
 BYE = b"!"
-"""Message that the driver has stopped the robot itself, and the guard may end."""
+"""Message that the driver has stopped the robot itself, so that the guard may end."""
 LIMIT_S = 0.5
 """Time without a heartbeat, in s, after which the driver is taken to hang."""
 TIMES = 20
@@ -82,7 +82,7 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int]) -> None:
-    """Write these packets up to ``TIMES`` times; stop early when one of ``until`` is readable."""
+    """Write the stop packets up to ``TIMES`` times, or until one of ``until`` is readable."""
     lines = {line for line, _ in last_words}
     for line in lines:
         drop_what_waits(line)
@@ -110,7 +110,7 @@ def drop_what_waits(line: int) -> None:
 
 
 def words(argument: str) -> Words:
-    """Parse an argument that `keeper.py` made of packets."""
+    """Return the packets in an argument or message of `keeper.py`: descriptors and bytes."""
     each = (word.split(":") for word in argument.split(",") if word)
     return [(int(descriptor), bytes.fromhex(data)) for descriptor, data in each]
 

@@ -2,8 +2,8 @@
 
 """The driver's side of `guard.py`: keeps a guard process beside an open port.
 
-It starts the process, sends it heartbeats, replaces it when it dies, and ends it. It knows no
-threads and no board; its user calls ``beat`` from the thread that must stay alive.
+This module starts the process, sends it heartbeats, replaces it when it dies, and ends it. It knows
+no threads and no board; its user calls ``beat`` from the thread that must stay alive.
 """
 
 import contextlib
@@ -25,13 +25,13 @@ BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
 """Shortest time between two starts, in s, for a guard that dies at once."""
 HANGS_AFTER: Final = 50
-"""Number of unread heartbeats after which a guard would not stop the robot either."""
+"""Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
-"""Number of killed guards that have not ended yet at which another one is not started."""
+"""Number of killed guards still running from which on a new guard is not started."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
-"""Longest wait for a killed guard to end, in s. One that takes longer is in an uninterruptible
-sleep, and the driver does not wait for it."""
+"""Longest wait for a killed guard to end, in s. A guard that takes longer is in an
+uninterruptible sleep, and the driver does not wait for its end."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
 """Longest wait for a guard that repeats the stop, in s; a process may be slow to start."""
 
@@ -39,8 +39,8 @@ SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
 class Keeper:
     """A guard process for open lines, from construction until ``end``.
 
-    ``descriptors`` are those of the lines, by channel, None for a missing line. ``stop`` is what
-    the guard sends, and ``emergency_stop`` what it sends while the e-stop is latched.
+    ``descriptors``: file descriptors of the lines, by channel; None for a missing line. ``stop``:
+    what the guard sends; ``emergency_stop``: what it sends instead while the e-stop is latched.
     """
 
     def __init__(
@@ -62,7 +62,8 @@ class Keeper:
     def beat(self, now: float, *, latched: bool = False) -> str:
         """Send a heartbeat; call this every ``BEAT_S``, neither more nor less often.
 
-        Returns a sentence, once, if the guard does not work as it should. Waits for no process.
+        Returns a sentence, only once, if the guard does not work; otherwise an empty string. Does
+        not wait for any process.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -75,7 +76,7 @@ class Keeper:
         return trouble
 
     def change(self, stop: Packets, emergency_stop: Packets) -> None:
-        """Replace the commands that the guard is to send. Waits for no process."""
+        """Replace the commands that the guard is to send, without waiting for any process."""
         self.last_words = stop, emergency_stop
         if (process := self._process) is None:
             return
@@ -88,7 +89,7 @@ class Keeper:
             self._give_up(process)
 
     def end(self, *, stopped: bool) -> None:
-        """End the guard, after which the port is ours alone. A second call does nothing.
+        """End the guard, so that only this process holds the port. A second call does nothing.
 
         Unless the robot is known to have been ``stopped``, the guard sends its stop first.
         """
@@ -124,7 +125,8 @@ class Keeper:
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
         """Kill the guard without waiting for its end; later heartbeats check whether it has ended.
 
-        It may be in an uninterruptible sleep, and the e-stop needs the lock that is held here.
+        The guard may be in an uninterruptible sleep, and the e-stop needs the lock that is held
+        here.
         """
         assert process.stdin is not None
         process.stdin.close()

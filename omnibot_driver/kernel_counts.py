@@ -2,7 +2,7 @@
 
 """Counts of the Linux kernel: losses of a serial port, and the time a thread waited to run.
 
-Each is None where the kernel does not count it.
+Each function returns None where the kernel has no such count.
 """
 
 import fcntl
@@ -14,13 +14,13 @@ TIOCGICOUNT: Final = 0x545D
 """Request of asm-generic/ioctls.h; Python's ``termios`` does not name it everywhere."""
 _COUNTS: Final = struct.Struct("20i")
 _OVERRUN, _BUFFER_OVERRUN = 7, 10
-"""Indices in ``serial_icounter_struct``: the receiver was not emptied in time; the tty was not."""
+"""Indices in ``serial_icounter_struct``: overruns of the receiver, and of the tty's buffer."""
 
 
 def overruns(descriptor: int) -> int | None:
-    """Return how often the line has lost bytes since the port exists; None without a count.
+    """Return how often the kernel has lost bytes of the port so far; None without a count.
 
-    A pseudo-terminal and a socket lose none and count none; some USB adapters count none.
+    Pseudo-terminals and sockets lose no bytes and have no count; some USB adapters have no count.
     """
     try:
         counts = _COUNTS.unpack(fcntl.ioctl(descriptor, TIOCGICOUNT, bytes(_COUNTS.size)))

@@ -7,8 +7,8 @@ once, on its own thread. No timer and no other thread delays a measurement betwe
 listener. The *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the
 watchdog does not depend on an executor. It also sends the guard its heartbeat. These threads and
 every caller use one lock. Events that the pacer and callers cause are delivered by the *teller*, so
-a slow listener delays neither. All events are delivered in the order in which they occurred under
-that lock.
+a slow listener delays neither of the two. All events are delivered in the order in which they
+occurred under that lock.
 """
 
 import threading
@@ -29,12 +29,13 @@ from omnibot_driver.transports import Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s; longer than a guard takes to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at the end until the robot is seen at rest, in s; longer where a proof takes longer.
-After it the guard repeats Stop."""
+"""Longest wait at shutdown until the robot is proved at rest, in s; extended if a proof takes
+longer. Afterwards the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at the end until the robot is seen at rest, without a guard, in s."""
+"""Longest wait at shutdown until the robot is proved at rest, in s, without a guard process."""
 SILENCE_S: Final = 0.25
-"""Wait after the standstill, in s, in silence, which proves that the last Stop was not damaged."""
+"""Longest wait for a second proof of standstill, in s, in which nothing is sent. This second proof
+shows that the last Stop was not damaged."""
 
 T = TypeVar("T")
 
@@ -43,11 +44,12 @@ class Link:
     """One session on one port, which is opened again whenever it is lost.
 
     ``opener`` opens the transport, whose name for the user is ``port``. ``guard``: whether a
-    separate process is to send the board's stop commands when this process cannot. ``deliver`` gets
-    the session's events. ``refused`` gets the reason why a command was refused. ``report`` gets a
+    separate process sends the board's stop commands when this process cannot. ``deliver`` gets the
+    session's events. ``refused`` gets the reason why a command was refused. ``report`` gets a
     sentence about the port whenever it, or one of its lines, cannot be opened or is lost, and None
-    when all of it is open. ``on_read`` and ``on_write`` get each packet that was read or written.
-    They are called one at a time, in the order of the events, on the reader's thread or another.
+    when the port and all its lines are open. ``on_read`` and ``on_write`` get each packet that was
+    read or written. These functions are called one at a time, in the order of the events, on the
+    reader's thread or another.
 
     ``failed`` gets the exception that ended a thread, which only a defect can cause.
     """
@@ -132,10 +134,10 @@ class Link:
             return link, self._session.figures(time.monotonic())
 
     def close(self, on_exit: OnExit) -> bool:
-        """Stop the robot, end the threads and close the port. A second call does no harm.
+        """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        Returns whether Stop was sent and the threads have ended. ``stands`` then says whether the
-        robot was seen at rest.
+        Returns whether Stop was sent and the threads have ended. Afterwards ``stands`` shows
+        whether the robot was proved at rest.
         """
         told = False
         with self._shared.lock:

@@ -45,7 +45,8 @@ MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""Displacement rolled so far, unwrapped wheel angles in rad, wheel rates in rad/s or empty."""
+"""State of the wheels: displacement rolled so far in m and rad, unwrapped wheel angles in rad,
+wheel rates in rad/s (empty if unknown)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +68,7 @@ class MessageSettings:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], wheels: Kinematics) -> "MessageSettings":
-        """Build from checked parameter values and the wheels of the board's profile."""
+        """Make the settings from checked parameter values and the wheels of the board."""
         prefix = values["frame_prefix"]
         return cls(
             odom_frame=prefix + values["odom_frame"],
@@ -147,7 +148,7 @@ def unturned(kinematics: Kinematics) -> Wheels:
 
 
 def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -> Wheels:
-    """Return the wheels after what was rolled since ``before``, by their present sizes."""
+    """Return the wheels' state after ``estimate``, from the state ``before``."""
     rolled, rolling, (then, angles, _) = estimate.rolled, estimate.rolling, before
     way = BodyTwist(rolled.x_m - then.x_m, rolled.y_m - then.y_m, rolled.yaw_rad - then.yaw_rad)
     angles = tuple(map(add, angles, kinematics.wheel_rates(way)))
@@ -155,7 +156,7 @@ def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -
 
 
 def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) -> JointState:
-    """Return a ``joint_states`` message."""
+    """Return a ``joint_states`` message with wheel angles in rad and rates in rad/s."""
     _, angles, rates = wheels
     return JointState(
         header=Header(stamp=stamp), name=settings.wheels.joints, position=angles, velocity=rates
@@ -224,7 +225,7 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
 
 
 def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
-    """Return a warning about ``cmd_vel`` publishers of another type; empty without any."""
+    """Return a warning about ``cmd_vel`` publishers whose type is not received; else empty."""
     ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
     if stamped:
         ours, other = other, ours
@@ -240,7 +241,7 @@ def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
 
 
 def age(stamp: Time, now_ns: int) -> float:
-    """Return the seconds since the stamp, by the clock that gave both; 0 for a zero stamp."""
+    """Return the age of a stamp in s at ``now_ns`` of the same clock; 0 for a zero stamp."""
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
 
@@ -272,7 +273,7 @@ def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> 
 
 
 def yaw_quaternion(yaw_rad: float) -> Quaternion:
-    """Return a rotation about z."""
+    """Return the quaternion of a rotation by ``yaw_rad`` about z."""
     return Quaternion(x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))
 
 

@@ -92,9 +92,9 @@ class OmniBotDriver(Node):
         self._link.start()
 
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
-        """Create a publisher without events.
+        """Create a publisher without callbacks for quality-of-service events.
 
-        The executor would check each event before it takes a command. A subscriber with an
+        The executor would check each of them before it takes a command. A subscriber with an
         incompatible quality of service sees a warning on its own side only.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
@@ -191,7 +191,7 @@ class OmniBotDriver(Node):
     ) -> Callable[..., None]:
         """Return a callback that passes each message to ``action``; the link reports a refusal.
 
-        ``may_be_old`` returns whether the transit time of a message does not matter.
+        ``may_be_old`` returns True for a message whose transit time does not matter.
         """
         transit = Transit()
 

@@ -4,8 +4,8 @@
 
 A thread puts a call while it holds the lock under which the event occurred, and delivers after it
 has released that lock, so a slow listener delays no command. One thread delivers at a time; another
-one that arrives meanwhile leaves its calls to the first. This module knows threads; it does not
-know what is delivered.
+thread that wants to deliver meanwhile leaves its calls to the first. This module knows threads; it
+does not know what is delivered.
 """
 
 import threading
@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of waiting calls from which on each thread that delivers waits for the listener."""
+"""Number of waiting calls at which each thread that delivers waits for the listener."""
 
 Delivery = Callable[[], object]
 
@@ -29,13 +29,14 @@ class Outbox:
         self._closed = False
 
     def put(self, delivery: Delivery) -> None:
-        """Queue the next call. It never blocks; the caller's lock gives the order."""
+        """Queue the next call, without blocking; the caller's lock gives the order."""
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
-        """Return whether the caller may deliver by itself, cheaper than ``put`` and ``deliver``.
+        """Return whether the caller may deliver directly, cheaper than ``put`` and ``deliver``.
 
-        Call it with the lock held under which the event occurred. If True, ``release`` must follow.
+        Hold the lock under which the event occurred during this call. If it returns True,
+        ``release`` must follow.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 
@@ -47,13 +48,13 @@ class Outbox:
 
     @property
     def full(self) -> bool:
-        """Whether the listener is so slow that a dispensable call is better not put."""
+        """Whether ``MOST_WAITING`` calls wait; dispensable calls should then not be queued."""
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
-        """Make the waiting calls, or leave them to the thread that is doing so.
+        """Make the waiting calls, or leave them to the thread that is making calls now.
 
-        With a full outbox, wait for that thread. Raises what the calls raise.
+        If the outbox is full, wait for that thread. Raises what the calls raise.
         """
         waiting, delivering = self._waiting, self._delivering
         while waiting:  # again after the release: a call put meanwhile found the lock taken

@@ -64,7 +64,8 @@ class UnblockedOutput:
 def _fill_gaps() -> None:
     """Open /dev/null on those of the descriptors 0 to 2 that are closed.
 
-    Otherwise the port would get the number of a closed standard output, and the board the log.
+    Otherwise the port would get the number of a closed standard output, and the log would be sent
+    to the board.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
         pass

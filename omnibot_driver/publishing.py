@@ -89,8 +89,8 @@ class Publishing:
             Extra: self._publish_extra,
         }
         self.extras: Mapping[type, Callable[[Any, int], None]] = {}
-        """Functions that publish the types of value that only this board has, by type; they get the
-        value and its stamp in ns."""
+        """Functions that publish values of the types that only this board has, by type; each gets
+        the value and its stamp in ns."""
 
     @property
     def settings(self) -> messages.MessageSettings:
@@ -146,7 +146,7 @@ class Publishing:
             self._node.get_logger().error(f"{trouble} (retrying)")
 
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
-        """Publish by a simulated clock, which steps, may jump back, and is 0 until it begins."""
+        """Publish with stamps of a simulated clock, which may jump back, and is 0 at first."""
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
             self._stamped_ns = {}
@@ -163,11 +163,11 @@ class Publishing:
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
-        """Note that ROS is being shut down; a query for each event would cost more than an Imu."""
+        """Note that ROS is shutting down; asking ROS at each event would take too much time."""
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Note whether time is simulated; a query for each event would cost a microsecond."""
+        """Note whether time is simulated; asking ROS at each event would take a microsecond."""
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
@@ -224,9 +224,9 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether the text is new since the board was last understood.
+        """Return whether the text is new since the last decoded data of the board.
 
-        Each text is logged once until then, so a flapping port is reported once.
+        A text is logged once until new data is decoded, so a flapping port is reported once.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

@@ -31,9 +31,9 @@ LONGEST_WAIT_S: Final = 2.0
 class Reader:
     """The work of the reader thread, ``serve``, and its counts.
 
-    ``opener`` and the arguments after it are the link's. ``trouble`` is the reason why the port, or
-    one of its lines, is not open. ``opened`` counts openings, ``received_bytes`` bytes, and
-    ``overruns`` the kernel's losses on this port (None without a count).
+    ``opener`` and the arguments after it are those of ``Link``. ``trouble`` is the reason why the
+    port, or one of its lines, is not open. ``opened`` counts openings, ``received_bytes`` bytes,
+    and ``overruns`` the kernel's losses on this port (None without a count).
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Reader:
         self._outbox.deliver()
 
     def _attach_anew(self, port: Transport) -> None:
-        """Begin again on the lines that are present now, after one was lost or came back."""
+        """Begin again on the lines that are present now, after a line was lost or came back."""
         with self._lock:
             self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
@@ -176,7 +176,7 @@ class Reader:
             self._session.overran(self.overruns)
 
     def _detach(self, port: Transport, *, comes_back: bool) -> None:
-        """Leave the port, and the robot without a command, whatever ended the reading."""
+        """Stop the robot, then end the use of the port, whatever ended the reading."""
         with self._lock:
             if self._shared.write_error is None:
                 self._shared.write(

@@ -35,7 +35,7 @@ class Recording:
     delay_s: float = 5.0
 
     def chunks(self) -> Iterator[tuple[int, Packet]]:
-        """Yield each packet, after its time in ns of the recorder's clock. Raises LinkError."""
+        """Yield (time in ns by the recorder's clock, packet) for each packet. Raises LinkError."""
         try:
             from rosbags.rosbag2 import Reader
             from rosbags.typesys import Stores, get_typestore
@@ -58,7 +58,7 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording that a URL means, of a board with these channels.
+    """Return the recording at a URL, of a board with these channels.
 
     Raises ParameterError, which says what is wrong with the URL or the bag.
     """

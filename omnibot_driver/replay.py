@@ -3,8 +3,9 @@
 """A session fed from a recording: the counterpart of `Link` for recorded bytes.
 
 The only clock is the recording's. The session gets each chunk of bytes at the time at which it was
-received, and is ticked when it asks to be. Its output therefore depends on the recording alone, and
-not on this machine or on the playback speed. The bytes that it wants written are discarded.
+received, and ``tick`` is called whenever ``wake_at`` is reached. Its output therefore depends on
+the recording alone, and not on this machine or on the playback speed. The bytes that the session
+would write are discarded.
 """
 
 import threading
@@ -23,7 +24,7 @@ from omnibot_driver.recording import Recording
 
 JOIN_TIMEOUT_S: Final = 1.0
 SHORTEST_STEP_S: Final = 0.001
-"""Shortest time between two ticks of the session, in s, whatever it asks for."""
+"""Shortest time between two calls of ``Session.tick``, in s, even if it asks for less."""
 
 T = TypeVar("T")
 
@@ -33,8 +34,8 @@ class Replay:
 
     ``deliver`` gets the session's events and the time of day, in ns, at which the session's time is
     zero. ``refused`` gets the reason why a command was refused. ``report`` gets None when the
-    recording begins. They are called one at a time, in the order of the events. ``failed`` gets the
-    exception that ended the thread, which only a defect can cause.
+    recording begins. These functions are called one at a time, in the order of the events.
+    ``failed`` gets the exception that ended the thread, which only a defect can cause.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class Replay:
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, _sent_ns: Sequence[int]
     ) -> None:
-        """Pass a command to the session by ``call``. It does not move a robot."""
+        """Pass the motion command ``wish`` to the session by ``call``; it moves no robot."""
         self.call(lambda session, now: action(session, wish, now))
 
     def close(self, _on_exit: OnExit) -> bool:
@@ -125,7 +126,7 @@ class Replay:
         self._tell(partial(self._deliver, [Notice(end)], self._epoch_ns))
 
     def _run_until(self, end_s: float) -> bool:
-        """Let the time pass and do what falls due in it; return False if ``close`` cut it short."""
+        """Tick the session as needed until ``end_s``; return False if ``close`` interrupts."""
         while (due_s := self._due()) < end_s:
             if not self._pass(due_s):
                 return False

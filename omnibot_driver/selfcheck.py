@@ -2,9 +2,9 @@
 
 """Advice on surroundings of the driver that can be observed and should be set differently.
 
-It checks the adapter of an open port, the clock, and nodes of the same name. It reads sysfs, and
-knows no pyserial, no ROS and no board. Obstacles to opening a port, such as its permissions, are
-reported by ``transports``.
+This module checks the adapter of an open port, the clock, and nodes of the same name. It reads
+sysfs, and knows no pyserial, no ROS and no board. Obstacles to opening a port, such as its
+permissions, are reported by ``transports``.
 """
 
 from collections.abc import Iterable
@@ -55,7 +55,10 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
 
 
 def waiting_advice(port: str, now_ns: int) -> str:
-    """Return a warning if the node's clock has not begun; a recording has stamps of its own."""
+    """Return a warning if the node's clock, ``now_ns``, is still 0; otherwise empty.
+
+    A recording has stamps of its own, so this is not checked for it.
+    """
     if now_ns or port.startswith(RECORDING):
         return ""
     return (

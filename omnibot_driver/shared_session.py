@@ -32,7 +32,7 @@ class SharedSession:
     """A session, its open port, and the lock that protects both.
 
     Hold ``lock`` to use anything but ``call``, ``command`` and ``blocked``. ``changed`` is a
-    condition on this lock. ``port`` and ``keeper`` are those of the open port, or None.
+    condition on this lock. ``port`` is the open port and ``keeper`` its guard, each None if absent.
     ``write_error`` is the error after which nothing more is written to the port. ``deliver``,
     ``refused`` and ``on_write`` are the link's.
     """
@@ -65,9 +65,9 @@ class SharedSession:
         self._pacing_until = self._beat_at = -math.inf
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Call ``action`` with the session; what it sends is written before this returns.
+        """Call ``action`` with the session and the time in s; return the result of ``action``.
 
-        The events that result are delivered by another thread.
+        The resulting packets are written before this returns; another thread delivers the events.
         """
         try:
             with self.lock:
@@ -85,7 +85,7 @@ class SharedSession:
     ) -> None:
         """Pass ``wish``, the motion that a sender wants, to the session by ``action``.
 
-        ``sent_ns`` are the possible times of day, in ns, at which it was sent. Raises
+        ``sent_ns``: the possible times of day, in ns, at which the command was sent. Raises
         CommandRefused for a wish that waited while this process was stalled. Each refusal is also
         delivered, in its place among the events, unless the outbox is full.
         """
@@ -118,7 +118,7 @@ class SharedSession:
             return self.write_error is not None
 
     def settle(self) -> None:
-        """Write what is due, queue the events, and wake the pacer if it would sleep too long."""
+        """Write due packets, queue the events, and wake the pacer if it would sleep too long."""
         packets = self.session.take_output(time.monotonic())
         self.tell_guard()
         if packets:

@@ -3,8 +3,9 @@
 """Detection of stalls of this process: SIGSTOP, a swapped-out or suspended host, a hanging thread.
 
 During a stall the watchdog does not run either, and commands keep arriving. When the process runs
-again, nothing that was sent meanwhile may be obeyed. This module gets the time, and calls that show
-that the watchdog's thread runs. It knows no threads and no commands. Its time is ``boot_time_s``.
+again, commands that were sent meanwhile must not be obeyed. This module gets the time, by
+``boot_time_s``, and calls that show that the watchdog's thread runs. It knows no threads and no
+commands.
 """
 
 import math
@@ -12,15 +13,16 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Shortest stall, in s: a thread that should pass ten times a second has not passed for this time.
-It is less than the guard's limit, so whenever the guard acts, the stall is noticed as well."""
+"""Shortest stall, in s: ``passed`` has not been called for this time, although it should be called
+ten times a second. The time is less than the guard's limit, so a stall is noticed whenever the
+guard acts."""
 SETTLE_S: Final = 0.25
-"""Time after a stall, in s, in which whatever arrives had been waiting, whatever the sender's clock
-says. A command with a send time in it may have been sent a little before: a sender's clock is known
-only roughly."""
+"""Time after a stall, in s. A command that arrives within this time is regarded as sent during the
+stall, whatever its send time. So is a command whose send time is within this time,
+because a sender's clock is known only roughly."""
 LATEST_S: Final = 10.0
-"""Longest time in transit, in s, retransmissions included. A command that seems to have been sent
-earlier has a sender whose clock is wrong."""
+"""Longest time in transit, in s, retransmissions included. A command that seems to be older comes
+from a sender whose clock is wrong."""
 
 
 def boot_time_s() -> float:
@@ -65,9 +67,9 @@ class StallDetector:
         self._passed_at = now
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
-        """Return whether a command is not from before the end of a stall, as far as is known.
+        """Return False for a command that may have been sent before or during a recent stall.
 
-        ``sent_ns`` is the time of day at which it was sent.
+        ``sent_ns`` is the time of day at which the command was sent, in ns.
         """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The publisher of ``/tf`` where tf2_ros is installed; elsewhere a warning instead of it."""
+"""The publisher of ``/tf`` if tf2_ros is installed; otherwise a warning is logged."""
 
 from collections.abc import Callable
 from typing import Any, Final

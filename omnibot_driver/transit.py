@@ -8,11 +8,13 @@ clock was in transit for the shortest time. That difference is taken as the offs
 clocks; the excess of any other message is its delay. The time that a message waited in this process
 is known exactly, by our own clock.
 
-Clocks step. Ours is read twice, as time of day and as a steady clock. A step of the time of day
-that our senders share (one host, or NTP everywhere) shows in the steady difference alone, a step of
-ours in the time of day alone, and the smaller delay is used. A sender whose clock alone is set back
-seems to be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``, the
-smallest difference among those becomes its offset. A real delay that lasts as long looks the same.
+Clocks step. Our clock is read twice, as time of day and as a steady clock, which gives two
+differences. If our time of day and the sender's step together (one host, or NTP everywhere), only
+the difference of the steady clock changes. If our time of day steps alone, only its difference
+changes. So the smaller of the two delays is used. A sender whose clock alone is set back seems to
+be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``, the smallest
+difference among these messages becomes its offset. A real delay that lasts as long cannot be
+distinguished from this case.
 
 The middleware numbers the messages of each sender. It does not report who sent one, but a number
 that is not above a sender's last one belongs to another sender. This module reads no clock and
@@ -32,13 +34,12 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest drift between two clocks, in s/s: a crystal is off by a tenth of this, NTP corrects a
 clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which an early message is less likely to be a sender's than one that is late by the
-same time."""
+"""Factor by which a message that seems early is less likely to come from a sender than a message
+that is late by the same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages after which at least one of a sender's was hardly delayed. Earlier, all may
-have been delayed; then later ones that arrive sooner seem to have been sent later than they were.
-"""
+"""Number of messages of a sender among which at least one was hardly delayed. Of fewer messages,
+all may have been delayed; the send time of a less delayed message is then estimated too late."""
 
 Differences = tuple[float, float]
 """Our clock minus a sender's when its message arrived, in s: time of day, and steady clock."""
@@ -48,9 +49,10 @@ Differences = tuple[float, float]
 class Arrival:
     """One message and its times, in ns.
 
-    ``sent_ns`` is the time of day by its sender's clock. ``received_ns`` is the time of day by ours
-    when it came in, ``now_ns`` the present one, and ``steady_ns`` the present time of a steady
-    clock. ``number`` counts its sender's messages; None where the middleware does not.
+    ``sent_ns`` is the time of day by its sender's clock. ``received_ns`` is the time of day by our
+    clock when the message came in, ``now_ns`` the present time of day, and ``steady_ns`` the
+    present time of a steady clock. ``number`` counts its sender's messages; None if the middleware
+    does not count them.
     """
 
     sent_ns: int
@@ -62,10 +64,10 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """The age of a message: ``total_s`` since it was sent, ``waited_s`` of it in our own queue.
+    """The age of a message: ``total_s`` since it was sent, ``waited_s`` of that in our own queue.
 
-    ``sent_ns`` is when it was sent, by our time of day. It has two possible values until enough
-    messages of its sender have arrived.
+    ``sent_ns`` is when the message was sent, by our time of day in ns. It has two possible values
+    until enough messages of its sender have arrived.
     """
 
     total_s: float
@@ -90,13 +92,13 @@ class Delay:
 
 
 class Transit:
-    """The messages of one topic, from all senders."""
+    """The estimator of the delays of messages on one topic, from all senders."""
 
     def __init__(self) -> None:
         self._senders: list[_Sender] = []
 
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
-        """Return the delay of this message; one above ``longest_s`` is regarded as late.
+        """Return the delay of this message; a delay above ``longest_s`` is regarded as late.
 
         The first message of each sender is taken to have no delay.
         """
@@ -136,11 +138,11 @@ class _Sender:
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
-        """Whether the sender may have sent this number, as numbers only grow."""
+        """Return whether this sender may have sent message ``number``; its numbers only grow."""
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
-        """Return how unlikely it is that this sender sent a message, for comparison with others."""
+        """Return how unlikely it is that this sender sent a message, to compare senders."""
         late_s = min(
             offset.late_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)
@@ -157,7 +159,7 @@ class _Sender:
 
 
 class _Offset:
-    """The offset of one of our clocks from a sender's: the smallest difference of its messages."""
+    """The offset of one of our clocks from a sender's: the smallest of that sender's messages."""
 
     def __init__(self, difference_s: float, at_s: float) -> None:
         self._least_s, self._least_at_s = difference_s, at_s
@@ -170,7 +172,7 @@ class _Offset:
         return difference_s - self._least_s - drift_s
 
     def hear(self, difference_s: float, at_s: float, longest_s: float) -> float:
-        """Learn from a message and return its delay in s."""
+        """Update the offset with a message, and return the message's delay in s."""
         late_s = self.late_s(difference_s, at_s)
         if late_s > longest_s:
             return self._hear_late(difference_s, at_s, late_s)

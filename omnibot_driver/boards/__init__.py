@@ -44,10 +44,10 @@ class Profile(Protocol):
         """Return a board with these checked parameter values."""
 
     def settings(self, values: Mapping[str, Any]) -> object:
-        """Return the new value of ``Board.settings`` after parameters have changed."""
+        """Return the value for ``Board.settings`` that these parameter values give."""
 
     def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
-        """Return a function that opens the real line."""
+        """Return a function that opens the connection to the real board."""
 
     def kinematics(self, values: Mapping[str, Any]) -> Kinematics:
         """Return the kinematics of the wheels, from checked values."""
@@ -67,7 +67,7 @@ def load(name: str) -> Profile:
 
 
 def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transport]:
-    """Return a function that opens the line, or a simulated board if ``port`` is ``sim://``."""
+    """Return a function that opens the board's port, or a simulated board for ``sim://``."""
     port = str(values["port"])
     if not port.lower().startswith("sim://"):
         return profile.opener(values)

@@ -25,7 +25,7 @@ from omnibot_driver.transports.several import Several
 
 SIMULATOR: Final = "omnibot_driver.simulator.fejemis"
 USB_BAUDRATE: Final = 115200
-"""Baud rate that is set; a USB port has a speed of its own, whatever this is."""
+"""Baud rate that is set for the USB ports; their real speed does not depend on it."""
 WHEEL_RADIUS_M, TRACK_M, WHEELBASE_M = 0.0775, 0.4, 0.42
 """Sizes that are used where the user gives none; the manual has the track alone."""
 PARAMETERS: Final = table(
@@ -50,12 +50,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> FejemisBoard:
-    """Return the pair of boards, from which nothing has been received yet."""
+    """Return a new object for both Teensys, with these checked parameter values."""
     return FejemisBoard(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> FejemisSettings:
-    """Return the settings that the wire does not reveal, from checked values."""
+    """Make the board's settings, which its data does not reveal, from checked values."""
     wheels = kinematics(values)
     return FejemisSettings(
         track_m=wheels.track_m,
@@ -71,7 +71,7 @@ def settings(values: Mapping[str, Any]) -> FejemisSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
-    """Return a function that opens both devices; each may be missing alone."""
+    """Return a function that opens both serial devices, even if one of them is missing."""
     return partial(
         Several,
         [partial(SerialPort, values[name], USB_BAUDRATE, name) for name in ("port", "front_port")],

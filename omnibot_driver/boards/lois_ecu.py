@@ -53,12 +53,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> LoisEcuBoard:
-    """Return the board, from which nothing has been received yet."""
+    """Return a new board object with these checked parameter values."""
     return LoisEcuBoard(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
-    """Return the settings that the wire does not reveal, from checked values."""
+    """Make the board's settings, which its data does not reveal, from checked values."""
     wheels = kinematics(values)
     return LoisEcuSettings(
         wheel_radius_m=wheels.wheel_radius_m,

@@ -159,7 +159,7 @@ _RANGES: Final = {
     "long_correction": (0.1, 10.0),
     "feed_forward": (0.0, 1000.0),
 }
-"""Allowed values: a negative gain makes a wheel run away, and the controller divides by Tn."""
+"""Least and largest value by kind: a negative gain is unstable, and Tn is a divisor."""
 
 
 _UNITS: Final = {"tn": "s", "td": "s"}
@@ -182,7 +182,7 @@ def _setting(name: str, what: str) -> Parameter:
 SETTINGS: Final[Mapping[str, Setting]] = {
     f"{setting.name.lower()}": setting for setting in Setting if setting != Setting.RPM_LOW_PASS
 }
-"""Settings that the board keeps, by the name of the parameter."""
+"""Settings that the board stores, by the name of the parameter."""
 _WORDS: Final = {
     "kp": "Gain Kp of the {} wheel's speed controller",
     "tn": "Integral time Tn of the {} wheel's speed controller",

@@ -57,7 +57,7 @@ def table(reading: RecordReading) -> Iterator[Row]:
 
 
 def remark(reading: RecordReading) -> str:
-    """Return a sentence on the limits of the file; empty without such limits."""
+    """Return a sentence on what the file lacks; empty if the file is complete."""
     if reading.record.kind is not RecordKind.RPM:
         return ""
     if reading.count_s is None:
@@ -79,7 +79,7 @@ def file_name(kind: RecordKind, at_s: float) -> str:
 
 
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
-    """Write the file; return False, without a file, if it is not ``wanted`` any more.
+    """Write the record to ``path``; return False, and leave no file, if ``wanted`` returns False.
 
     Raises OSError.
     """

@@ -43,12 +43,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> MartBoard:
-    """Return the board, from which nothing has been received yet."""
+    """Return a new board object with these checked parameter values."""
     return MartBoard(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> MartSettings:
-    """Return the settings that the wire does not reveal, from checked values."""
+    """Make the board's settings, which its data does not reveal, from checked values."""
     wheels = kinematics(values)
     sign = -1 if values["encoder_inverted"] else 1
     return MartSettings(

@@ -42,7 +42,7 @@ NOT_READY: Final = (
 
 
 class MartTopics:
-    """The board's own topics and services; ``publish`` has the publishing functions by type."""
+    """The board's own topics and services; ``publish`` maps types of readings to publishers."""
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values

@@ -23,12 +23,12 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> OmniBot:
-    """Return the board, from which nothing has been received yet."""
+    """Return a new board object with these checked parameter values."""
     return OmniBot(settings(values))
 
 
 def settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """Return the settings that the wire does not reveal, from checked values."""
+    """Make the board's settings, which its data does not reveal, from checked values."""
     return OmniBotSettings(
         baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],

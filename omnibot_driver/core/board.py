@@ -2,8 +2,8 @@
 
 """The interface between the driver and a motor board: what to implement to add a board.
 
-A ``Board`` decodes bytes into readings (measurements in SI units, without a trace of the bytes) and
-encodes requests as packets. It tracks the mode that the board seems to be in, and makes the
+A ``Board`` decodes bytes into readings (measurements in SI units, independent of the encoding)
+and encodes requests as packets. It tracks the mode that the board seems to be in, and makes the
 actuator that encodes motion orders. It does not know ROS or ports, and reads no clock: every
 ``now`` is the host's steady time, in s.
 """
@@ -22,7 +22,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class Mode(Enum):
-    """The mode of the board as its data shows it; the value is its public name."""
+    """The mode of a board, as shown by its data; each value is the mode's public name."""
 
     UNKNOWN = "connecting"
     PAUSED = "paused"
@@ -42,15 +42,15 @@ RateName = Literal["IMU", "Odometry", "Pose"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardFigures:
-    """Counters and states of a board for the diagnostics, over all connections.
+    """Counters and states of a board for the diagnostics, counted over all connections.
 
     * ``rates_hz``: expected rate of each kind of reading that the board sends.
     * ``trouble``: why the robot cannot be driven, as a sentence; empty if it can.
     * ``faults``: how often the framing was lost.
     * ``discarded_bytes``: bytes that belong to no valid frame.
     * ``saturated``: commands that exceeded the range of the board's encoding.
-    * ``odom_hz``: rate at which ``odom`` is published, or None if that is once per odometry
-      reading.
+    * ``odom_hz``: rate at which ``odom`` is published, or None if it is published once per
+      odometry reading.
     * ``own``: figures that only this board has (version, voltage, progress), by readable names.
     """
 
@@ -71,20 +71,20 @@ class ReadingClock(Protocol):
         """Rate error of the board's clock in ppm; positive if it is faster than the host's."""
 
     def restart(self) -> None:
-        """Forget the stream so far: what the board sends next is unrelated to it."""
+        """Forget all readings so far; the times of later readings are unrelated to them."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
         """Return the stamps of all readings of one ``Board.receive`` or ``elapse``, in their order.
 
-        ``now`` is when they arrived; ``edge`` is ``Board.edge`` after that call.
+        ``now`` is when the readings arrived; ``edge`` is ``Board.edge`` after that call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of a reading that arrived alone, as a faster ``stamps``.
+        """Return the stamp of a reading that arrived alone, faster than ``stamps`` does.
 
-        Return None, and change nothing, if the stamp is uncertain; ``stamps`` is then called
+        Return None, and change nothing, if the stamp is uncertain; the caller then calls ``stamps``
         instead.
         """
 
@@ -92,8 +92,8 @@ class ReadingClock(Protocol):
 class Board(Protocol):
     """One kind of board: the translator between its bytes and the rest of the driver.
 
-    Implement every method that has only a docstring here. The others are optional: their default
-    suits a board that has nothing to do there. Requests raise RequestRefused where the present mode
+    Implement every method that has only a docstring here. The others are optional: their defaults
+    suit a board that does not need them. Requests raise RequestRefused where the present mode
     forbids them.
     """
 
@@ -112,9 +112,9 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended among the IMU samples; an input of ``clock``.
+        """Position in the stream of IMU samples at which the last read ended, for ``clock``.
 
-        None while the framing is uncertain, or if the read shows nothing new about it.
+        None while the framing is uncertain, or if the read shows nothing new about the position.
         """
         return None
 
@@ -130,16 +130,16 @@ class Board(Protocol):
 
     @property
     def refusal(self) -> str:
-        """Reason why motion is refused, with a remedy; empty if it is allowed.
+        """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
         A command to stand still is never refused for this reason.
         """
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Return advice on the settings if the specific force at rest, in m/s², is not gravity.
+        """Return advice on the settings if ``gravity_mps2`` differs from gravity; otherwise empty.
 
-        Empty if it is.
+        ``gravity_mps2``: specific force measured at rest, in m/s².
         """
         return ""
 
@@ -154,17 +154,17 @@ class Board(Protocol):
         """
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings that the held bytes still prove, as the line is closed."""
+        """Decode the bytes held back so far, as the line is closed; return their readings."""
         return []
 
     def silence(self) -> None:
         """Forget the mode, as the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
-        """Note that this process stalled: the guard may have sent what stops the board.
+        """Note that this process stalled, so the guard may have sent the stop commands.
 
-        The guard is the process that sends ``last_words`` when this one hangs. Motors other than
-        the wheels, such as a brush, may then be off as well.
+        The guard is the process that sends ``last_words`` when this process hangs. Motors other
+        than the wheels, such as a brush, may then be off as well.
         """
         return
 
@@ -176,15 +176,16 @@ class Board(Protocol):
     def due(self, now: float) -> Packets:
         """Return the packets that are due besides commands: subscriptions, polls, relayed values.
 
-        The caller writes them, so regard them as written. Called when ``wake_at`` has come.
+        The caller writes these packets, so regard them as written. Called when ``wake_at`` has
+        come.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time; called when ``wake_at`` has come.
 
-        If all of them are OdometryReadings or NoticeReadings, the board may still be silent. Any
-        other reading shows that it is alive.
+        If all returned readings are OdometryReadings or NoticeReadings, the board may still be
+        silent. Any other reading shows that the board is alive.
         """
         return []
 
@@ -203,23 +204,23 @@ class Board(Protocol):
     def actuator(self, proof: StopProof) -> Actuator:
         """Return the part that encodes motion orders; called once.
 
-        It reports each stop and each motion that it sends to ``proof``.
+        The actuator reports each stop and each motion that it sends to ``proof``.
         """
 
     def wake(self) -> Packets:
         """Return the packets that wake the board, end a partial command and stop the wheels.
 
-        They must work in any state of the board.
+        These packets must work in any state of the board.
         """
 
     def start(self) -> Packets:
-        """Return the packets that make the board run, whatever its mode is; harmless to repeat."""
+        """Return the packets that make the board run in any mode; they may be sent repeatedly."""
         return NO_PACKETS
 
     def pause(self) -> Packets:
         """Return the packets that pause a running board.
 
-        Raise RequestRefused if a pause toggles and the board is not known to run.
+        Raise RequestRefused if the pause command toggles and the board is not known to run.
         """
         return NO_PACKETS
 
@@ -232,21 +233,21 @@ class Board(Protocol):
         return NO_PACKETS
 
     def stop(self) -> Packets:
-        """Return the packets that stop the robot; they may depend on its present motion."""
+        """Return the packets that stop the robot; they may depend on the robot's motion."""
 
     def emergency_stop(self) -> Packets:
-        """Return only the board's own emergency stop, without a Stop after it."""
+        """Return the board's own emergency stop alone, without Stop; empty if it has none."""
         return NO_PACKETS
 
     def switch_off(self) -> Packets:
-        """Return what else to switch off at the end, after Stop and the ``on_exit`` request."""
+        """Return the last packets, after Stop and ``on_exit``; they switch other devices off."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
         """Return what the guard sends if this process fails: Stop, and emergency stop with Stop.
 
-        The second one is sent while the e-stop is latched. Called after each input and before each
-        output, because what stops a board may depend on its state.
+        The guard sends the second item if the e-stop is latched. Called after each input and before
+        each output, because what stops a board may depend on its state.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

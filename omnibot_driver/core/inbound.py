@@ -2,9 +2,9 @@
 
 """The inbound path: from bytes of the board, or elapsed time, to measurements and events.
 
-``hear`` returns what must be published at once. ``process`` handles the rest: checked
-displacements, mode changes, answers and figures. This module composes the board, the measurements
-and the safety stops. It must not know bytes, nor what is commanded.
+``hear`` returns the measurements that must be published at once. ``process`` handles the rest:
+checked displacements, mode changes, answers and figures. This module connects the board, the
+measurements and the safety stops. It must not know bytes, nor what is commanded.
 """
 
 from omnibot_driver.core.board import Board
@@ -19,7 +19,7 @@ from omnibot_driver.core.safety import SafetyStops
 
 
 class Inbound:
-    """The inbound path of a session: feeds ``measurement`` and ``safety``, adds to ``reporter``."""
+    """The inbound path of a session: passes data to ``measurement``, ``safety``, ``reporter``."""
 
     def __init__(
         self,
@@ -43,11 +43,11 @@ class Inbound:
         self.process(now)
 
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
-        """Return what must be published at once; ``process`` must follow and handles the rest.
+        """Decode bytes, and return the estimates to publish at once; call ``process`` afterwards.
 
-        A command that arrives between both calls is handled as if it came before the bytes. This
-        would be wrong if the bytes change the mode, so this method then does everything at once and
-        returns an empty list. All other requests call ``process`` first.
+        A command that arrives between both calls is handled as if it came before the bytes. That
+        would be wrong if the bytes change the mode. This method then calls ``process`` itself and
+        returns an empty list. Requests other than commands call ``process`` first.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -90,7 +90,10 @@ class Inbound:
         return True
 
     def elapse(self, now: float) -> None:
-        """Process what follows from time alone; predicted odometry does not prove liveness."""
+        """Process readings that follow from time alone, such as predicted odometry.
+
+        OdometryReadings and NoticeReadings among them do not show that the board is alive.
+        """
         before = self._board.mode
         readings = self._board.elapse(now)
         self._reporter.events += self._measurement.hear(readings, now)

@@ -2,8 +2,8 @@
 
 """Long tasks of a board, such as a recording: one at a time.
 
-A task ends when the board or its owner reports so, and fails when its time limit has passed. It
-fails at once if the robot is stopped, the e-stop is latched, or the board is lost. This module
+A task ends when the code that began it reports the end, and fails when its time limit has passed.
+It fails at once if the robot is stopped, the e-stop is latched, or the board is lost. This module
 knows times and sentences, not what a task does.
 """
 
@@ -35,7 +35,8 @@ class LongTask:
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
         """Begin a task that may take ``limit_s``; ``token`` identifies it in the answer.
 
-        ``name`` must read well after "a". Raises RequestRefused if another task is in progress.
+        ``name`` is used in messages after the word "a". Raises RequestRefused if another task is in
+        progress.
         """
         if self.active:
             raise RequestRefused(

@@ -19,15 +19,16 @@ from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Longer than the second between two notices of a paused board: data for this time without a notice
-means that P, or R, was lost."""
+"""Time of uninterrupted data, in s, after which a pause or reset is sent again. A paused board
+sends a notice every second, so data without a notice for this time shows that the command was
+lost."""
 FLOWING_S: Final = 0.1
-"""Longest time between two receptions that is added to the time for which data has flowed; a
-running board sends every 10 ms."""
+"""Longest pause between two receptions, in s, that is added to the time for which data has flowed;
+a running board sends every 10 ms."""
 IN_FLIGHT_S: Final = 0.1
-"""Time for which a command or a notice may still be in flight. A notice that arrives sooner after a
-command may have been sent before the board obeyed. A notice that is followed by data within this
-time does not show that the board is paused."""
+"""Time, in s, for which a command or a notice may still be in flight. A notice that arrives sooner
+after a command may have been sent before the board obeyed. A notice that is followed by data within
+this time does not show that the board is paused."""
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, since one may be lost."""
 ANSWER_WITHIN_S: Final = 4.5
@@ -55,8 +56,8 @@ class Wanted(Enum):
 CLOSED: Final = Phase.CLOSED
 SETTLED: Final = Phase.SETTLED
 PAUSED: Final = Wanted.PAUSED
-"""Constants for the checks of every read: Python 3.11 looks an Enum member up by a function
-call."""
+"""Copies of Enum members for the checks at every read, because Python 3.11 looks each member up by
+a slow function call."""
 
 
 class ModeManager:
@@ -99,7 +100,7 @@ class ModeManager:
         return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
-        """Begin with an open port; the board may be in any state, even within a command."""
+        """Begin with an open port; the board may be in any state, even amid a command."""
         self.output = NO_PACKETS
         self._begin(now)
 
@@ -140,7 +141,10 @@ class ModeManager:
             self._say(self._board.reset(), now)
 
     def heard_paused(self, now: float, *, continues: bool) -> None:
-        """Note that the board is paused; ``continues``: it was before, so it has not restarted."""
+        """Note that the board is paused.
+
+        ``continues``: the board was paused before as well, so it has not restarted.
+        """
         in_flight = now - self._said_at < IN_FLIGHT_S
         running_wanted = self._wanted is Wanted.RUNNING
         if self.phase is Phase.PAUSING:
@@ -157,14 +161,17 @@ class ModeManager:
             self._begin(now)  # it has restarted, and may have missed all commands so far
 
     def heard_reset(self, now: float, remark: str = "") -> None:
-        """Note that the board has obeyed a reset; ``remark``: what is not proved, as a sentence."""
+        """Note that the board has obeyed a reset.
+
+        ``remark``: a sentence that says what is not proved about the reset; empty if all is proved.
+        """
         if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
             self.output += self._board.wake()
             self._settle(remark or "the board was reset")
 
     @property
     def at_rest(self) -> bool:
-        """Whether continuing data needs no reaction."""
+        """Whether further data from a running board needs no reaction."""
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:
@@ -202,7 +209,7 @@ class ModeManager:
             self._say(self._board.start(), now)
 
     def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> Packets:
-        """Return the last packets to the board; they stop it unless it is ``proved`` to stand."""
+        """Return the last packets to the board, without Stop if a standstill is ``proved``."""
         stops = 0 if proved else LAST_STOPS
         return stops * self._board.stop() + self._last_request(on_exit) + self._board.switch_off()
 
@@ -227,8 +234,8 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: a P may be in flight, or the received data be an error. P is then sent only
-        after data has flowed for ``PAUSE_RETRY_S``, because a second P would resume the board.
+        ``with_p``: whether a P may be in flight, or the received data may be wrong. P is then sent
+        only after data has flowed for ``PAUSE_RETRY_S``, because a second P would resume the board.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings: what boards measure, in SI units, without a trace of their bytes."""
+"""Readings: measurements and states that boards report, in SI units."""
 
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -17,8 +17,8 @@ Vector3 = tuple[float, float, float]
 class ImuReading:
     """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
 
-    ``lost``: number of ImuReadings that seem to be missing before this one, judged by those
-    received.
+    ``lost``: number of ImuReadings that seem to be missing before this one, judged by the
+    readings received.
     """
 
     specific_force: Vector3
@@ -30,10 +30,13 @@ class ImuReading:
 class DisplacementReading:
     """Motion during the last ``duration_s``, in m and rad, in the board's earth or body frame.
 
-    * ``duration_s``: None if unknown: the first displacement after a pause holds all motion since.
+    * ``duration_s``: None if unknown, as for the first displacement after a pause, which includes
+      all motion during the pause.
     * ``lost``: number of displacements that are missing before this one.
-    * ``restarted``: the board's counters seem to start again here, and its earth frame with them.
-    * ``measured``: False if the board cannot measure its motion, and this is the commanded one.
+    * ``restarted``: the board's counters, and with them its earth frame, seem to start again with
+      this displacement.
+    * ``measured``: False if the board cannot measure motion; the values are then the commanded
+      ones.
     """
 
     dx_m: float
@@ -47,16 +50,16 @@ class DisplacementReading:
 
 
 NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
-"""Placeholder of a board that is alive, but has not reported its motion."""
+"""Placeholder reading for a board that is alive, but has not reported its motion."""
 
 
 @value(frozen=True, slots=True)
 class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
-    ``lost``: number of displacements that are missing before it although it includes them; the next
-    displacement does not report them again. ``restarted``: the counter of the poses starts again
-    here; that of the displacements did so some time before.
+    ``lost``: number of lost displacements whose motion this pose includes; the next displacement
+    does not report them again. ``restarted``: the counter of the poses starts again with this pose;
+    the counter of the displacements has done so some time before.
     """
 
     x_m: float
@@ -70,7 +73,7 @@ class PoseReading:
 class PausedReading:
     """The board reports that it is paused (or still initialising).
 
-    ``continues``: it reported so just before, so it has not restarted in between.
+    ``continues``: the previous report was the same, so the board has not restarted in between.
     """
 
     continues: bool = False
@@ -83,7 +86,7 @@ class OdometryReading:
     * ``pose``, ``covariance``: in that frame, at ``stamp_s``.
     * ``twist``: in the board's body axes.
     * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s².
-    * ``rolled``: all motion by the wheels since the board object was made, as one tangent.
+    * ``rolled``: sum of all motion by the wheels, in body axes, since the board object was made.
     * ``rolling``: rate of ``rolled``; None while the board does not report it.
     """
 
@@ -148,11 +151,10 @@ Reading = (
 class SampleBoundary:
     """Where a read of the port ended in the stream of IMU samples, for the clock that stamps them.
 
-    The first bytes of a sample show its time better than its delayed last byte, and so does a
-    sample that has not arrived yet.
+    The last byte of a sample may come late. The first bytes of a sample show its time better.
 
-    * ``ahead``: number of samples (0 or 1) received after the last ImuReading.
-    * ``cut``: that sample is incomplete; otherwise it is complete.
+    * ``ahead``: number of samples (0 or 1) received, at least in part, after the last ImuReading.
+    * ``cut``: whether the sample counted in ``ahead`` is incomplete.
     * ``latest_s``: the last sample was due to be complete within this time after the read.
     * ``earliest_s``: the next sample, or the incomplete one, cannot be complete sooner than this
       time after the read.

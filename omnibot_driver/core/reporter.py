@@ -2,7 +2,8 @@
 
 """The reports of a session: events in order, notices when they are due, state and figures.
 
-It reads every part of a session and changes none. Must not know who receives the reports.
+The reporter reads every part of a session and changes none. It must not know who receives the
+reports.
 """
 
 import math
@@ -65,7 +66,7 @@ class Reporter:
         return str((Mode.UNKNOWN if unknown else self._board.mode).value)
 
     def figures(self, now: float) -> SessionFigures:
-        """Return all counters and measurements."""
+        """Return all counters and measurements of the session."""
         return SessionFigures(
             state=self.state,
             tally=replace(self._measurement.tally),
@@ -110,7 +111,7 @@ class Reporter:
             self.notify(self._notices.once(advice))
 
     def unconfirmed(self) -> None:
-        """Report that Stop was repeated for its full time without proof that the robot stands."""
+        """Report that Stop was repeated for its full time without proof of a standstill."""
         measured = self._policy.proof.measured
         blind = not self._board.shows_standstill
         self.notify(self._notices.unconfirmed(self._board.mode, measured=measured, blind=blind))

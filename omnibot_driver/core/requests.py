@@ -10,7 +10,7 @@ OnExit = Literal["stop", "pause", "reset"]
 
 
 class Request(Enum):
-    """A request to a board; the value must read well after "a"."""
+    """A request to a board; the value is used in messages after the word "a"."""
 
     START = "start"
     PAUSE = "pause"

@@ -3,9 +3,10 @@
 """Safety stops: what stops the robot at once, whatever the source of its commands.
 
 A stop follows from the e-stop, from a board that restarts, is paused or falls silent, and from a
-stall of this process. This module composes measurements, commands and requests where one must
-follow from another. Must not know bytes, nor who commands. Two other stops are elsewhere: the
-command policy stops the robot when a command expires, the motion monitor when it does not obey.
+stall of this process. This module connects measurements, commands and requests where one must
+follow from another. It must not know bytes, nor who commands. Two other stops are elsewhere: the
+command policy stops the robot when a command expires, the motion monitor stops a robot
+that does not move as commanded.
 """
 
 from typing import Final
@@ -56,7 +57,7 @@ class SafetyStops:
         """State of the e-stop button by its last event, which may be older than the connection."""
 
     def react(self, measured: list[Measured], now: float) -> None:
-        """React to the measurements, in their order."""
+        """Process the readings in order: report estimates, and stop the robot where necessary."""
         notify, commanding = self._reporter.notify, self._commanding
         for reading, estimates in measured:
             self._reporter.events += estimates
@@ -123,7 +124,7 @@ class SafetyStops:
         self._policy.halt(now)
 
     def tick(self, now: float) -> None:
-        """React to silence: a short one ends the command, a long one makes the mode unknown."""
+        """End the command after a short silence of the board; after a long one forget its mode."""
         if self._policy.current and self._liveness.unheard(now):
             self._policy.halt(now)
         if not self._liveness.fell_silent(now):

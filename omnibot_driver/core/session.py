@@ -101,7 +101,7 @@ class Session:
         return self._measurement.refused
 
     def figures(self, now: float) -> SessionFigures:
-        """Return all counters and measurements."""
+        """Return all counters and measurements of the session."""
         return self._reporter.figures(now)
 
     @property
@@ -126,7 +126,7 @@ class Session:
     # Inputs of the link and of time
 
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
-        """Apply new settings from the next command and frame on; stricter ones stop the robot.
+        """Apply new settings to later commands and frames; stricter limits stop the robot.
 
         ``board``: new settings of the board itself; the current command is encoded again with them.
         """
@@ -165,7 +165,7 @@ class Session:
         self._reporter.overruns = count
 
     def tick(self, now: float) -> None:
-        """Do what is due at this time."""
+        """Process elapsed time, timeouts and retries that are due at ``now``."""
         if now >= self._board.wake_at:
             self.inbound.elapse(now)
         self._safety.tick(now)
@@ -197,7 +197,10 @@ class Session:
         self._command(self._commanding.pose(goal), now)
 
     def request(self, request: Request, token: object, now: float) -> None:
-        """Start, pause or reset; a RequestDone answers later. Raises RequestRefused at once."""
+        """Start, pause or reset the board; a RequestDone answers later.
+
+        Raises RequestRefused at once if that is not possible now.
+        """
         if reason := self._interlocks.why_not_request():
             raise RequestRefused(reason)
         self.inbound.process(now)  # earlier data is not an answer
@@ -208,15 +211,19 @@ class Session:
             self._commands.halt(now)
 
     def calibrate_gyro(self, token: object, now: float) -> None:
-        """Measure the gyro's bias; a RequestDone answers later. Raises RequestRefused at once."""
+        """Measure the gyro's bias; a RequestDone answers later.
+
+        Raises RequestRefused at once if that is not possible now.
+        """
         if reason := self._interlocks.why_not_calibrate():
             raise RequestRefused(reason)
         self._calibration.measure(token, now)
 
     def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Begin a task that takes the board long; a RequestDone answers within ``limit_s``.
+        """Begin a task that takes the board a long time; a RequestDone answers within ``limit_s``.
 
-        ``name`` must read well after "a". Raises RequestRefused at once if it cannot begin.
+        ``name`` is used in messages after the word "a". Raises RequestRefused at once if the task
+        cannot begin.
         """
         if reason := self._interlocks.why_not_task():
             raise RequestRefused(reason)

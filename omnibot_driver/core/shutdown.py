@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The shutdown of a connection: stop, wait until the robot stands, send the last packets.
+"""The shutdown of a connection: stop, wait until the robot is at rest, send the last packets.
 
-Must not know bytes, nor how long the caller waits.
+This module must not know bytes, nor how long the caller waits.
 """
 
 from omnibot_driver.core.board import Board, Mode
@@ -35,18 +35,18 @@ class Shutdown:
 
     @property
     def stands(self) -> bool:
-        """Whether the board has shown that the robot stands, without a motion command since."""
+        """Whether the robot was shown to stand still, without a motion command since then."""
         return self._policy.proof.proved
 
     @property
     def proof_takes_s(self) -> float:
-        """Time to wait for the proof that the robot stands, counted from Stop, in s."""
+        """Time to wait for the proof that the robot stands still, counted from Stop, in s."""
         return self._policy.proof.takes_s
 
     def fall_silent(self, now: float) -> bool:
-        """Stop repeating Stop, and demand a new proof that the robot stands.
+        """Stop repeating Stop, and demand a new proof that the robot stands still.
 
-        The last Stop may have been damaged on the line, and be carried out as something else.
+        The last Stop may have been damaged on the line, and be obeyed as another command.
         Return whether the board can give such a proof.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
@@ -64,7 +64,7 @@ class Shutdown:
         return packets + self._estop_again()
 
     def broken_off(self) -> Packets:
-        """Return what to write after a write that failed half-way, before the port is closed."""
+        """Return the packets to write after a write failed half-way, before the port is closed."""
         return self._board.wake() + self._estop_again()
 
     def _estop_again(self) -> Packets:

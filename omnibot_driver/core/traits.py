@@ -20,12 +20,12 @@ class Traits:
     * ``authorities``: the topics that may command motion.
     * ``requests``: the requests that the board supports.
     * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in its order.
-    * ``unheard_s``: after this time without data the robot is not driven any further.
+    * ``unheard_s``: after this time without data the robot is stopped.
     * ``silence_s``: after this time without data the mode of the board is unknown.
     * ``own_odometry``: OdometryReadings give the robot's pose, and displacements only show whether
       it obeys. Otherwise the driver integrates the displacements.
     * ``stands_after_s``: a robot whose displacements show no motion for this time stands still.
-    * ``unproved_s``: longest time for which Stop is repeated while that is not shown.
+    * ``unproved_s``: longest time for which Stop is repeated while the standstill is not shown.
     * ``baudrate``: whether the line has a baud rate to set.
     * ``calibrates_gyro``: the board subtracts the gyro's bias itself, so its profile offers
       ``~/calibrate_gyro``.

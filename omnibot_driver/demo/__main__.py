@@ -30,7 +30,7 @@ ROW_EVERY_S: Final = 1.0
 
 
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
-    """Drive for ``seconds``, or until ``asked_to_end`` returns True.
+    """Run the demo with this board for ``seconds``, or until ``asked_to_end`` returns True.
 
     Raises ParameterError for an unknown board, DemoFailed, and ImportError without ROS.
     """
@@ -112,9 +112,9 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Return 0 when the time is over or a signal came, 1 on failure, 2 on wrong usage.
+    """Run the demo until its time is over, or SIGINT or SIGTERM.
 
-    The signals are SIGINT and SIGTERM.
+    Returns the exit code: 0 at the end, 1 on failure, 2 on wrong usage.
     """
     parser = argparse.ArgumentParser(
         prog="demo",

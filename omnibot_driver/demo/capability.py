@@ -19,9 +19,9 @@ class Capability:
     """The abilities of a board that drives by ``cmd_vel`` and has ``odom``.
 
     ``title`` is its name in "A simulated ... drives". ``imu``: whether it has ``imu/data_raw``.
-    ``sideways``: whether it can move along y as well. ``ports``: for each line that the simulator
-    prints, the driver's parameter; empty where it follows from another line. ``real``: arguments
-    that a driver needs for the real robot.
+    ``sideways``: whether it can move along y as well. ``ports``: for each address that the
+    simulator prints, the driver's parameter for it; empty where another address implies it.
+    ``real``: arguments that a driver needs for the real robot.
     """
 
     title: str

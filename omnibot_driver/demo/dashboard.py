@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor on the demo's terminal, where it can be shown. Knows processes, no ROS."""
+"""The tool ``monitor`` on the demo's terminal, if possible. Knows processes, no ROS."""
 
 import subprocess
 import sys
@@ -11,9 +11,10 @@ from omnibot_driver.tools.monitor.screen import has_screen
 
 
 class Dashboard:
-    """The tool ``monitor`` on this terminal, where ``possible``, until it is quit or closed.
+    """The tool ``monitor`` on this terminal, until the user quits it or ``close`` is called.
 
-    It shows the driver of this namespace as soon as that driver runs.
+    It shows the driver of this namespace as soon as that driver runs. ``possible``: whether the
+    terminal and the installed libraries allow it.
     """
 
     def __init__(self, namespace: str) -> None:

@@ -79,7 +79,7 @@ Where ROS 2 Jazzy is installed, watch and intervene from another terminal:
 class Drive:
     """The results of a drive: what was driven and received, the pose by odometry, and the true one.
 
-    ``imu_hz`` is None without an IMU. ``real`` has a driver's arguments for the real robot.
+    ``imu_hz`` is None without an IMU. ``real``: the driver's arguments for the real robot.
     """
 
     seconds: float
@@ -94,7 +94,7 @@ class Drive:
 
 
 def report(drive: Drive) -> None:
-    """Print the results and the error of the pose, on a terminal beside a picture of the path."""
+    """Print the results and the error of the pose; on a terminal, also a picture of the path."""
     pose, true_pose = drive.pose, drive.true_pose
     error_mm = 1000 * math.dist((pose.x_m, pose.y_m), (true_pose.x_m, true_pose.y_m))
     error_deg = abs(_degrees(pose.yaw_rad - true_pose.yaw_rad))

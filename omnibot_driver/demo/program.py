@@ -21,7 +21,7 @@ class DemoFailed(Exception):
 class Program:
     """A module of this package as a separate process, which never outlives this one.
 
-    Signals of the terminal do not reach it; it is ended when nothing depends on it any more.
+    Signals of the terminal do not reach this process; ``end`` ends it.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:

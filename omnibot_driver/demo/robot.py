@@ -23,16 +23,16 @@ from omnibot_driver.demo.square import HALT, steer, steer_ahead
 from omnibot_driver.tools.monitor.rates import Rate
 
 REMEMBERED = 1000
-"""Number of poses that are kept: those of some laps."""
+"""Number of path points that are kept; enough for some laps."""
 ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
-"""Rates in Hz that each board exceeds, but a driver that has just started does not."""
+"""Message rates in Hz that every board exceeds once its driver has been running for a while."""
 
 
 class Robot:
-    """The robot as a ROS program has it: topics in, ``cmd_vel`` out.
+    """The robot as a ROS program uses it: subscribed topics in, ``cmd_vel`` out.
 
-    Every other odometry message is answered with a command, which is a halt unless ``driving``.
-    ``imu``: whether it has an IMU. ``sideways``: whether it can drive along its y axis.
+    Every second odometry message is answered with a command, which is a halt unless ``driving``.
+    ``imu``: whether the robot has an IMU. ``sideways``: whether it can drive along its y axis.
     """
 
     def __init__(self, namespace: str, *, imu: bool = True, sideways: bool = True) -> None:
@@ -70,7 +70,7 @@ class Robot:
         self._executor.spin_once(timeout_sec=0.05)
 
     def missing(self) -> list[str]:
-        """Return what a robot needs to drive and this one lacks: topics and the nominal state."""
+        """Return what is missing before the robot can drive: topics, or the nominal state."""
         now_s = time.monotonic()
         topics = [("imu/data_raw", self.imu, ENOUGH_IMU_HZ), ("odom", self.odom, ENOUGH_ODOM_HZ)]
         missing = [
@@ -85,11 +85,11 @@ class Robot:
         return self._node.count_subscribers("odom") > 1
 
     def stands(self) -> bool:
-        """Return whether the last five odometry messages showed a robot at rest, not driving."""
+        """Return whether the last five odometry messages showed an idle robot at rest."""
         return self._stood_for >= 5
 
     def row(self) -> str:
-        """Return the row that shows its present state."""
+        """Return a row of text with the robot's present state, rates, pose and velocities."""
         now_s = time.monotonic()
         imu_hz = None if self.imu is None else round(self.imu.hz(now_s))
         rates_hz = (imu_hz, round(self.odom.hz(now_s)))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steering of the robot around the square: a pure function of its pose."""
+"""Steering of the robot around the square: a pure function of its pose and leg."""
 
 import math
 from typing import Final
@@ -26,9 +26,9 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
     """Return the leg to be on, and the velocity along it in the robot's own axes.
 
-    Legs are counted from 0 without end: +x, +y, -x, -y in the odometry frame. On legs 0, 2, ... the
-    robot turns a quarter to the left, and on legs 1, 3, ... back, while it drives along a straight
-    line.
+    A leg is a side of the square. Legs are counted from 0 without end: +x, +y, -x, -y in the
+    odometry frame. On legs 0, 2, ... the robot turns by 90° to the left, and on legs 1, 3, ...
+    back, while it drives along a straight line.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD
@@ -44,7 +44,7 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the same for a robot that cannot drive sideways: it turns on the spot at corners."""
+    """Return leg and velocity for a robot that cannot drive sideways and turns at corners."""
     leg, along_m, aside_m = _progress(pose, leg)
     course_rad = leg % 4 * QUARTER_RAD - math.atan2(GAIN_PER_S * aside_m, 2 * SPEED_MPS)
     error_rad = math.remainder(course_rad - pose.yaw_rad, math.tau)

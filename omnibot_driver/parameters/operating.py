@@ -16,7 +16,7 @@ BOARD: Final = Parameter(
     "The motor board at the other end of the line.",
     fixed=True,
 )
-"""Its default and its only choice are set by each board's table."""
+"""Parameter that names the board; each board's table sets its default and its only choice."""
 
 LINE: Final = (
     Parameter(

@@ -20,13 +20,13 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 class Parameter:
     """One row of the table. The default's type is the parameter's type.
 
-    ``unset``: without a given value the parameter has none, because the board keeps its own; the
+    ``unset``: the value is None unless one is given, because the board keeps its own value; the
     default then only defines the type. ``low`` and ``high`` are inclusive. ``fixed``: the value is
     given at start, and is read-only afterwards. ``calibrated``: a calibration file may hold the
     value.
 
     The default of a list has at least one item. Range and choices apply to each item. ``length`` is
-    the least and the largest number of items; without it, a value has as many as the default.
+    the least and the largest number of items; without ``length``, it is that of the default.
     """
 
     name: str
@@ -132,7 +132,7 @@ class Parameter:
 
 
 def _converted(value: object, kind: type) -> object:
-    """Convert numbers as YAML does: 1 to a double, 1.0 to an integer."""
+    """Convert an integer such as 1 to a double, or 1.0 to an integer; keep other values."""
     if kind is float and type(value) is int:
         return float(value)
     if kind is int and isinstance(value, float) and value.is_integer():

@@ -71,7 +71,8 @@ DISPENSABLE: Final = frozenset(
         "twist_angular_stddev",
     }
 )
-"""Common parameters that a board may lack; all others are read on each board that they fit."""
+"""Common parameters that a board may lack; the driver reads all others on each board
+whose traits they fit."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
 """Values of ``on_exit`` besides stop, with the request that a board must accept for each."""
 
@@ -100,7 +101,7 @@ class Table:
         return tuple(row.name for row in self.rows if row.calibrated)
 
     def check_all(self, given: Mapping[str, object]) -> dict[str, Value]:
-        """Return every parameter's value, given or default. Raises ParameterError."""
+        """Return all values by name, given or default. Raises ParameterError for a wrong one."""
         for name in given:
             if name not in self.by_name:
                 raise ParameterError(
@@ -124,10 +125,11 @@ def table(
 ) -> Table:
     """Return the table of a board with these traits.
 
-    ``own``: rows of its own, by section. ``without``: those of ``DISPENSABLE`` that have no meaning
-    for it; what its traits do not need is left out anyway. ``changed``: by name, fields of common
-    rows that differ (``{"port": {"default": "udp://"}}``). ``checks``: checks between its values,
-    in addition to those of every board.
+    ``own``: rows that only this board has, by section. ``without``: names in ``DISPENSABLE`` that
+    have no meaning for this board; rows that its traits do not need are left out anyway.
+    ``changed``: fields of common rows that differ, by the row's name
+    (``{"port": {"default": "udp://"}}``). ``checks``: checks between this board's values, in
+    addition to those of every board.
     """
     changes = {
         "on_exit": {
@@ -166,7 +168,7 @@ def table(
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return the name that is most similar to this one, however little."""
+    """Return the one of ``names`` that is most similar to ``name``."""
     import difflib  # only needed for a wrong name, so rarely
 
     return difflib.get_close_matches(name, list(names), n=1, cutoff=0.0)[0]

@@ -142,7 +142,7 @@ def _signals_as_readable() -> Iterator[int]:
 
 
 def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
-    """Answer the console until a signal or ``quit``."""
+    """Execute console commands until a signal arrives or ``quit`` is entered."""
     console = sys.stdin.fileno() if sys.stdin else None
     held = b""
     while True:
@@ -162,7 +162,7 @@ def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
 
 
 def _answer(command: str, served: ServedBoard[SimulatedBoard]) -> bool:
-    """Execute one console command; return False if it ends the program."""
+    """Execute one console command; return False if the command ends the program."""
     if command == "truth":
         with served.lock:
             facts = served.facts

@@ -19,7 +19,7 @@ NONE_MISSING: Final[Mapping[int, str]] = {}
 
 
 class LinesChanged(Exception):
-    """One of several lines is lost or is back; ``missing`` has the lines that are missing now."""
+    """A line of several was lost or reopened; ``Transport.missing`` has those that are missing."""
 
 
 class Transport(Protocol):
@@ -27,14 +27,14 @@ class Transport(Protocol):
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Descriptors by channel, which another process may inherit to write the same bytes.
+        """File descriptors by channel, which another process may inherit to write the same bytes.
 
-        None where it cannot, and None in the place of a missing line.
+        None if descriptors cannot be inherited; None as an item for each missing line.
         """
 
     @property
     def missing(self) -> Mapping[int, str]:
-        """Missing lines of several, by channel: the reason, and what to do."""
+        """Missing lines by channel, each with the reason and what to do; empty if all are open."""
 
     @property
     def ends_with_us(self) -> bool:
@@ -58,7 +58,7 @@ class Transport(Protocol):
         """
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write what is accepted at once, perhaps nothing; return the number of bytes."""
+        """Write what is accepted without waiting, perhaps nothing; return the number of bytes."""
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where it can be ended."""

@@ -116,7 +116,7 @@ class SerialPort:
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write what is accepted at once; return the number of bytes."""
+        """Write what the port accepts without waiting; return the number of bytes written."""
         if self._descriptor is not None:
             with contextlib.suppress(OSError):
                 return os.write(self._descriptor, joined(packets))

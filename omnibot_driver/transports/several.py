@@ -41,7 +41,7 @@ class Several:
         self._retry_s = retry_s
         self._lines = [Line(opener) for opener in openers]
         self._writing = threading.Lock()
-        """Lock for the bytes still to be written, and for the set of present lines."""
+        """Lock for the bytes still to be written, and for the set of open lines."""
         self._ready: list[tuple[int, int]] = []
         self._arrivals = select.poll()
         self._channels: dict[int, int] = {}
@@ -246,9 +246,9 @@ class Line:
         self.trouble, self.waits, self.watched = "", b"", False
 
     def write(self, data: bytes, now: float) -> bool:
-        """Write data after the bytes that wait; return as ``flush`` does.
+        """Write ``data`` after the waiting bytes; return False if some remain for too long.
 
-        A missing line that is still open gets what it has room for.
+        To a missing line that is still open, write only what is accepted at once.
         """
         if self.port is None:
             return True

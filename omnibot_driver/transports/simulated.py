@@ -34,7 +34,7 @@ class SimulatedTransport:
 
     missing = NONE_MISSING
     overruns: int | None = None
-    """None, because memory does not overrun."""
+    """None, because a channel in memory does not have a counter of lost bytes."""
     ends_with_us: bool = True
     """Always True: nothing outside this process receives what is written."""
     descriptors: tuple[int, ...] | None = None
@@ -77,7 +77,7 @@ class SimulatedTransport:
         return sum(len(data) for _, data in packets)
 
     def interrupt(self) -> None:
-        """End a ``read`` that waits in another thread, or else the next one."""
+        """End a ``read`` that waits in another thread, or else the next ``read``."""
         if (board := self._board) is not None:
             board.cancel()
 
@@ -123,7 +123,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
             return channel, bytes(data)
 
     def cancel(self) -> None:
-        """End the ``read`` that waits, or else the next one."""
+        """End the ``read`` that waits in another thread, or else the next ``read``."""
         with self._came:
             self._cancelled = True
             self._came.notify_all()

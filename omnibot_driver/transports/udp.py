@@ -3,8 +3,8 @@
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
 A packet is one datagram. Only datagrams from the address that is written to are received. A host
-that is absent, or on which nothing listens, is silent like a board without power. It may be back
-with the next datagram, so the sockets stay open.
+that is absent, or on which nothing listens, is treated as a silent board and not as an error. The
+host may answer again later, so the sockets stay open.
 """
 
 import contextlib
@@ -61,7 +61,7 @@ class UdpPorts:
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
-        """Return one datagram, or none after a while; the channels take turns."""
+        """Return one datagram and its channel, or ``(0, b"")`` if none arrives in time."""
         if not self._ready:
             self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
         if not self._ready:

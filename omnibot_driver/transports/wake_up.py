@@ -10,14 +10,14 @@ import os
 
 
 class WakeUp:
-    """A pipe whose ``descriptor`` is polled with the others. Raises OSError if none is left."""
+    """A pipe whose ``descriptor`` a thread polls. Raises OSError if a pipe cannot be opened."""
 
     def __init__(self) -> None:
         self.descriptor, self._far = os.pipe()
         os.set_blocking(self._far, False)
 
     def ring(self) -> None:
-        """Wake the thread that waits, or else the next one that does; any thread may call this."""
+        """Wake the waiting thread, or else end its next wait at once; any thread may call this."""
         with contextlib.suppress(OSError):  # full, so a wake-up is pending; or closed
             os.write(self._far, b"\0")
 

@@ -14,16 +14,19 @@ LARGEST_PIECE: Final = 16
 PACKET: Final = 62
 """Size of an FTDI packet in bytes."""
 DRIFT: Final = 1.0002
-"""Rate of the adapter's clock against the board's: in 8 s packets end at all phases of a tick."""
+"""Rate of the adapter's clock against the board's.
+
+Because of it, in 8 s packets end at all phases of a tick.
+"""
 
 Handed = tuple[float, bytes]
-"""Time of delivery, and bytes."""
+"""Time of a delivery in s, and the delivered bytes."""
 Ticks = Iterator[tuple[float, bytes]]
 Adapter = Callable[[Ticks, Random], Iterator[Handed]]
 
 
 def whole(ticks: Ticks, _random: Random) -> Iterator[Handed]:
-    """Deliver all bytes of a tick when it begins, which is faster than any adapter."""
+    """Deliver all bytes of a tick when the tick begins, which is faster than any adapter."""
     yield from ticks
 
 
@@ -38,7 +41,7 @@ def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
 
 
 def packets(timer_s: float) -> Adapter:
-    """Make an adapter like FTDI's: 62 bytes, or what there is when its latency timer expires."""
+    """Make an adapter like FTDI's: it delivers 62 bytes, or fewer at the end of its timer."""
 
     def handed(ticks: Ticks, random: Random) -> Iterator[Handed]:
         held, out = bytearray(), -1.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements of the core alone: decoding against a trusting loop, linearity, and memory."""
+"""Measurements of the core alone: decoding against a loop without checks, linearity, and memory."""
 
 import gc
 import os
@@ -29,7 +29,7 @@ SECONDS = 120.0
 SETTLED = 400
 """Number of ticks before a measurement begins."""
 OTHERS_BYTES = 24 << 20
-"""Bytes that exceed the processor's caches."""
+"""Number of bytes to touch so that the processor's caches hold nothing else."""
 FAULTY = "1 byte in 100 lost"
 STREAMS = (("clean", ""), (FAULTY, FAULTY))
 GOALS = {"clean": 1.5, FAULTY: 4.0}
@@ -38,7 +38,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB
 
 
 def trust(data: bytes) -> list[Frame]:
-    """Decode without checks, as the floor: every header is regarded as one of a full frame."""
+    """Decode without checks, as the floor: whatever looks like a header begins a complete frame."""
     frames: list[Frame] = []
     at, size = 0, len(data) - 15
     while at < size:
@@ -59,7 +59,10 @@ def trust(data: bytes) -> list[Frame]:
 
 
 def trust_all(blocks: Sequence[bytes]) -> int:
-    """Count the frames of all blocks; as in ``decode`` they are not kept, since that costs time."""
+    """Count the frames of all blocks, without keeping them.
+
+    ``decode`` does not keep frames either, since that costs time.
+    """
     return sum(len(trust(block)) for block in blocks)
 
 
@@ -79,7 +82,7 @@ def stream(seconds: float, fault: str = "") -> bytes:
 
 
 def decoding(times: int) -> list[Figure]:
-    """Measure decoding per frame, clean and faulty, in all chunkings."""
+    """Measure the decoding time per frame of clean and faulty streams in all chunkings."""
     figures = []
     for name, fault in STREAMS:
         data = stream(SECONDS if not fault else SECONDS / 4, fault)
@@ -184,7 +187,7 @@ def _us_per_frame(work: object, data: object, frames: int) -> float:
 
 
 def _seconds(work: object, data: object) -> float:
-    """Return the processor time of one call in s, which other processes hardly influence."""
+    """Return the processor time of ``work(data)`` in s, which other processes hardly influence."""
     assert callable(work)
     gc.collect()
     begun = time.process_time()

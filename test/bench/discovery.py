@@ -48,7 +48,7 @@ def processor_s(pids: list[int]) -> float:
 
 
 def measure(number: int, *, served: bool) -> str:
-    """Start the fleet, find it, and watch it at rest; return one row."""
+    """Start this number of drivers, discover them, and watch them at rest; return one row."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT),
@@ -104,7 +104,7 @@ def measure(number: int, *, served: bool) -> str:
 
 
 def main() -> None:
-    """Print the rows."""
+    """Print the rows of the table."""
     for words in (
         ["link", "set", "lo", "up", "multicast", "on"],
         ["route", "add", "224.0.0.0/4", "dev", "lo"],

@@ -37,7 +37,7 @@ from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
 BESIDE: Final = (0, 2, 4)
-"""Numbers of busy processes."""
+"""Numbers of busy processes that run beside the boards, one measurement each."""
 SETTLES_S: Final = 3.0
 TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
 RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
@@ -112,7 +112,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return the delay of each angle in ms, sorted."""
+    """Return the delays of all angles beside this number of busy processes, in ms, sorted."""
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
         tty.setraw(near)
@@ -133,7 +133,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return a table of the delays, alone and beside busy processes; no figure has a floor."""
+    """Return an empty list, because no figure has a floor, and a table of the delays."""
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",
         "",

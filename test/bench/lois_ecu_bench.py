@@ -2,7 +2,7 @@
 
 """The LOIS ECU's part of ``make bench``: processor time of its stream, and latency of commands.
 
-Both boards send the same bytes, recorded from a simulated board at rest.
+Driver and floor each have a board; both boards send the same bytes, recorded at rest.
 """
 
 import bisect
@@ -30,7 +30,7 @@ SETTLING_S: Final = 10.0
 
 
 class Stage:
-    """Boards on pseudo-terminals at ``paths``; ``heard``: their reads of commands, with times."""
+    """Boards on pseudo-terminals at ``paths``; ``heard``: reads of commands, with times."""
 
     def __init__(self, boards: int) -> None:
         board = SimulatedLois(LoisSettings(running=True))
@@ -76,7 +76,7 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return all figures, and no further sections."""
+    """Return all figures that have a floor, and no other sections of the report."""
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:
         parameters = {"board": "lois_ecu", "port": stage.paths[0], "motion_monitor": "false"}

@@ -24,11 +24,14 @@ SETTLING_S: Final = 8.0
 LATEST_S: Final = 0.9
 """Longest latency in s; a later datagram belongs to the next command."""
 LARGE: Final = 3
-"""Smallest change of a speed, in units; smaller changes hold the heading."""
+"""Smallest change of a speed that is a new command, in register units.
+
+Smaller changes hold the heading.
+"""
 
 
 class Heard(SimulatedMart):
-    """A controller that keeps the datagrams of its command port in ``heard``, with steady times."""
+    """A controller that stores the datagrams of its command port in ``heard``, with their times."""
 
     def __init__(self) -> None:
         super().__init__(MartSettings())
@@ -41,7 +44,7 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return all figures, and no further sections."""
+    """Return all figures that have a floor, and no other sections of the report."""
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]
@@ -93,7 +96,10 @@ def _medians(late: list[list[float]], windows: int) -> list[list[float]]:
 def _latencies(
     sent: list[tuple[float, float]], heard: list[tuple[float, bytes]], *, stops: bool
 ) -> list[float]:
-    """Return the time from each speed to its datagram, in µs, where the robot drove before."""
+    """Return the time from each speed command to its datagram, in µs, if the robot drove before.
+
+    ``stops``: whether to measure stops, or else changes of speed.
+    """
     found = []
     for (_, before), (at, speed) in pairwise(sent):
         if not before or (speed == 0.0) is not stops:

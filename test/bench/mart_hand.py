@@ -20,7 +20,7 @@ AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Command each speed to both robots, one right after the other, and time its first message."""
+    """Command each speed to one robot right after the other; note when it was first published."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

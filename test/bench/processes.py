@@ -15,7 +15,7 @@ PATIENCE_S = 5.0
 
 
 class Program:
-    """A program of this directory, or a module, that runs until the end of its ``with``."""
+    """A program of this directory, or a module, that runs as a process until its ``with`` ends."""
 
     def __init__(self, *arguments: str, environment: dict[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
@@ -42,19 +42,19 @@ class Program:
                 pipe.close()
 
     def line(self) -> str:
-        """Return the next line that it prints."""
+        """Return the next line that the process prints."""
         assert self.process.stdout is not None
         return self.process.stdout.readline()
 
     def result(self) -> Any:
-        """Close its input; return its output, decoded from JSON."""
+        """Close the input of the process; return its output, decoded from JSON."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         return json.loads(self.line())
 
     @property
     def busy_s(self) -> float:
-        """Processor time so far, with its threads and children, in s."""
+        """Processor time of the process so far, with its threads and children, in s."""
         return _busy_s(self.process.pid)
 
     @property
@@ -70,7 +70,7 @@ class Program:
 
 
 def driver(path: str, namespace: str, before: str = "", **environment: str) -> Program:
-    """Start the driver on this port as users do; ``before``: Python that is run in it first."""
+    """Start the driver on this port as users do; ``before``: Python to run in its process first."""
     program = ["-m", "omnibot_driver.driver"]
     if before:
         main = "import sys, omnibot_driver.driver as driver; sys.exit(driver.main())"
@@ -80,17 +80,17 @@ def driver(path: str, namespace: str, before: str = "", **environment: str) -> P
 
 
 def floor(what: str, path: str, namespace: str) -> Program:
-    """Start the smallest relay on this port."""
+    """Start the smallest relay on this port; ``what``: its task."""
     return Program(str(HERE / "floor.py"), what, path, namespace)
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start the smallest relay with this step."""
+    """Start the smallest relay on this port with one more step, named ``what``."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 
 def ear(*namespaces: str) -> Program:
-    """Start a subscribing process; it is ready when this returns."""
+    """Start a process that subscribes in these namespaces; it is ready when this returns."""
     program = Program(str(HERE / "ear.py"), *namespaces)
     program.line()
     return program

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Figures compared with a floor: the median of alternating pairs, and their spread."""
+"""Figures of the driver compared with those of a floor, measured in alternation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,10 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """``ours[n]`` and ``floor[n]`` were measured together; ``goal``: upper bound of the ratio."""
+    """A figure of the driver (``ours``) and of the floor, in pairs measured together.
+
+    ``goal``: largest allowed ratio of ours to the floor.
+    """
 
     name: str
     unit: str
@@ -19,7 +22,7 @@ class Figure:
 
     @property
     def ratio(self) -> float:
-        """Median of the pairs' ratios."""
+        """Median over the pairs of the ratio of ours to the floor."""
         return median(self._ratios)
 
     @property
@@ -60,11 +63,11 @@ def alternate(
     times: int,
     goal: float | None = None,
 ) -> Figure:
-    """Measure both in alternation."""
+    """Measure driver and floor alternately; return the figure."""
     pairs = [(ours(), floor()) for _ in range(times)]
     return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
 
 
 def short(value: float) -> str:
-    """Format a number with three digits, or all digits of a large one."""
+    """Format a number with three digits; a large one with all digits before the point."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

@@ -25,7 +25,7 @@ from ratios import Figure, table
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
-"""By the board's name: the module that measures it."""
+"""Module that measures each other board, by the board's name."""
 SCALES = (1, 2, 4, 8)
 
 

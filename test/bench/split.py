@@ -28,7 +28,7 @@ reads = {"count": 0}
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Count the time of this method for its stage, without the stages that it calls."""
+    """Replace a method by one whose time is added to this stage, less the stages that it calls."""
     method: Callable[..., Any] = getattr(owner, name)
 
     def measured(*arguments: Any) -> Any:

@@ -28,9 +28,9 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Upper end of the number, which goes up and down from 0."""
+"""Upper end of the number in IMU frames, which counts up from 0 to it and down again."""
 NOISE = 997
-"""Number of noise readings, used repeatedly."""
+"""Number of different noise readings, which are repeated."""
 
 
 _IMU, _DELTA, _POSE = (struct.Struct(form) for form in (">BB6h", ">BB3hB", ">BB3fB"))
@@ -42,7 +42,7 @@ def number_of(tick: int) -> int:
 
 
 def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
-    """Return what the board sends in this tick: an IMU frame, often a delta, sometimes a pose."""
+    """Return what a board sends in this tick: an IMU frame, often a delta, sometimes a pose."""
     u, v, w, x, y = noise[tick % NOISE]
     data = _IMU.pack(0xFF, 0xFA, number_of(tick), 30 * x, 16384 + 8 * y, u, v, w)
     if tick % 4 == 3:

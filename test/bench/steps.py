@@ -38,7 +38,7 @@ Estimates = list[ImuEstimate | OdometryEstimate]
 
 
 class Relay:
-    """The methods are steps: each publishes what it makes of a read."""
+    """A relay whose methods are the steps: each publishes its result for the bytes of one read."""
 
     def __init__(self, node: Node) -> None:
         values = boards.check_all({})
@@ -61,7 +61,7 @@ class Relay:
         self._begun = b""
 
     def publish(self, estimates: Estimates) -> None:
-        """Publish each message on its topic, with its own stamp."""
+        """Publish each estimate as a message on its topic, with its own timestamp."""
         for estimate in estimates:
             stamp_ns = round(1e9 * estimate.stamp_s)
             if isinstance(estimate, ImuEstimate):
@@ -72,7 +72,7 @@ class Relay:
                 self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def trust(self, data: bytes) -> None:
-        """Publish whatever looks like a frame; only its first word is read."""
+        """Publish whatever looks like a frame, without checks; only its first word is read."""
         estimates: Estimates = []
         at, data = 0, self._begun + data
         while at + 1 < len(data) and at + LENGTHS.get(kind := data[at + 1], 1) <= len(data):
@@ -99,7 +99,7 @@ class Relay:
         self.publish(estimates)
 
     def measure(self, data: bytes) -> None:
-        """Decode, stamp, check and integrate, and let the session react; publish the result."""
+        """Decode, stamp, check and integrate the frames, let the session react, and publish."""
         now = time.monotonic()
         self.publish(list(self._session.inbound.hear(data, now)))
         self._session.inbound.process(now)

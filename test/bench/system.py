@@ -33,12 +33,12 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Goals by adapter: latency (median, 99th percentile), processor time, and cmd_vel."""
+"""Goals by adapter, as ratios to the floor: latency (median, 99th percentile), CPU, and cmd_vel."""
 MPS2_PER_COUNT = 9.80665 / 16384
 
 
 def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
-    """Measure the time from line to callback, processor time, and the driver's memory."""
+    """Measure the latency from line to callback, processor time, and the driver's memory."""
     with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear("ours", "floor"))
         programs = [
@@ -109,7 +109,7 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return rows of a table from the floor to the driver, with one more step in each."""
+    """Return rows of a table that begins with the floor and adds a step per row."""
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear(*names))
@@ -246,7 +246,7 @@ def split(seconds: float) -> list[str]:
 def _latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """Return for each message when its frame was written, and its latency in µs."""
+    """Return for each message when its frame was delivered, and its latency in µs."""
     found = []
     for at, value in heard:
         number = round(value / unit)

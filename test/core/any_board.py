@@ -2,7 +2,7 @@
 
 """Test bench in simulated time: a session with the simulated robot of any board.
 
-The motion rules are tested on it.
+The tests of the motion rules use it.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ TICK_S = 0.01
 
 
 class Robot(Protocol):
-    """The simulated robot at the other end. ``way_m``: length of its true way forward, in m."""
+    """The simulated robot at the other end of the line. ``way_m``: its true way forward, in m."""
 
     @property
     def stands(self) -> bool: ...
@@ -181,16 +181,16 @@ MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }
-"""By name: makes a new board and its robot."""
+"""Functions by name; each makes a new board and its simulated robot."""
 CORE = Path(core.__file__).parent
 BOARDS = [
     name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
 ]
-"""Names of the boards that exist: each board is a folder that can be removed."""
+"""Names of the installed boards: the folder of a board can be removed."""
 
 
 class AnyBench:
-    """A session and a robot. ``hears``, ``speaks``: whether the robot receives, and sends."""
+    """A session and a robot. ``hears``: the robot receives data. ``speaks``: it sends data."""
 
     def __init__(self, board: Board, robot: Robot) -> None:
         self.robot = robot

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots that do not do as commanded, and the time until the driver stops them."""
+"""Robots that do not move as commanded, and the time until the driver stops them."""
 
 import math
 from collections.abc import Callable
@@ -31,7 +31,7 @@ def by_velocity(bench: Bench, command: Triple) -> None:
 
 
 def by_wheels(bench: Bench, command: Triple) -> None:
-    """Command the wheel rates that correspond to this twist."""
+    """Command the wheel rates that correspond to a twist."""
     x, y, yaw = command
     along_x, along_y, turn = math.cos(math.radians(30)) * x, y / 2, 0.143 * yaw
     bench.turn_wheels(
@@ -42,9 +42,9 @@ def by_wheels(bench: Bench, command: Triple) -> None:
 
 
 def goes_astray(bench: Bench, command: Triple) -> bool:
-    """Return whether the robot leaves the range between rest and the command.
+    """Return whether the robot's twist leaves the range between rest and the command.
 
-    It does from a distance of 0.05 m/s or 0.15 rad/s on.
+    The twist leaves the range at a distance of 0.05 m/s or 0.15 rad/s from it.
     """
     truth, (x, y, yaw) = bench.board.truth, command
     square = x * x + y * y
@@ -88,7 +88,7 @@ def on_the_wrong_switch(frame: str, delta_period_s: float = 0.04) -> Bench:
 
 
 def try_to_drive(bench: Bench, seconds: float) -> int:
-    """Command at 10 Hz for ``seconds``, and return how many commands are accepted."""
+    """Command a twist at 10 Hz for ``seconds``, and return how many commands are accepted."""
     taken = 0
     for _ in range(round(seconds / PERIOD_S)):
         try:

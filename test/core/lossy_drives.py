@@ -27,7 +27,7 @@ def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "ear
 
 
 def lose(on: Line, seconds: float, *headers: bytes) -> None:
-    """Lose all bytes, or only frames with these headers, for ``seconds``."""
+    """Lose all bytes for ``seconds``, or only frames with the given headers."""
     on.loses = lambda data, _now: not headers or data[:2] in headers
     on.run(seconds)
     on.loses = loses_nothing
@@ -39,7 +39,7 @@ def settled(on: Line) -> bool:
 
 
 def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Return the time in s, and the difference of poses, between consecutive estimates."""
+    """Return time difference in s, and difference of poses, of consecutive estimates."""
     return [
         (after.stamp_s - before.stamp_s, after.pose - before.pose)
         for before, after in pairwise(estimates)
@@ -47,7 +47,7 @@ def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
 
 
 def attached(settings_: OdometrySettings | None = None) -> Odometry:
-    """Return odometry that has received two poses of a board that stands at zero."""
+    """Return odometry that has received two poses of a board that is at its origin."""
     odometry = Odometry(settings_ or OdometrySettings())
     odometry.settle(PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.0, 0.0, 0.0))

@@ -92,7 +92,7 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to send commands: a paused board could take a letter within one for a request."""
+        """Whether commands are sent: a paused board could take a byte of a command for a letter."""
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property

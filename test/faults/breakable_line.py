@@ -30,17 +30,17 @@ def cut(_data: bytes) -> bytes:
 
 
 def losing(rate: float, random: Random) -> Damage:
-    """Lose single bytes, each with the same probability."""
+    """Return damage that loses single bytes, each with the probability ``rate``."""
     return FaultyLine(LineFaults(lose=rate), random.getrandbits(32)).carry
 
 
 def losing_bursts(rate: float, random: Random) -> Damage:
-    """Lose 1 to 200 bytes in a row, over any number of ticks."""
+    """Return damage that loses 1 to 200 bytes in a row, over any number of ticks."""
     return FaultyLine(LineFaults(burst=rate), random.getrandbits(32)).carry
 
 
 def gaining(rate: float, random: Random) -> Damage:
-    """Insert bytes of any value, anywhere."""
+    """Return damage that inserts bytes of any value, each place with the probability ``rate``."""
 
     def damage(data: bytes) -> bytes:
         out = bytearray()
@@ -54,12 +54,18 @@ def gaining(rate: float, random: Random) -> Damage:
 
 
 def noise(random: Random) -> Damage:
-    """Replace the bytes as a wrong baud rate or a broken wire does: as many as the line carries."""
+    """Return damage that replaces all bytes, as a wrong baud rate or a broken wire does.
+
+    In each tick there are as many random bytes as the line can carry.
+    """
     return lambda _data: random.randbytes(BYTES_PER_TICK)
 
 
 def late(ticks: int) -> Damage:
-    """Hold back all data for this number of ticks, then deliver it at once, as some adapters do."""
+    """Return damage that holds all data back for this number of ticks, as some adapters do.
+
+    After that, it delivers everything at once.
+    """
     held: list[bytes] = []
 
     def damage(data: bytes) -> bytes:
@@ -74,7 +80,7 @@ def late(ticks: int) -> Damage:
 
 
 class BreakableLine:
-    """A board behind a line: ``receive`` and ``advance`` go through the damage.
+    """A board behind a line: ``receive`` and ``advance`` pass through the line and its damage.
 
     ``sent``: every frame and text that the board sent, before damage. ``driven_at``: the last tick
     in which its motors had a command to turn.

@@ -23,11 +23,11 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""Pause of the simulated board from which a report of its silence is right, in s."""
+"""Least pause of the simulated board, in s, that the driver may report as silence."""
 TRANSIT: Final = 200
-"""Number of frames that may be on their way when the comparison begins."""
+"""Number of frames that may be on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""Number of sent frames among which the next message must be; otherwise it was never sent."""
+"""Number of sent frames among which the next message must be found; else it was never sent."""
 
 
 class PiecesTerminal(Terminal):
@@ -51,7 +51,7 @@ class PiecesTerminal(Terminal):
 
 
 class PiecesRig(Rig):
-    """A rig whose board is behind such an adapter."""
+    """A rig whose board is behind a ``PiecesTerminal``."""
 
     def _make_terminal(self) -> Terminal:
         return PiecesTerminal(self.line, self.port)  # type: ignore[arg-type]
@@ -75,7 +75,7 @@ def busy_loops() -> Iterator[None]:
 
 
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
-    """Count the messages that were never sent, and the sent ones that are missing in between.
+    """Return the number of messages that were never sent, and of sent ones missing in between.
 
     At constant speed many frames are equal, so each possible first one is tried.
     """
@@ -96,7 +96,7 @@ def _compared(published: list[Key], sent: list[Key]) -> tuple[int, int]:
 
 
 def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
-    """Drive the robot on a busy computer, and compare all messages with what was sent."""
+    """Drive the robot on a busy computer, and compare all messages with the frames sent."""
     rig.drive()
     before = max(0, len(rig.line.sent) - TRANSIT)
     imu, odom, line = len(rig.imu), len(rig.odom), len(rig.driver.lines)

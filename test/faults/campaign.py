@@ -49,7 +49,7 @@ BUSY: Final = ("busy_computer", ())
 
 @dataclass(slots=True)
 class Row:
-    """One row of the table."""
+    """One row of the table: the result of all runs of one case."""
 
     name: str
     tried: int = 0
@@ -75,7 +75,7 @@ class Outcome:
     wrong: int = 0
 
     def add(self, more: "Outcome") -> None:
-        """Add another result; rows of the same name are combined."""
+        """Add another result; rows of the same name become one."""
         mine = {row.name: row for row in self.rows}
         for row in more.rows:
             if (same := mine.get(row.name)) is None:
@@ -110,14 +110,14 @@ class Campaign(Outcome):
 
     @property
     def outcome(self) -> Outcome:
-        """The part of the result that can be sent to another process."""
+        """The result alone, which can be sent to another process."""
         return Outcome(self.rows, self.complaints, self.published, self.wrong)
 
     def rig(self, kind: type[Rig] = Rig, before: str = "") -> Rig:
         return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), self._kind, before=before)
 
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
-        """Run a case once, and collect its complaints."""
+        """Run a case once and collect its complaints; ``again``: check then that it obeys."""
         try:
             case(rig)
             row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
@@ -136,7 +136,7 @@ class Campaign(Outcome):
             print("the log ends:", *rig.driver.lines[-20:], sep="\n    ", flush=True)
 
     def judge(self, rig: Rig, *, damaged_bytes: bool = True) -> None:
-        """Compare the messages that one rig published with those sent."""
+        """Compare the messages published with one rig with those that its board sent."""
         rig.judge_stream(damaged_bytes)
         self.published += rig.findings.published
         self.wrong += rig.findings.wrong
@@ -147,7 +147,7 @@ class Campaign(Outcome):
         return self.rows[-1]
 
     def faults_of_the_line(self) -> None:
-        """Run each fault of the line in each round, with one driver."""
+        """Run all faults of the line once per round, all with the same driver."""
         self._one_life(Rig, self._kind.cases or survivable, damaged_bytes=True)
 
     def faults_of_the_network(self) -> None:
@@ -157,7 +157,7 @@ class Campaign(Outcome):
         self._one_life(GoalRig, lambda _: GOALS, damaged_bytes=False)
 
     def ending(self, name: str) -> None:
-        """Run one way to end a driver."""
+        """Run the ending of this name in every round, each with a new driver."""
         ending = ENDINGS[name]
         self._ends(f"the driver ends: {name}", ending, before=ending.before)
 
@@ -197,7 +197,10 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Run each kind of stop with losses towards the board, which last until the verdict."""
+        """Run each stop of a driver while its board loses received bytes, for these numbers.
+
+        Bytes are lost until the result is judged.
+        """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
         for number in numbers:
@@ -208,7 +211,7 @@ class Campaign(Outcome):
                     self.run(rows[name], case, rig, again=False)
 
     def busy_computer(self) -> None:
-        """Run on a busy computer with an undamaged line."""
+        """Run on a busy computer with an undamaged line, in every round."""
         row = self.row(
             f"{LOOPS} busy loops for {TICKS // 100} s, the line in pieces of {PIECE} bytes"
         )
@@ -236,7 +239,7 @@ class Campaign(Outcome):
             self.judge(rig)
 
     def soak(self, minutes: float) -> None:
-        """Run random walks with one driver for this time."""
+        """Run random walks with one driver for this number of minutes."""
         row = self.row(f"soak: random walks of {SOAK_STEPS} faults")
         end, seed = time.monotonic() + 60 * minutes, 0
         with self.rig() as rig:
@@ -262,7 +265,7 @@ Piece = tuple[str, tuple[Any, ...]]
 
 
 def losses() -> list[Piece]:
-    """Return the pieces with losses towards the board, each of ten drivers."""
+    """Return the pieces in which bytes to the board are lost; each piece has ten drivers."""
     starts = range(0, LOSSES, LOSSES_AT_ONCE)
     return [
         ("losses", (life, range(start, start + LOSSES_AT_ONCE)))
@@ -301,7 +304,7 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 
 
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
-    """Run the pieces that apply to the board in parallel; the longest come first."""
+    """Run the pieces that apply to the board in parallel, the longest first; return their sum."""
     total, without = Outcome(), load(board).without
     wanted = [piece for piece in wanted if without.isdisjoint((piece[0], *map(str, piece[1])))]
     with get_context("spawn").Pool(processes, maxtasksperchild=1) as pool:

@@ -2,7 +2,8 @@
 
 """Scripted faults: events while a commander drives, and what must follow.
 
-A case gets a rig whose robot is at rest, and leaves it at rest; ``findings`` collects complaints.
+A case is a function of a rig. The robot of the rig is at rest before and after it; ``findings``
+collects complaints.
 """
 
 import signal
@@ -27,11 +28,11 @@ NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
 """Time without a heartbeat after which the guard acts, in s."""
 DAMAGED_S: Final = 1.1
-"""Time after the last command until the robot is at rest on a damaged line, in s, plus grace."""
+"""Time after the last command until the robot is at rest with a damaged line, in s, plus grace."""
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
-"""Log lines of a driver whose board does not receive."""
+"""Pattern of log lines that are right for a driver whose board receives nothing."""
 NEXT_ATTEMPT_S: Final = 2.0
-"""Latest time after which a lost port is opened again, in s."""
+"""Longest time until the driver tries again to open a lost port, in s."""
 SILENCE_S: Final = 1.5
 """Time without data after which the driver regards a board as silent, in s."""
 
@@ -94,7 +95,7 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """Damage bytes for a while, and further until the robot must be at rest."""
+    """Damage bytes for ``seconds``, and from then on until the robot must be at rest."""
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board
@@ -108,7 +109,7 @@ def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, 
 def cut_to_the_board(rig: Rig) -> None:
     """Cut the line to the board: the driver must report it, since Stop cannot arrive.
 
-    The robot must stop when the line is whole again.
+    The robot must stop when the line is repaired.
     """
     rig.drive()
     mark = len(rig.driver.lines)
@@ -146,7 +147,7 @@ def board_reboots(rig: Rig) -> None:
 
 
 def board_reboots_while_somebody_drives_on(rig: Rig) -> None:
-    """Reboot the board while commands continue: none may reach a booting board."""
+    """Reboot the board while commands continue: no command may reach the booting board."""
     rig.drive()
     rig.reboot_board()
     rig.probe.wait_for_state("nominal")
@@ -220,7 +221,7 @@ def estop_by_topic(rig: Rig) -> None:
 
 
 def service_discards_the_command(service: str, rig: Rig) -> None:
-    """Pause and resume, or reset; the robot then waits for a fresh command."""
+    """Pause and resume, or reset, while driving: the robot must then wait for a fresh command."""
     rig.drive()
     rig.hand.leave()
     since = rig.line.tick
@@ -234,7 +235,7 @@ def service_discards_the_command(service: str, rig: Rig) -> None:
 
 
 def random_lines(seed: int) -> dict[str, Case[Rig]]:
-    """Return cases of random damage to bytes, by the seed."""
+    """Return cases that damage bytes at random, by name; ``seed`` determines the damage."""
     random = Random(f"lines {seed}")
     return {
         "1 byte in 100 lost, both ways": partial(
@@ -275,7 +276,7 @@ SERVICES: Final[dict[str, Case[Rig]]] = {
 
 
 def driver_hangs(rig: Rig) -> None:
-    """Stop the process, as swapping may do, while commands continue and queue up."""
+    """Stop the driver's process, as swapping may do, while commands continue and queue up."""
     rig.drive()
     since = rig.line.tick
     rig.driver.process.send_signal(signal.SIGSTOP)
@@ -307,5 +308,5 @@ HOST: Final[dict[str, Case[Rig]]] = {
 
 
 def survivable(seed: int) -> dict[str, Case[Rig]]:
-    """Return all cases that one driver goes through."""
+    """Return all cases that a driver must survive, by name."""
     return {**COMMANDS, **LINE, **TERMINAL, **random_lines(seed), **SERVICES, **HOST, **UNKIND}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commanders: they command the robot until they leave."""
+"""Commanders: they send commands to the robot until they leave."""
 
 import math
 import threading
@@ -17,17 +17,17 @@ FAR_M: Final = 10.0
 
 
 class Hand(Protocol):
-    """Any commander."""
+    """The interface of a commander: a program that sends motion commands."""
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
-        """Command this motion until it leaves or another call follows."""
+        """Command this motion until ``leave`` or another ``hold``; m/s and rad/s."""
 
     def leave(self) -> None:
         """Stop commanding, so that the motion ends."""
 
 
 class Stick:
-    """Publishes a velocity at 20 Hz until it leaves."""
+    """A commander that publishes a velocity at 20 Hz."""
 
     def __init__(self, probe: Probe) -> None:
         self._publisher = probe.publisher(Twist, "cmd_vel")
@@ -57,7 +57,7 @@ class Stick:
 
 
 class Navigator:
-    """Sends a distant goal for each motion; leaves by latching and releasing the e-stop.
+    """A commander that sends a distant goal for each motion.
 
     ``odom``: received odometry; its last message is the newest.
     """
@@ -67,7 +67,7 @@ class Navigator:
         self._goals = probe.publisher(PoseStamped, "cmd_pose")
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
-        """Send a goal in this direction."""
+        """Send a goal far away in this direction."""
         self._probe.wait_for(lambda: self._odom)
         here = self._odom[-1].pose.pose
         yaw = 2 * math.atan2(here.orientation.z, here.orientation.w) + yaw_rate
@@ -79,6 +79,6 @@ class Navigator:
         self._goals.publish(goal)
 
     def leave(self) -> None:
-        """Latch and release the e-stop, since a goal has no timeout."""
+        """Latch and release the e-stop, which discards the goal; a goal has no timeout."""
         for data in (True, False):
             self._probe.call(SetBool, "estop", data=data)

@@ -53,10 +53,11 @@ os.close(terminal)
 
 @dataclass(frozen=True)
 class Ending:
-    """An end of the driver, with its right exit codes; Stop must be the last that is received.
+    """A way to end the driver, and what must follow; the board must receive Stop last.
 
-    ``allowed_s``: how long the robot may drive on. ``late_s``: how much later the process may end.
-    ``full``: the port is full of old commands. ``read``: the next read fails.
+    ``before``: Python that is run first in the driver's process. ``allowed_s``: how long the robot
+    may drive on. ``late_s``: how much later the process may end. ``full``: the port is full of old
+    commands. ``read``: the driver ends at its next read.
     """
 
     end: Callable[[Rig], object]
@@ -68,7 +69,7 @@ class Ending:
     read: bool = False
 
     def __call__(self, rig: Rig) -> None:
-        """End the driver while the robot drives, and check what the robot and the process do."""
+        """End the driver while the robot drives; check robot, exit code and last bytes."""
         rig.drive()
         self.end(rig)
         since = rig.line.tick
@@ -81,7 +82,7 @@ class Ending:
 
 
 def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """Send the signals one after the other."""
+    """Return an ending that sends these signals to the driver, one after the other."""
 
     def end(rig: Rig) -> None:
         for number in numbers:
@@ -91,7 +92,10 @@ def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """Signal the process group without pauses in between, as a shell or a launcher does."""
+    """Return an ending that sends these signals to the driver's process group.
+
+    They follow without pauses, as from a shell or a launcher.
+    """
 
     def end(rig: Rig) -> None:
         for number in numbers:
@@ -101,7 +105,7 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Publish on the topic whose callback ``before`` has replaced."""
+    """Publish on ``estop``, whose callback the ending has replaced by code that ends the driver."""
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))
 
@@ -125,7 +129,7 @@ def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
 
 
 def while_full(end: Callable[[Rig], object], rig: Rig) -> None:
-    """End the driver while its port accepts no data."""
+    """Run ``end`` while the driver's port accepts no data, and wait until the driver has ended."""
     with rig.terminal.full(rig.kind.old_command):
         end(rig)
         rig.driver.process.wait()
@@ -181,7 +185,7 @@ ENDINGS: Final[dict[str, Ending]] = {
 def terminal_is_closed(
     make_rig: Callable[[str], Rig], run: Callable[[Rig, Ending], object]
 ) -> None:
-    """Close the driver's terminal, as when an ssh session drops: SIGHUP, unread output."""
+    """Close the driver's terminal, as when an ssh session drops: SIGHUP, and output is not read."""
     master, slave = pty.openpty()
     with make_rig(TERMINAL.format(os.ttyname(slave))) as rig:
         os.close(slave)

@@ -18,7 +18,7 @@ from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.fejemis import CHANNELS, FejemisSettings, SimulatedFejemis
 
 TICKS: Final = 5
-"""Ticks of the simulated boards in one of the rig's."""
+"""Number of ticks of the simulated boards in one tick of the rig."""
 SILENCE_S: Final = 1.6
 ANGLE_S: Final = 0.2
 MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.MULTILINE)
@@ -27,7 +27,7 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 class Pair:
     """Both Teensys as one board with the ticks of the rig.
 
-    ``received``: lines of motion at the drive board, without sums and padding.
+    ``received``: motion commands at the drive board, without checksums and padding.
     """
 
     channels = CHANNELS
@@ -67,7 +67,10 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 
 
 def half_restarts(half: str) -> Any:
-    """Make a case in which one half restarts; no commands follow, as it obeys again at once."""
+    """Make a case in which one Teensy restarts.
+
+    Commands do not continue, because the Teensy obeys again at once.
+    """
 
     def case(rig: Rig) -> None:
         rig.drive()
@@ -81,7 +84,10 @@ def half_restarts(half: str) -> Any:
 
 
 def half_is(half: str, what: str, allowed_s: float) -> Any:
-    """Make a case with one faulty half; commands have no effect until it works."""
+    """Make a case with the fault ``what`` of one Teensy.
+
+    Commands must have no effect until the Teensy works again.
+    """
 
     def case(rig: Rig) -> None:
         rig.drive()
@@ -118,7 +124,7 @@ CASES: Final = {
 
 
 def cases(seed: int) -> dict[str, Case[Rig]]:
-    """Return the cases of a serial line, and those of each half."""
+    """Return the cases of a serial line, and those of each Teensy, by name."""
     return {**survivable(seed), **CASES}
 
 

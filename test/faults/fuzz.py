@@ -17,14 +17,14 @@ from std_srvs.srv import SetBool, Trigger
 
 CALLS_ONE_IN: Final = 20
 BURST: Final = 10
-"""Number of messages per tick: 1000 a second."""
+"""Number of messages per tick of 10 ms, which makes 1000 a second."""
 HELD: Final = 0.99
-"""Smallest share of readings published during the input and 2 s after it, resets included."""
+"""Least share of the board's readings to publish during the input and 2 s after it."""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
 def odd_float(random: Random) -> float:
-    """Draw any 64-bit float, or one of the usual special values."""
+    """Draw a random 64-bit float, or a usual or special value such as 0, 1e300 or NaN."""
     anything = struct.unpack("d", random.randbytes(8))[0]
     usual = (0.0, -0.0, 0.3, -0.3, 1e-300, 1e300, float("nan"), float("inf"), -float("inf"))
     return random.choice((*usual, anything))
@@ -53,12 +53,12 @@ def pose(random: Random) -> PoseStamped:
 
 
 def no_message(random: Random) -> bytes:
-    """Draw bytes that are an invalid message of any type, or just a valid one."""
+    """Draw random bytes in place of a serialized message; by chance they may be valid."""
     return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
 
 
 def parameters(random: Random) -> SetParameters.Request:
-    """Draw values that may be allowed or not, also of read-only and unknown parameters."""
+    """Draw a request to set a parameter, which may be read-only, unknown, or have a wrong value."""
     value = random.choice(
         (
             ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=odd_float(random)),
@@ -72,7 +72,7 @@ def parameters(random: Random) -> SetParameters.Request:
 
 
 def fuzz(rig: Rig, count: int, random: Random) -> None:
-    """Send messages and calls; check that calls are answered and that the node publishes on."""
+    """Send messages and calls; check that calls are answered and that the node still publishes."""
     probe = rig.probe
     publishers = [
         (probe.publisher(Twist, "cmd_vel"), twist),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Events that discard a goal of position control: until another command the robot is at rest.
+"""Events that discard a goal of position control: the robot then rests until another command.
 
 Each event returns the board's tick from which the robot must be at rest.
 """
@@ -87,7 +87,7 @@ def hang(rig: GoalRig) -> int:
 
 
 def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) -> None:
-    """Check that an event discards the goal, also after everything works again."""
+    """Check that the event discards the goal, so that the robot rests also after the event."""
     rig.drive()
     rig.wait_ticks(50)
     since = event(rig)
@@ -98,7 +98,7 @@ def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) ->
 
 
 def ended(number: signal.Signals, rig: GoalRig) -> None:
-    """Check that the robot stops when the driver ends, with a final Stop of its own or without."""
+    """Check that the robot stops when this signal ends the driver."""
     rig.drive()
     since = rig.line.tick
     rig.driver.process.send_signal(number)

@@ -21,7 +21,7 @@ NONSENSE: Final = (float("nan"), float("inf"), -1.0, 1e12)
 
 
 def two_commanders(rig: Rig) -> None:
-    """Command body velocities and wheel rates in turn, then neither."""
+    """Command body velocities and wheel rates in turn, then stop both commanders."""
     publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
     rig.drive()
     for _ in range(40):
@@ -33,7 +33,7 @@ def two_commanders(rig: Rig) -> None:
 
 
 def other_type(rig: Rig) -> None:
-    """Publish TwistStamped on the same topic: it has no effect, but is reported."""
+    """Publish TwistStamped on the topic of Twist: it has no effect, and the driver reports it."""
     context = rclpy.Context()
     context.init()
     node = Node("other", namespace=rig.driver.namespace, context=context)
@@ -53,7 +53,7 @@ def other_type(rig: Rig) -> None:
 
 
 def flood_of_releases(rig: Rig) -> None:
-    """Publish ``false`` 1000 times a second, while only the service may release the e-stop."""
+    """Publish ``false`` for the e-stop 1000 times a second: only the service may release it."""
     publisher = rig.probe.publisher(Bool, "estop")
     rig.drive()
     rig.probe.call(SetBool, "estop", data=True)
@@ -72,7 +72,7 @@ def flood_of_releases(rig: Rig) -> None:
 def everybody_calls_at_once(rig: Rig) -> None:
     """Call every service from five clients during a reconnection.
 
-    Each call is answered, and none moves the robot.
+    Each call must be answered, and none may move the robot.
     """
     rig.drive()
     rig.hand.leave()
@@ -102,7 +102,7 @@ def everybody_calls_at_once(rig: Rig) -> None:
 
 
 def nonsense_for_parameters(rig: Rig) -> None:
-    """Set every limit and timeout to invalid values; all are refused."""
+    """Set every limit and timeout to invalid values: all must be refused."""
     rig.drive()
     parameters = [
         Parameter(
@@ -124,7 +124,7 @@ def nonsense_for_parameters(rig: Rig) -> None:
 
 
 def limit_lowered(rig: Rig) -> None:
-    """Lower the limit to zero while commands continue."""
+    """Lower the speed limit to zero while commands continue: the robot must stop."""
     rig.drive(yaw_rate=0.0)
     since = rig.line.tick
     for value in (0.0, 0.5):
@@ -138,7 +138,10 @@ def limit_lowered(rig: Rig) -> None:
 
 
 def flood_into_a_full_port(rig: Rig) -> None:
-    """Send 1000 commands a second into a full port, which then accepts data without commands."""
+    """Send 1000 commands a second into a full port.
+
+    When the port accepts data again, no command may follow.
+    """
     publisher = rig.probe.publisher(Twist, "cmd_vel")
     fast = Twist()
     fast.linear.x = 0.4
@@ -155,7 +158,7 @@ def flood_into_a_full_port(rig: Rig) -> None:
 
 
 def guard_killed(rig: Rig) -> None:
-    """Kill the guard; the driver continues with another one."""
+    """Kill the guard process: the driver must start another one and continue."""
     rig.drive()
     (first,) = rig.driver.guards()
     os.kill(first, signal.SIGKILL)

@@ -18,34 +18,34 @@ from rig_board import RigBoard
 from std_srvs.srv import SetBool
 
 GRACE_S: Final = 0.1
-"""Grace that the rig itself adds, in s."""
+"""Additional time that the rig allows for each stop, in s."""
 TIMED_OUT_S: Final = 1.2 - GRACE_S
 ESTOPPED_S: Final = 0.3 - GRACE_S
 ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
-"""Additional time of an end in which the guard has to repeat Stop, in s."""
+"""Additional time for a stop at the end of the driver, as its guard repeats Stop, in s."""
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
-    """Return a rig with a new driver and board; the line is undamaged until the first stop."""
+    """Return a rig with a new driver and board number ``number``, on an undamaged line."""
     return Rig(folder, kind, settings=kind.lossy(number), **more)
 
 
 def lose(rig: Rig, number: int) -> None:
-    """Lose bytes towards the board from now on."""
+    """Begin to lose bytes towards the board; ``number`` selects the loss."""
     rig.line.to_board = losing(RATES[number % len(RATES)], Random(number))
 
 
 def times_out(rig: Rig) -> None:
-    """Let the publisher stop."""
+    """Stop publishing commands: the robot must be at rest after the timeout."""
     rig.drive()
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "timeout", TIMED_OUT_S)
 
 
 def is_estopped(rig: Rig) -> None:
-    """Latch the e-stop while commands continue."""
+    """Latch the e-stop while commands continue: the robot must stop."""
     rig.drive()
     since = rig.line.tick
     answer = rig.probe.call(SetBool, "estop", data=True)
@@ -67,12 +67,12 @@ def _ends(by: signal.Signals, exit_code: int, rig: Rig) -> None:
 
 
 def is_interrupted(rig: Rig) -> None:
-    """Interrupt the driver, as ctrl-C does."""
+    """Interrupt the driver, as ctrl-C does: the robot must stop."""
     _ends(signal.SIGINT, 0, rig)
 
 
 def is_killed(rig: Rig) -> None:
-    """Kill the driver; only its guard is left."""
+    """Kill the driver: its guard must stop the robot."""
     _ends(signal.SIGKILL, -signal.SIGKILL, rig)
 
 
@@ -80,4 +80,4 @@ LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
     {"timeout": times_out, "ctrl-C": is_interrupted},
     {"e-stop": is_estopped, "SIGKILL": is_killed},
 )
-"""Stops of one driver, one after the other; the last one ends it."""
+"""The stops that one driver goes through, by name; the last one ends the driver."""

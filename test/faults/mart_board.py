@@ -2,8 +2,8 @@
 
 """The MART controller's part of the fault campaign: datagrams, no stream, and blocking motions.
 
-It has no line whose bytes break, but a network that loses, doubles and delays complete datagrams.
-Faults beyond what the driver assumes of a network are named as such.
+Its faults are those of a network, which loses, doubles and delays complete datagrams. The names of
+cases say where a fault exceeds what the driver assumes of a network.
 """
 
 import socket
@@ -24,15 +24,15 @@ from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
 TICKS: Final = 5
-"""Ticks of the simulated controller in one of the campaign's."""
+"""Number of ticks of the simulated controller in one tick of the campaign."""
 LATE_S: Final = 0.3
 """Longest delay of a datagram each way, as the parameter ``network_delay`` has it, in s."""
 LOST_STOP_S: Final = 1.2
-"""Delay of the stop if two in a row are lost and the third is as late as possible, in s."""
+"""Delay of a stop in s if two datagrams in a row are lost and the third is as late as possible."""
 BLIND_S: Final = 2.0
-"""Time until a robot that drives without replies is stopped, also if exchanges are slow, in s."""
+"""Time until a robot that drives without replies is stopped, in s, even with slow exchanges."""
 NETWORK_S: Final = 90.0
-"""Patience for a start, which needs a recent proof of the IMU that a bad network delays, in s."""
+"""Longest wait for a start on a bad network, in s, as the IMU must first be seen to work."""
 STRAY_S: Final = 2.5
 """Time until a robot that another program drives is stopped, in s."""
 
@@ -50,7 +50,7 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Empty, since the last bytes are not judged here: polls follow the last stop."""
+        """Always empty: polls follow the last stop, so the last bytes are not judged here."""
         return b""
 
 
@@ -111,7 +111,7 @@ def line_of(rig: Rig) -> Any:
 
 
 def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
-    """Drive until the publisher stops; a bad network may only cost time."""
+    """Stop publishing while the robot drives: a bad network may only delay the rest."""
     line_of(rig).network(faults)
     for twist in ((0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)):
         rig.hand.hold(twist[0], 0.0, twist[1])
@@ -123,7 +123,7 @@ def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
 
 
 def replies_are_cut(rig: Rig) -> None:
-    """Cut the replies of the controller, which still receives the stop."""
+    """Cut the controller's replies; the controller still receives the stop."""
     rig.drive()
     rig.line.from_board = cut
     rig.expect_still(rig.line.tick, "no replies come", BLIND_S)
@@ -133,7 +133,7 @@ def replies_are_cut(rig: Rig) -> None:
 
 
 def network_is_away(seconds: float, rig: Rig) -> None:
-    """Cut the network both ways; the robot drives on until it can be reached again."""
+    """Cut the network both ways; the robot drives on until commands reach it again."""
     rig.drive()
     rig.line.from_board = rig.line.to_board = cut
     rig.wait_ticks(round(seconds / TICK_S))
@@ -144,7 +144,7 @@ def network_is_away(seconds: float, rig: Rig) -> None:
 
 
 def _wait_until_served(rig: Rig) -> None:
-    """Wait until the driver receives replies of the controller again."""
+    """Wait until the driver receives the controller's replies again."""
     rig.wait_ticks(400)
     rig.probe.wait_for_state("nominal")
 
@@ -173,7 +173,7 @@ def estop_through_a_restart(rig: Rig) -> None:
 
 
 def another_client(said: bytes, rig: Rig) -> None:
-    """Let another client start a motion while the robot is at rest."""
+    """Let another client start a motion with this datagram while the robot is at rest."""
     rig.wait_ticks(350)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         port = int(rig.port.rpartition(":")[2])
@@ -183,7 +183,7 @@ def another_client(said: bytes, rig: Rig) -> None:
 
 
 def imu_dies(rig: Rig) -> None:
-    """Let the IMU die while RM drives: the stop then hangs the server, which is restarted."""
+    """Let the IMU die during an RM motion: the stop then hangs the server, which is restarted."""
     rig.drive()
     rig.wait_ticks(100)
     since = rig.line.tick
@@ -211,7 +211,7 @@ ASSUMED: Final = {
 
 
 def cases(_seed: int) -> dict[str, Case[Rig]]:
-    """Return all cases that one driver goes through."""
+    """Return all cases that one driver goes through, by name."""
     mine = {name: case for name, case in COMMANDS.items() if not name.startswith("wheel_cmd")}
     return {
         **mine,
@@ -234,7 +234,7 @@ def cases(_seed: int) -> dict[str, Case[Rig]]:
 
 
 def serve(line: Any, url: str) -> ServedBoard[Any]:
-    """Serve the line at this address, for whose port another server may just have been closed."""
+    """Return a server that offers the controller at the port of this address."""
     return ServedBoard(line, udp_port=int(url.rpartition(":")[2]))
 
 

@@ -26,7 +26,7 @@ def make(settings: BoardSettings | None) -> SimulatedBoard:
 
 
 def sent(board: SimulatedBoard) -> list[bytes]:
-    """Return the frames that were sent in the last tick."""
+    """Return the frames that the board sent in its last tick."""
     frames = []
     for frame in reversed(board.sent):
         if frame.tick != board.tick:
@@ -46,7 +46,7 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Return settings with another receiver for each number, for lossy lines."""
+    """Return settings for a line that loses bytes; each number selects another receiver."""
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)
 

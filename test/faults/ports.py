@@ -32,7 +32,10 @@ DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
 
 
 class Terminal(PtyBoard):
-    """A terminal. ``deaf``: the adapter does not read the kernel's buffer, but still sends."""
+    """A pseudo-terminal.
+
+    ``deaf``: the adapter does not read the kernel's buffer, but still sends.
+    """
 
     deaf = False
 
@@ -51,10 +54,10 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def full(self, old: bytes) -> Iterator[None]:
-        """Keep the kernel's buffer full of these commands, by not reading it.
+        """Keep the kernel's buffer full of these commands, about 20 kB, by not reading them.
 
-        They are about 20 kB. At the end, wait until the board has received them all, which takes
-        longer in a busy process.
+        At the end, wait until the board has received all of them, which takes longer in a busy
+        process.
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -69,7 +72,7 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """Keep the buffer full as ``full`` does, also after the driver has discarded its content.
+        """Keep the buffer full even after the driver has discarded the buffer's content.
 
         The terminal's output is suspended for this.
         """
@@ -115,12 +118,12 @@ class Server(RunningBoard):
             each.close()
 
     def close_from_here(self) -> None:
-        """Close the connection towards the driver; the server still accepts data."""
+        """Close only the direction to the driver; the server still accepts data."""
         with self.lock:
             self._peers[-1].shutdown(socket.SHUT_WR)
 
     def vanish(self) -> None:
-        """Cut the network: packets are dropped in both directions without confirmation."""
+        """Cut the network: packets are dropped in both directions, and neither side is informed."""
         program = ctypes.create_string_buffer(DROP_ALL)
         rule = struct.pack("HP", 1, ctypes.addressof(program))
         self.deaf = self.mute = True

@@ -23,7 +23,7 @@ _GYRO: Final = math.radians(1 / 131)
 
 
 def imu_key(message: Imu) -> Key:
-    """Return the reading in counts of the sensor."""
+    """Return the reading of a message in the sensor's counts."""
     a, w = message.linear_acceleration, message.angular_velocity
     return a.x / _ACCEL, a.y / _ACCEL, a.z / _ACCEL, w.x / _GYRO, w.y / _GYRO, w.z / _GYRO
 
@@ -33,7 +33,10 @@ def sent_imu_key(frame: bytes) -> Key | None:
 
 
 def odom_key(message: Odometry) -> Key | None:
-    """Return speed in 0.1 mm and yaw rate in 0.1 mrad per 40 ms, which no heading changes."""
+    """Return speed in 0.1 mm and yaw rate in 0.1 mrad, each per 40 ms; None if unmeasured.
+
+    Both are independent of the heading.
+    """
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE
     return None if unknown else (math.hypot(v.linear.x, v.linear.y) * 400.0, v.angular.z * 400.0)
@@ -47,7 +50,7 @@ def sent_odom_key(frame: bytes) -> Key | None:
 
 
 def not_sent(published: Iterable[Key | None], sent: Iterable[Key | None]) -> int:
-    """Count the published keys that were not sent, or not in this order."""
+    """Return the number of published keys that were never sent, or not in this order."""
     truth = [key for key in sent if key is not None]
     at = missing = 0
     for key in published:

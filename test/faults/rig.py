@@ -36,19 +36,19 @@ GRACE_S: Final = 0.1
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
-"""Variance of x soon after a reset of odometry, in m²; acceleration in an open gap, in m/s²."""
+"""Variance of x soon after a reset of odometry, in m²; acceleration assumed in a gap, in m/s²."""
 WRONG_ONE_IN: Final = 500
-"""At most one wrong message in this many, while one byte in 100 is lost."""
+"""At most one message in this number may be wrong while one byte in 100 is lost."""
 ENDS_WITHIN_S: Final = 2.0
 
 
 @dataclass(slots=True)
 class Findings:
-    """The complaints, empty if all went well, and figures."""
+    """The complaints about a driver or robot (empty if all is well), and figures."""
 
     complaints: list[str] = field(default_factory=list)
     stood_after_s: list[float] = field(default_factory=list)
-    """How late the robot came to rest each time, in s of the board's clock."""
+    """Time until the robot was at rest after each stop, in s of the board's clock."""
     published: int = 0
     wrong: int = 0
 
@@ -57,7 +57,7 @@ class Findings:
             self.complaints.append(complaint)
 
     def take(self) -> list[str]:
-        """Return the complaints since the last call."""
+        """Remove and return the complaints since the last call."""
         complaints, self.complaints = self.complaints, []
         return complaints
 
@@ -144,7 +144,7 @@ class Rig:
         self._terminal.deaf = False
 
     def unplug(self) -> None:
-        """Remove the terminal; the robot follows its last command."""
+        """Remove the terminal; the robot continues with its last command."""
         if self._terminal is not None:
             self._terminal.__exit__(None, None, None)
             self._terminal, self._unplugged_at_s = None, time.monotonic()
@@ -158,7 +158,7 @@ class Rig:
 
     @property
     def terminal_lock(self) -> Any:
-        """Lock to hold while the board is changed."""
+        """The lock to hold while the board is changed."""
         return self._terminal.lock
 
     def _make_terminal(self) -> Any:
@@ -184,12 +184,12 @@ class Rig:
     # What can be seen
 
     def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
-        """Let the commander drive until it leaves; return when the motors turn."""
+        """Let the commander send this motion; return when the motors turn."""
         self.hand.hold(vx, vy, yaw_rate)
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect motors to run for at most this time from ``since_tick`` on, and not again."""
+        """Expect the motors to be off for good ``allowed_s`` (plus grace) after ``since_tick``."""
         ticks = round((allowed_s + self._grace_s) / TICK_S)
         self.wait_ticks(max(0, since_tick + ticks + 50 - self.line.tick))
         stood_s = max(0, self.line.driven_at - since_tick) * TICK_S
@@ -200,7 +200,7 @@ class Rig:
         )
 
     def wait_for_diagnosis(self, pattern: str) -> None:
-        """Wait for new ``/diagnostics`` with this message for this port."""
+        """Wait for new ``/diagnostics`` of this port with a message that matches ``pattern``."""
         mark = len(self._diagnostics)
         self.probe.wait_for(
             lambda: any(
@@ -211,12 +211,12 @@ class Rig:
         )
 
     def expect_said_once(self, pattern: str, mark: int) -> None:
-        """Expect it exactly once in the lines of the log from number ``mark`` on."""
+        """Expect exactly one match of ``pattern`` in the log from line number ``mark`` on."""
         times = sum(bool(re.search(pattern, line)) for line in self.driver.lines[mark:])
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 
     def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
-        """Expect the driver to end in time with one of these exit codes."""
+        """Expect the driver to end in time, plus ``late_s``, with one of these exit codes."""
         begin_s = time.monotonic()
         try:
             code = self.driver.process.wait(PATIENCE_S)
@@ -230,14 +230,14 @@ class Rig:
         )
 
     def expect_obeys_again(self) -> None:
-        """Expect a fresh command to move the robot, and rest after the commander has left."""
+        """Expect a fresh command to move the robot, and rest after the commander leaves."""
         self.probe.wait_for_state("nominal")
         self.drive()
         self.hand.leave()
         self.expect_still(self.line.tick, "afterwards")
 
     def judge_stream(self, damaged_bytes: bool = False) -> None:
-        """Compare everything published with everything sent, and check odometry by itself.
+        """Expect every published message to have been sent, and odometry to be free of jumps.
 
         ``damaged_bytes``: bytes were lost or added, so that a few wrong frames are allowed.
         """

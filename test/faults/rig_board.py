@@ -15,15 +15,15 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the campaign.
 
-    ``make``: makes a simulated board with these settings, or the usual ones. ``parameters``: those
+    ``make``: makes a simulated board from settings, or with the usual ones. ``parameters``: those
     of the driver. ``ports``: the parameters that name its ports, by the link to the terminal.
 
     ``old_command``: bytes of a motion command. ``stop``: the last bytes received when a driver
     ends. ``opening``: the first bytes on a new line. ``wheels``: number of values in wheel_cmd.
-    ``services``: which of the common ones it has. ``tuning``: parameters that refuse invalid
-    values.
+    ``services``: the common services that its driver has. ``tuning``: parameters that refuse
+    invalid values.
 
-    ``off_within_s``: time from a stop until its motors are off. ``old_bytes_s``: time to receive
+    ``off_within_s``: time from a stop until the motors are off. ``old_bytes_s``: time to receive
     what a full port has kept. ``ends_later_s``: additional time for its driver to end. ``deaf_s``:
     how long it may miss what is sent on a line, so that the next line must repeat it. ``silent_s``:
     its longest usual pause between two transmissions.

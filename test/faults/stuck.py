@@ -16,7 +16,10 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Drive for a while into a stuck adapter; after that it delivers everything it has held."""
+    """Drive while the adapter is stuck for ``seconds``; then it delivers everything it has held.
+
+    ``mute``: data from the board are held too.
+    """
     rig.drive()
     rig.terminal.deaf = True
     if mute:
@@ -29,7 +32,7 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
 
 def full(rig: Rig, *, mute: bool = False) -> None:
-    """Fill the port as after minutes; it accepts data again, with or without reopening."""
+    """Fill the port with old commands; the robot must stop when the port accepts data again."""
     rig.drive()
     mark = len(rig.driver.lines)
     with rig.terminal.full(rig.kind.old_command):
@@ -43,7 +46,7 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full: it is opened repeatedly, the fault is reported once, then all is well."""
+    """Keep the port full: the driver opens it repeatedly and reports it once, then recovers."""
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(rig.kind.old_command):
@@ -56,7 +59,7 @@ def full_for_long(rig: Rig) -> None:
 
 
 def estop_into_a_full_port(rig: Rig) -> None:
-    """Latch the e-stop with a full port: the answer warns, and it later precedes all motion."""
+    """Latch the e-stop with a full port: the reply warns, and no motion precedes it later."""
     rig.drive()
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "no command")
@@ -90,7 +93,10 @@ TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
 
 
 def server_holds(rig: NetworkRig, *, mute: bool) -> None:
-    """Let the server hold data back, and deliver it all at once later."""
+    """Let the server hold data back, and later deliver everything at once.
+
+    ``mute``: data from the board are held too.
+    """
     rig.drive()
     rig.server.deaf, rig.server.mute = True, mute
     rig.wait_ticks(200)
@@ -124,7 +130,7 @@ def server_dies(rig: NetworkRig) -> None:
 
 
 def server_vanishes(rig: NetworkRig) -> None:
-    """Cut the network without closing the connection; the server comes back without it."""
+    """Cut the network without closing the connection; the server returns with no connection."""
     rig.drive()
     before = len(rig.server.accepted_at)
     rig.server.vanish()

@@ -9,7 +9,7 @@ from omnibot_board import BOARD
 
 
 def test_a_busy_computer_loses_no_message(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """There are four busy loops, and the adapter delivers four bytes at a time."""
+    """With four busy loops and pieces of four bytes, everything sent is published in order."""
     with PiecesRig(tmp_path, BOARD, **lenience) as rig:
         is_busy(rig, ticks=500)
         assert not rig.findings.take(), rig.driver.output

@@ -17,7 +17,7 @@ LEFT_OUT = {
     "the kernel's buffer is full, and the board silent",
     "TwistStamped where Twist is expected",
 }
-"""Cases that are similar to others; ``make faults`` has them all."""
+"""Cases left out here because they are similar to others; ``make faults`` runs all cases."""
 CASES = {name: case for name, case in survivable(seed=0).items() if name not in LEFT_OUT}
 
 
@@ -31,27 +31,27 @@ def rig(
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_the_robot_stands_still_and_obeys_again(case: Case[Rig], rig: Rig) -> None:
-    """The robot must be at rest during the fault, and obey again after it."""
+    """During the fault the robot comes to rest; after it, the robot obeys a fresh command."""
     case(rig)
     rig.expect_obeys_again()
     assert not rig.findings.take(), rig.driver.output
 
 
 def test_random_input_from_ros_does_not_disturb_the_node(rig: Rig) -> None:
-    """Of 1000 messages and calls, the calls are answered, and the board's frames are published."""
+    """After 1000 random messages and calls, all calls are answered and readings still published."""
     fuzz(rig, 1000, Random(0))
     rig.expect_obeys_again()
     assert not rig.findings.take(), rig.driver.output
 
 
 def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
-    """This is a short walk; ``make faults`` and ``make soak`` have long ones."""
+    """A short random walk of faults; ``make faults`` and ``make soak`` run long ones."""
     walk(rig, Random(0), steps=6)
     assert not rig.findings.take(), rig.driver.output
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """This holds for all cases together; odometry has not jumped either."""
+    """In all cases of this module together, no message is false and odometry never jumps."""
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()
     assert rig.findings.published > 1000

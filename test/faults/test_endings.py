@@ -22,16 +22,16 @@ SOME = (
     "SIGKILL, the port full",
     "a segmentation fault",
 )
-"""Others are in test_driver_endings and test_driver_guard; ``make faults`` has them all."""
+"""The endings tested here; test_driver_endings and test_driver_guard have others."""
 
 
 @pytest.mark.parametrize("ending", [ENDINGS[name] for name in SOME], ids=SOME)
 def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """Stop comes first, then the port is closed, in time and with the right exit code.
+    """The board receives Stop, then the port is closed, in time and with the right exit code.
 
-    Where the driver cannot do it, its guard stops the robot.
+    Where the driver cannot do this, its guard stops the robot.
     """
     with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
@@ -41,7 +41,7 @@ def test_the_robot_stands_still_however_the_driver_ends(
 def test_a_terminal_that_is_closed_ends_the_driver_in_order(
     tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The driver can no longer print."""
+    """The driver gets SIGHUP and can no longer print, yet it stops the robot and exits in order."""
 
     def run(rig: Rig, end: Ending) -> None:
         end(rig)
@@ -51,7 +51,7 @@ def test_a_terminal_that_is_closed_ends_the_driver_in_order(
 
 
 def test_a_goal_ends_with_the_driver(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """Otherwise the board would continue to the goal."""
+    """The driver must cancel the goal when it ends, as the board would continue to it."""
     with GoalRig(tmp_path, BOARD, **lenience) as rig:
         GOAL_ENDINGS["a goal, and SIGKILL"](rig)
         assert not rig.findings.take(), rig.driver.output

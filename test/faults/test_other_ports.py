@@ -35,7 +35,7 @@ def network(
 def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
     case: Callable[[NetworkRig], None], network: NetworkRig
 ) -> None:
-    """It obeys as soon as bytes arrive again."""
+    """The robot is at rest while the server fails, and obeys as soon as bytes arrive again."""
     case(network)
     network.expect_obeys_again()
     network.judge_stream()
@@ -55,7 +55,7 @@ def goals(
 def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
     case: Callable[[GoalRig], None], goals: GoalRig
 ) -> None:
-    """The old goal is not sent again meanwhile."""
+    """After the event the old goal is never sent again, and a new goal moves the robot."""
     case(goals)
     goals.expect_obeys_again()
     goals.judge_stream()
@@ -63,7 +63,7 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_and_faults_in_random_order(goals: GoalRig) -> None:
-    """This is a short walk; ``make faults`` and ``make soak`` have long ones."""
+    """A short random walk on position control; ``make faults`` and ``make soak`` run long ones."""
     walk(goals, Random(1), steps=3)
     goals.judge_stream(damaged_bytes=True)
     assert not goals.findings.take(), goals.driver.output

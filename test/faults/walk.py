@@ -3,8 +3,8 @@
 """Faults in random order, on top of each other, under random commands.
 
 Every few steps the commander leaves. Then the robot must be at rest in time, return to its state
-and obey a fresh command. The line's faults end before, but losses towards the board last until the
-robot is at rest.
+and obey a fresh command. The line's other faults end before that, but losses towards the board last
+until then.
 """
 
 from collections.abc import Callable
@@ -18,11 +18,14 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""Longest time to rest, in s: a driver that received nothing must first see the motion."""
+"""Longest time until the robot rests, in s.
+
+A driver that received nothing must first see that the robot moves.
+"""
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:
-    """Inject this many faults; return their names in order."""
+    """Inject this number of random faults; return their names in order."""
     names = []
     for step in range(1, steps + 1):
         if random.random() < 0.8:

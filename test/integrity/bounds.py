@@ -17,9 +17,12 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """At most one wrong frame in this many (None: none), and at least this share delivered.
+    """Limits of a parser's errors under one fault of the line.
 
-    A share of 1.0 means all frames after the first two.
+    ``one_wrong_in_visible``, ``one_wrong_in_hidden``: at most one decoded frame in this many is
+    wrong (None: none is), where the chunking keeps the line's idle gaps and where it hides them.
+    ``delivered``: least share of the intact frames to decode; 1.0 means all after the first two of
+    a stream. ``chunkers``: the chunkings to which the limits apply.
     """
 
     one_wrong_in_visible: int | None
@@ -28,16 +31,22 @@ class Bound:
     chunkers: tuple[str, ...] = tuple(CHUNKINGS)
 
     def one_wrong_in(self, chunker: str) -> int | None:
-        """Return the bound, which depends on whether the chunking keeps the line's idle gaps."""
+        """Return N of the limit "at most one wrong frame in N"; None: none may be wrong.
+
+        N depends on whether the chunking keeps the line's idle gaps.
+        """
         visible = chunker in GAPS_VISIBLE
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
-        """Return the share to deliver, which is smaller where adapter and reader are both late."""
+        """Return the least share of intact frames to decode.
+
+        It is smaller where adapter and reader are both late.
+        """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
     def holds(self, chunker: str, score: Score) -> bool:
-        """Return whether the score reaches the bound."""
+        """Return whether a score is within the limits; true for a chunking without limits."""
         if chunker not in self.chunkers:
             return True
         one_in = self.one_wrong_in(chunker)
@@ -60,22 +69,25 @@ BOUNDS: dict[str, Bound] = dict(
         strict=True,
     )
 )
-"""Bounds by fault; for added bytes only with reads that contain what follows a frame."""
+"""Limits by fault; for added bytes, only with chunkings that deliver several frames at once."""
 
 Scores = dict[tuple[str, str, str], Score]
-"""Scores by fault, chunking and scenario."""
+"""Scores by the names of fault, chunking and scenario."""
 
 PLAIN_CHUNKING = "whole bursts"
-"""Chunking for the plain parser, which makes the same of all chunkings."""
+"""Chunking for the plain parser, whose result does not depend on the chunking."""
 
 
 def chunkings(fault: str) -> dict[str, Chunker]:
-    """Return the chunkings for this fault; busy readers are run with some faults only."""
+    """Return the chunkings to test with a fault; late readers are tested with some faults only."""
     return CHUNKINGS if fault in BUSY_FAULTS else CHUNKERS
 
 
 def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
-    """Run one stream with every fault; the driver's parser in every chunking."""
+    """Return a parser's scores on one stream with every fault.
+
+    The driver's parser gets every chunking, the plain parser ``PLAIN_CHUNKING`` only.
+    """
     truth = generate(SCENARIOS[scenario], seed, seconds)
     scores: Scores = {}
     for fault_name, fault in FAULTS.items():
@@ -90,7 +102,7 @@ def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
 
 
 def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
-    """Return the sum over all scenarios."""
+    """Return the sum over all scenarios of the scores of one fault and one chunking."""
     total = Score()
     for scenario in SCENARIOS:
         total += scores[fault, chunker, scenario]
@@ -98,7 +110,7 @@ def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
 
 
 def over_chunkers(scores: Scores, fault: str, scenario: str) -> Score:
-    """Return the sum over all chunkings."""
+    """Return the sum over all chunkings of the scores of one fault and one scenario."""
     total = Score()
     for chunker in chunkings(fault):
         total += scores[fault, chunker, scenario]

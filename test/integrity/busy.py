@@ -14,25 +14,25 @@ from carriage import CHUNKERS, Chunker, Chunks, Received
 from truth import BYTE_S
 
 LATE_SHARE, LATE_S = 0.02, (0.002, 0.030)
-"""Share of late reads, and their delay: as beside a navigation stack on a small computer."""
+"""Share of late reads, and the range of their delay in s, as beside a navigation stack."""
 STALL_SHARE, STALL_S = 0.002, (0.001, 0.300)
 JITTER_S = 60e-6
-"""Mean delay of any wake-up, exponentially distributed."""
+"""Mean delay of any wake-up in s, exponentially distributed."""
 READ_S = 20e-6
-"""Duration of a read that need not wait."""
+"""Duration of a read that does not wait for data, in s."""
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
-"""Share of wake-ups beside busy loops that wait for their turn, and the delay of these."""
+"""Share of wake-ups that wait for their turn beside busy loops, and the range of the delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Share of wake-ups beside busy loops after which the process is slowed, and for how long."""
+"""Share of wake-ups after which busy loops slow the process, and the range of that time in s."""
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
-"""Delay of each read while the process is slowed, within 1 ms; and delay of each piece."""
+"""Ranges of the delay in s while a process is slowed: of a reader's and of an adapter's wake-up."""
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
-"""Number of bytes after which the kind of pieces changes."""
+"""Range of the number of bytes after which another kind of pieces is drawn."""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:
-    """Return the delay of one wake-up, in s."""
+    """Draw the delay of one wake-up, in s."""
     late_s = random.expovariate(1.0 / JITTER_S)
     kind = random.random()
     if kind < LATE_SHARE:
@@ -43,13 +43,16 @@ def delay_s(random: Random, now: float = 0.0) -> float:
 
 
 class Turns:
-    """Wake-ups of a process beside busy loops; ``late_s``: range of delays while it is slowed."""
+    """Wake-ups of a process beside busy loops.
+
+    ``late_s``: range of their delay in s while the process is slowed.
+    """
 
     def __init__(self, late_s: tuple[float, float]) -> None:
         self._late_s, self._steady_s, self._until_s = late_s, 0.0, 0.0
 
     def delay_s(self, random: Random, now: float) -> float:
-        """Return the delay of one wake-up, in s."""
+        """Draw the delay of the wake-up at the time ``now``, in s."""
         late_s = random.expovariate(1.0 / JITTER_S)
         kind = random.random()
         if kind < BEHIND_SHARE:
@@ -66,7 +69,7 @@ def read(
     most: Callable[[], int],
     delay_s: Callable[[Random, float], float] = delay_s,
 ) -> Chunks:
-    """Read what is there, but no more than ``most`` bytes at once."""
+    """Return the chunks of a late reader, which reads up to ``most`` bytes of what has arrived."""
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []
     start, now = 0, 0.0
@@ -82,7 +85,7 @@ def read(
 
 
 def few_bytes_straddling(received: Received, random: Random) -> Chunks:
-    """Deliver 1 to 8 bytes together with the last of them, however long that takes."""
+    """Deliver pieces of 1 to 8 bytes, each when its last byte arrives, even across a pause."""
     chunks, at = [], 0
     while at < len(received.times_s):
         at = min(len(received.times_s), at + random.randint(1, 8))
@@ -91,18 +94,18 @@ def few_bytes_straddling(received: Received, random: Random) -> Chunks:
 
 
 def all_at_once(pieces: Chunker) -> Chunker:
-    """Read everything that is there, however late."""
+    """Return a chunker with these pieces and a late reader, which reads all that has arrived."""
     return lambda received, random: read(pieces(received, random), random, lambda: 1 << 30)
 
 
 def in_parts(received: Received, random: Random) -> Chunks:
-    """Deliver single bytes; read 1 to 8 of those that are there."""
+    """Deliver single bytes; a late reader reads 1 to 8 of those that have arrived."""
     pieces = CHUNKERS["single bytes"](received, random)
     return read(pieces, random, lambda: random.randint(1, 8))
 
 
 def each_by_itself(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes that may each be late, independently of the others."""
+    """Deliver pieces of 1 to 8 bytes; the delay of each is independent of the other delays."""
     chunks: Chunks = []
     now = 0.0
     for end, time in few_bytes_straddling(received, random):
@@ -112,7 +115,7 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Read pieces of every kind, completely or in parts."""
+    """Deliver pieces of changing kinds; a late reader reads all that has arrived, or a part."""
     kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
     pieces: Chunks = []
     at, size = 0, len(received.data)
@@ -134,7 +137,7 @@ def mixed(received: Received, random: Random) -> Chunks:
 
 
 def hogged(received: Received, random: Random) -> Chunks:
-    """Read beside busy loops, from an adapter that delivers 4 bytes at a time."""
+    """Deliver 4 bytes at a time to a reader; busy loops beside delay both adapter and reader."""
     times, pieces, at = received.times_s, [], 0
     adapter, free_s = Turns(SLOW_S), 0.0
     while at < len(times):
@@ -155,4 +158,4 @@ READERS: dict[str, Chunker] = {
     "all mixed": mixed,
 }
 BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
-"""By name: both adapter and reader are late, so times contain hardly any information."""
+"""Chunkings in which adapter and reader are both late, so times contain hardly any information."""

@@ -17,12 +17,12 @@ Fault = Callable[[int, Random], Origins]
 
 
 def none(length: int, random: Random) -> Origins:
-    """A stream without faults that starts anywhere in the first second."""
+    """Return the origins of a stream without faults that starts anywhere in its first second."""
     return list(range(random.randrange(1700), length))
 
 
 def lost(rate: float) -> Fault:
-    """Lose single bytes, each with the same probability."""
+    """Return a fault that loses single bytes, each with the probability ``rate``."""
 
     def fault(length: int, random: Random) -> Origins:
         return [at for at in range(length) if random.random() >= rate]
@@ -31,7 +31,7 @@ def lost(rate: float) -> Fault:
 
 
 def added(rate: float) -> Fault:
-    """Add single bytes of any value, each place with the same probability."""
+    """Return a fault that adds bytes of any value, each place with the probability ``rate``."""
 
     def fault(length: int, random: Random) -> Origins:
         origins: Origins = []
@@ -45,7 +45,7 @@ def added(rate: float) -> Fault:
 
 
 def bursts(rate: float) -> Fault:
-    """Lose 1 to 200 bytes in a row."""
+    """Return a fault that loses 1 to 200 bytes in a row, with the probability ``rate`` per byte."""
 
     def fault(length: int, random: Random) -> Origins:
         origins: Origins = []
@@ -72,13 +72,13 @@ FAULTS: dict[str, Fault] = {
 
 @dataclass(slots=True)
 class Received:
-    """What arrives: bytes, their times in s, and the truth about them."""
+    """The received bytes, their arrival times in s, and the true stream to compare with."""
 
     data: bytes
     times_s: list[float]
     origins: Origins
     intact: list[bool]
-    """For each true frame, whether all its bytes arrived without others among them."""
+    """For each true frame, whether all its bytes arrived without foreign bytes among them."""
     truth: Truth
 
 
@@ -114,9 +114,10 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 
 
 def few_bytes(received: Received, random: Random) -> Chunks:
-    """Deliver one to eight bytes with the last one's arrival time.
+    """Deliver pieces of one to eight bytes, each when its last byte arrives.
 
-    A chunk may span a pause of the line, but a byte is kept for 16 ms at most, as by any adapter.
+    A piece may span a pause of the line, but no byte waits for more than 16 ms, as with any
+    adapter.
     """
     times, chunks, at = received.times_s, [], 0
     while at < len(times):
@@ -135,7 +136,7 @@ def whole_bursts(received: Received, random: Random) -> Chunks:
 
 
 def ftdi(received: Received, random: Random) -> Chunks:
-    """Deliver 62 bytes, or what there is when the latency timer of 16 ms expires."""
+    """Deliver 62 bytes at a time, or fewer when the adapter's latency timer of 16 ms expires."""
     chunks: Chunks = []
     start, timer = 0, received.times_s[0] + random.uniform(0, 0.016)
     for at, time in enumerate(received.times_s):
@@ -153,7 +154,7 @@ def ftdi(received: Received, random: Random) -> Chunks:
 
 
 def blocks(received: Received, random: Random) -> Chunks:
-    """Read 4096 bytes at a time."""
+    """Deliver 4096 bytes at a time."""
     length = len(received.data)
     ends = [*range(4096, length, 4096), length]
     return [(end, received.times_s[end - 1]) for end in ends]

@@ -30,14 +30,17 @@ PERIODS_S = 0.04, 0.1
 
 
 def robot(**settings: object) -> Callable[[float], Bench]:
-    """Return a maker of robots at rest with these settings, by the period of displacements in s."""
+    """Return a function that makes a bench with a resting robot of these settings.
+
+    Its argument is the period of the displacements, in s.
+    """
     return lambda period_s: started(
         BoardSettings(running=True, delta_period_s=period_s, **settings)  # type: ignore[arg-type]
     )
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """Return the time in s from an obeying robot's first deviation until Stop."""
+    """Grip an obeying robot; return the time in s from its first deviation until Stop is sent."""
     if any(command):
         for _ in range(15):
             by_velocity(bench, command)
@@ -59,7 +62,7 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Print one row, over all phases of the displacements."""
+    """Print a row: the shortest and the longest time over all phases of the displacements."""
     shown = []
     for period_s in PERIODS_S:
         times = []

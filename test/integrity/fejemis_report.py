@@ -30,15 +30,15 @@ from omnibot_driver.parameters import session_settings
 from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
 
 TICKS: Final = 5
-"""Ticks of the simulated boards per read."""
+"""Number of ticks of the simulated boards that pass for each read."""
 READ_S: Final = 0.01
 SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""By fault, for lines with sums: the smallest share delivered, and at most one wrong in this many.
+"""By fault, for lines with checksums: the least share of values to deliver, and N.
 
-0 means that none may be wrong.
+At most one value in N is wrong; N = 0 means that none may be wrong.
 """
 ASTRAY_M: Final = 0.02
 
@@ -48,7 +48,11 @@ Stream = list[dict[int, bytes]]
 
 @dataclass(slots=True)
 class Score:
-    """Counts that can be added. ``sent``: undamaged values; ``astray_m``: greatest error."""
+    """Counts of published values, which can be added.
+
+    ``sent``: values that undamaged lines lead to; ``astray_m``: greatest error of the odometry, in
+    m.
+    """
 
     sent: int = 0
     out: int = 0
@@ -73,7 +77,7 @@ def session() -> Session:
 
 
 def drive(sums: bool, seed: int, seconds: float) -> Stream:
-    """Return what a pair of boards sends that is commanded another twist each second."""
+    """Drive a pair of boards, with another twist each second; return what they send."""
     random = Random(f"{sums} {seed}")
     firmware = Firmware(sums=sums)
     pair = SimulatedFejemis(FejemisSettings(firmware=firmware, seed=seed, front_m=4.0))
@@ -124,7 +128,7 @@ def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
 
 
 def value_of(event: Event) -> str | None:
-    """Return the value without its stamp, or None where it is not judged by its value."""
+    """Return the value without its timestamp, or None if the event is not judged by its value."""
     if isinstance(event, ImuEstimate):
         return f"imu {event.specific_force} {event.angular_velocity}"
     if isinstance(event, Extra) and isinstance(event.value, OrientedImuReading):
@@ -135,7 +139,10 @@ def value_of(event: Event) -> str | None:
 
 
 def score(truth: list[Event], found: list[Event]) -> Score:
-    """Compare the published values; each is right as often as it was sent."""
+    """Compare published values with the true ones.
+
+    A value is right at most as often as the truth has it.
+    """
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))
     for value in filter(None, map(value_of, found)):
@@ -156,7 +163,7 @@ def score(truth: list[Event], found: list[Event]) -> Score:
 
 
 def one(seconds: float, job: tuple[bool, int]) -> dict[tuple[str, bool], Score]:
-    """Play one stream with each fault; return the scores."""
+    """Play one stream with each fault; return the scores by fault and by use of checksums."""
     sums, seed = job
     stream = drive(sums, seed, seconds)
     truth = list(play(stream))

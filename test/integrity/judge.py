@@ -13,17 +13,19 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Most intact frames that a parser may leave out in a row, unless the next frame confirms it.
+"""Number of intact frames beyond which the search for a decoded frame needs a confirmation.
 
-A false frame may equal a true one that is sent later.
+A decoded frame is searched for among the next sent ones. If the match is further away than this
+number, the next decoded frame must have a near match behind it: a false frame may equal a true one
+that is sent later.
 """
 REACH_BYTES = 600
-"""Bytes before the end of the delivered ones, or the read itself, within which a frame was sent."""
+"""How far back a decoded frame is searched for, in bytes before the present read."""
 
 
 @dataclass(slots=True)
 class Score:
-    """Counts that can be added."""
+    """Counts of decoded, wrong and intact frames, which can be added."""
 
     out: int = 0
     wrong: int = 0
@@ -96,7 +98,10 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
 
 
 def _place(received: Received, key: Key, at: int, horizon: int) -> int:
-    """Return the index of the next frame with this content sent by then, or else their number."""
+    """Return the index of the next frame with this content that begins at ``horizon`` or before.
+
+    If the content is not found, return the number of all frames.
+    """
     frames = received.truth.frames
     while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:
         at += 1

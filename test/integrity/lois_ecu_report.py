@@ -21,9 +21,9 @@ from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, Si
 
 TICK_S: Final = 0.01
 STEER_EVERY: Final = 100
-"""Number of ticks between two commands."""
+"""Number of the board's ticks between two commands."""
 LEAST_DELIVERED: Final = {"1 byte in 1,000 lost": 0.9, "1 byte in 100 lost": 0.5}
-"""Smallest share of the undamaged line's reports; with these faults none may be wrong."""
+"""By fault, the least share of the undamaged line's reports to decode; none may be wrong."""
 
 Stream = list[bytes]
 """The bytes of each tick."""
@@ -31,7 +31,7 @@ Stream = list[bytes]
 
 @dataclass(slots=True)
 class Score:
-    """Counts that can be added. ``sent``: reports of the undamaged line."""
+    """Counts of decoded reports, which can be added. ``sent``: reports of the undamaged line."""
 
     lines: int = 0
     lines_out: int = 0
@@ -46,7 +46,7 @@ class Score:
 
 
 def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
-    """Return what a board sends that is commanded another pair of wheel speeds each second."""
+    """Drive a board, with another pair of wheel speeds each second; return what the board sends."""
     random = Random(f"{firmware} {seed}")
     board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], seed=seed, running=True))
     stream = []
@@ -64,7 +64,7 @@ def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
 
 
 def decode(stream: Stream) -> tuple[list[Report], int]:
-    """Return all reports, and the number of valid lines."""
+    """Return all reports decoded from a stream, and the number of its valid lines."""
     decoder, found = LoisDecoder(), list[Report]()
     for tick, data in enumerate(stream):
         found += decoder.feed(data, tick * TICK_S)
@@ -73,7 +73,7 @@ def decode(stream: Stream) -> tuple[list[Report], int]:
 
 
 def score(truth: list[Report], lines: int, stream: Stream) -> Score:
-    """Compare in order: a report is right if it was sent after the one before it."""
+    """Count in order: a report is right if the truth has it after the previous right one."""
     found, lines_out = decode(stream)
     result = Score(lines=lines, lines_out=lines_out, sent=len(truth), out=len(found))
     left = Counter(map(repr, truth))

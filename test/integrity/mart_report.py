@@ -48,7 +48,7 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""Squared error over covariance above which a pose is wrong; 1 in 270,000 honest ones is."""
+"""Squared error over covariance above which a pose is wrong; by chance 1 in 270,000 is above."""
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
 STAY_M: Final = 1.5
@@ -57,7 +57,7 @@ STAY_M: Final = 1.5
 
 @dataclass(slots=True)
 class Score:
-    """Counts that can be added. ``published``, ``wrong``: by kind of message."""
+    """Numbers of messages by kind: ``published``, and of these ``wrong``. Scores can be added."""
 
     published: Counter[str] = field(default_factory=Counter)
     wrong: Counter[str] = field(default_factory=Counter)
@@ -72,13 +72,13 @@ class Score:
         return self
 
     def count(self, kind: str, wrong: bool) -> None:
-        """Count one message."""
+        """Count one message of this kind as published, and if ``wrong`` also as wrong."""
         self.published[kind] += 1
         self.wrong[kind] += wrong
 
 
 def drive(name: str, seconds: float, seed: int) -> Score:
-    """Drive random motions, with rests between in which sonars and battery are polled."""
+    """Drive random motions with rests, in which sonars and battery are polled; return the score."""
     random, score = Random(f"{name} {seed}"), Score()
     bench = MartBench(
         FIRMWARES[seed % 3],
@@ -106,7 +106,7 @@ def drive(name: str, seconds: float, seed: int) -> Score:
 
 
 def _watch(bench: MartBench, score: Score) -> None:
-    """Run for 0.1 s, and judge everything published; a pose is judged when it is published."""
+    """Run for 0.1 s, and compare each message with the truth at the moment of its publication."""
     seen = len(bench.events)
     for _ in range(10):
         told = len(bench.odometry)
@@ -125,9 +125,9 @@ def _watch(bench: MartBench, score: Score) -> None:
 
 
 def _is_true(sonar: SonarReading, x_m: float, yaw_rad: float) -> bool:
-    """Return whether a range agrees with the one wall, across x in front of the start.
+    """Return whether a sonar's range agrees with the true distance to the only wall.
 
-    The sonar reports -1 from 254 inches on.
+    The wall lies across x in front of the start. The sonar reports -1 from 254 inches on.
     """
     ahead = math.cos(yaw_rad) if sonar.side == "front" else -math.cos(yaw_rad)
     sees_m = (FRONT_M - x_m) / ahead if ahead > 0.3 else math.inf

@@ -26,16 +26,18 @@ OTHERWISE: Final = {
     "mart": "datagrams arrive whole or not at all; tests search all that their losses can do",
     "fejemis": "outbound lines carry a sum; tests try all losses of one and two characters",
 }
-"""Boards for which nothing is measured here, and why."""
+"""Boards that this report does not measure, with the reason."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Largest share of time under uncommanded set points, and one long one in this many frames.
+    """Limits of the errors that damage to the driver's writes may cause.
 
-    Stray motion, false letters and robots that still drive are never allowed. With ``overdue``
-    False, robots that still drive are only reported.
+    ``share``: largest share of driving time with an uncommanded set point. ``long_in``: at most one
+    frame in this many leads to an uncommanded set point longer than 2 ms. Stray motion, false
+    letters and robots that still drive are never allowed. With ``overdue`` False, robots that still
+    drive are only reported.
     """
 
     share: float = 1.0
@@ -43,7 +45,7 @@ class Bound:
     overdue: bool = True
 
     def missed(self, score: Score) -> list[str]:
-        """Return the names of the figures beyond the bound."""
+        """Return the names of the figures that are beyond their limits."""
         found = {
             "stray motion": score.strayed,
             "false letters": score.false_letters,
@@ -64,22 +66,22 @@ BOUNDS: Final[dict[str, Bound]] = dict(
 
 
 def none_of(count: int, total: int) -> str:
-    """Format a count that should be zero."""
+    """Format a count that should be zero, out of ``total``; bold if it is not."""
     return f"0 of {total:,}" if not count else f"**{count:,} of {total:,}**"
 
 
 def one_in(count: int, total: int) -> str:
-    """Format a rate."""
+    """Format a rate as "1 in N"."""
     return f"1 in {total / count:,.0f}" if count else f"0 of {total:,}"
 
 
 def ms(seconds: float) -> str:
-    """Format a time."""
+    """Format a time in ms; a dash for zero."""
     return f"{1e3 * seconds:.1f} ms" if seconds else "-"
 
 
 def share(score: Score) -> str:
-    """Format the share of time with an uncommanded set point."""
+    """Format the share of driving time with an uncommanded set point, in percent."""
     return f"{score.uncommanded_s / score.driving_s:.3%}" if score.driving_s else "-"
 
 

@@ -20,7 +20,7 @@ from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 
 @dataclass(frozen=True, slots=True)
 class Understood:
-    """What a receiver makes of an undamaged course of writes.
+    """What a receiver understands of an undamaged course of writes.
 
     held: the bytes that it holds after each write. alike_until: for each write, the next one of
     another kind (motion, or none), or the next that is not understood exactly as sent.
@@ -31,7 +31,7 @@ class Understood:
 
 
 class Course:
-    """What the driver writes in a scene while the board shows this ``history``."""
+    """What the driver writes in a scene while the board's visible state follows ``history``."""
 
     def __init__(self, scene: Scene, history: History | None = None) -> None:
         self.scene = scene
@@ -44,7 +44,7 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return the course to continue with if the board shows something else from a tick on."""
+        """Return the course to continue with if the board shows ``shown`` from this tick on."""
         other = self._others.get((tick, shown))
         if other is None:
             other = Course(self.scene, (*self.history, (tick, shown)))
@@ -52,14 +52,14 @@ class Course:
         return other
 
     def understood(self, kind: ReceiverKind) -> Understood:
-        """Return what a receiver of this kind, awake and running, makes of the course."""
+        """Return what an awake receiver of this kind understands of the course."""
         if kind not in self._understood:
             self._understood[kind] = self._understand(kind)
         return self._understood[kind]
 
     @property
     def rehearsals(self) -> int:
-        """How often the session was run, for this course and for those that branch off."""
+        """Number of runs of the session for this course and for all courses that branch off."""
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

@@ -33,12 +33,12 @@ STANDS: Final = Shown("running", False)
 CLOCK_S: Final = 1e-6
 """Time between two readings of the clock, in s."""
 History = tuple[tuple[int, Shown], ...]
-"""What the board shows, each from a tick on."""
+"""States that the board shows, each with the tick from which it shows that state."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Bytes that the driver or its guard writes; ``flush``: drop waiting bytes first."""
+    """Bytes that the driver or its guard writes; ``flush``: discard waiting bytes first."""
 
     at_s: float
     data: bytes
@@ -47,7 +47,7 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """An action on the session at a time; it may be refused."""
+    """A call on the session at a time in s; the session may refuse the call."""
 
     at_s: float
     do: Callable[[Session, float], object]
@@ -82,7 +82,7 @@ class Scene:
 
 
 def rehearse(scene: Scene, history: History) -> list[Write]:
-    """Return everything that is written from the opening of the port on."""
+    """Run the session through a scene; return everything written since the port was opened."""
     return [write for write in _Rehearsal(scene).run(dict(history)) if write.at_s < scene.ends_s]
 
 
@@ -106,7 +106,7 @@ class _Rehearsal:
         self._writes: list[Write] = []
 
     def run(self, changes: dict[int, Shown]) -> list[Write]:
-        """Run the events in the order of their times; return the writes."""
+        """Run the events in the order of their times; return everything that was written."""
         scene, session = self._scene, self._session
         wishes = iter(sorted(scene.wishes, key=lambda wish: wish.at_s))
         wish = next(wishes, None)
@@ -172,7 +172,7 @@ class _Rehearsal:
             self._writes += self._guards_words(now)
 
     def _guards_words(self, now: float) -> Iterator[Write]:
-        """Yield what the guard writes; it drops waiting bytes first."""
+        """Yield the guard's writes; the first one discards bytes still waiting to be sent."""
         words = joined(self._bot.stop())
         if self._session.estop_active:
             words = joined(self._bot.emergency_stop()) + words

@@ -66,7 +66,8 @@ class Score:
 class Judge:
     """Follows every write, and everything that is understood, in the order of time.
 
-    ``driving``: whether the driver drives. ``calm``: whether no set point is stray or uncommanded.
+    ``driving``: whether the driver drives. ``calm``: whether the set point in force, if any, is
+    neither stray nor uncommanded.
     """
 
     def __init__(self) -> None:
@@ -80,7 +81,7 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Whether no uncommanded set point is in force."""
+        """Whether the set point in force, if any, is neither stray nor uncommanded."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":
@@ -91,7 +92,7 @@ class Judge:
         return other
 
     def write(self, items: Items, start_s: float) -> None:
-        """Note that the first byte of a write is on the line."""
+        """Note that the first byte of this write is on the line at ``start_s``."""
         self._before, self._now = self._now, items
         if items.moves and not self.driving:
             self.driving = True
@@ -105,13 +106,16 @@ class Judge:
                 self.driving = False
 
     def writes(self, last: Items, frames: int) -> None:
-        """Note writes that arrived undamaged, all of the kind before; ``last``: the newest."""
+        """Note several undamaged writes of the same kind as the previous one.
+
+        ``last``: the newest of them; ``frames``: their number of control frames.
+        """
         self._now = last
         if self.driving:
             self.score.frames += frames
 
     def frame(self, frame: ControlFrame, at_s: float) -> str:
-        """Note that a control frame is understood; return what is wrong with it, if anything."""
+        """Note that the board understands a control frame; return the name of its error, or ""."""
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)
             if not is_motion(frame.mode, frame.values):
@@ -132,7 +136,10 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """Note a letter that acts; ``at``: its byte's place in the write, negative if added."""
+        """Note that a letter acts; return the name of the error, or "".
+
+        ``at``: place of its byte in the write; negative if the line added the byte.
+        """
         if at < 0:
             self.score.added_letters += 1
         elif (at, letter) not in self._now.letters:
@@ -141,7 +148,7 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the set point in force."""
+        """End the set point in force, and count the time for which it was stray or uncommanded."""
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s
@@ -155,7 +162,7 @@ class Judge:
             self._stray_from_s = None
 
     def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
-        """End the scene; return whether the robot is driven, or was when it had to be at rest."""
+        """End the scene; return whether the robot drives, or drove when it had to be at rest."""
         self.no_setpoint(at_s)
         if self.driving:
             self.score.driving_s += at_s - self._driving_from_s

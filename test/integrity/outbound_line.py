@@ -14,7 +14,7 @@ ADDED: Final = -1
 CHANGED: Final = -2
 
 Arrival = tuple[int, float, int]
-"""A byte, its position in its write, and its origin.
+"""An arrived byte: its value, its position in its write, and its origin.
 
 The position is a fraction for an added byte; the origin is the position, ADDED or CHANGED.
 """
@@ -22,7 +22,7 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 
 
 class Line(Protocol):
-    """One line in one trial. ``whole``: bytes that arrive undamaged before the next fault.
+    """The damaged line of one trial. ``whole``: number of bytes that arrive before the next fault.
 
     For a write of at most ``whole`` bytes the caller only subtracts its length from ``whole``;
     other writes go through ``carry``.
@@ -31,7 +31,7 @@ class Line(Protocol):
     whole: int
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """Return the bytes of a write that arrive."""
+        """Return the bytes that arrive when ``data`` is written."""
 
 
 Fault = Callable[[Random], Line]
@@ -45,7 +45,7 @@ class SingleFaults:
         self._rate, self._change, self._random = rate, change, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """Return the bytes of a write that arrive."""
+        """Return the bytes that arrive when ``data`` is written."""
         arrivals: list[Arrival] = []
         at = 0
         while at < len(data):
@@ -70,14 +70,14 @@ class NoFaults:
 
 
 class Bursts:
-    """A line that loses bytes in a row, also over several writes, with bursts at ``rate``."""
+    """A line that loses bytes in a row, even across writes; bursts begin with ``rate`` per byte."""
 
     def __init__(self, rate: float, longest: int, random: Random) -> None:
         self.whole, self._gone = _gap(rate, random), 0
         self._rate, self._longest, self._random = rate, longest, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """Return the bytes of a write that arrive."""
+        """Return the bytes that arrive when ``data`` is written."""
         arrivals: list[Arrival] = []
         for at, byte in enumerate(data):
             if self.whole:
@@ -91,7 +91,7 @@ class Bursts:
 
 
 def _gap(rate: float, random: Random) -> int:
-    """Return the number of bytes before the next fault."""
+    """Draw the number of bytes before the next fault."""
     return int(math.log(1.0 - random.random()) / math.log(1.0 - rate))
 
 
@@ -100,7 +100,7 @@ def _lost(_data: bytes, _at: int, _random: Random) -> list[Arrival]:
 
 
 def _added(data: bytes, at: int, random: Random) -> list[Arrival]:
-    """Add a byte, before this one or after it."""
+    """Return this byte and an additional one of any value, before it or after it."""
     own, value = (data[at], at, at), random.randrange(256)
     if random.random() < 0.5:
         return [(value, at - 0.5, ADDED), own]

@@ -22,13 +22,16 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts per scene, each with other commands."""
 NEEDED: Final = 10_000
-"""Number of trials per receiver and loss; at 1 byte in 100, per scene of ``HURRIES``."""
+"""Number of trials per receiver and loss.
+
+At 1 byte in 100 lost, each scene of ``HURRIES`` has this number.
+"""
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
 DRIVEN: Final = 150
-"""Number of trials of each script without an ending."""
+"""Number of trials of each script that only drives, so that no stop is judged."""
 OTHER_TRIALS: Final = 20
-"""Number of trials of each script with faults that have no bound."""
+"""Number of trials of each script with a fault for which the report has no limits."""
 ESTOPS: Final = ("e-stop", "goal", "exit")
 """Scenes in which it matters whether the board obeys an emergency stop."""
 BOOTS: Final = ("reset", "exit")
@@ -44,7 +47,7 @@ Scores = dict[tuple[str, str, str], Score]
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """Yield the boards that a receiver's name means in a scene, each with the scene's name."""
+    """Yield a scene's boards with this receiver, each with the name under which it is scored."""
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
         name = f"{scene}, {'obeyed' if obeys else 'ignored'}" if scene == "e-stop" else scene
@@ -54,7 +57,7 @@ def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
 
 
 def trials(fault: str, scene: str) -> int:
-    """Return the number of trials of each script, for each receiver."""
+    """Return the number of trials of each script with this fault, for each receiver."""
     if fault in OTHERS:
         return OTHER_TRIALS
     if scene in DRIVES:
@@ -66,7 +69,7 @@ def trials(fault: str, scene: str) -> int:
 def one(
     share: float, job: tuple[str, int], faults: Mapping[str, Fault] = FAULTS
 ) -> tuple[Scores, int]:
-    """Run one script on all boards with each fault; return scores and the number of rehearsals."""
+    """Run one script with each fault on all boards; return scores and number of session runs."""
     scene, seed = job
     course = Course(SCENES[scene](Random(f"{scene} {seed}")))
     scores: Scores = {}
@@ -86,13 +89,16 @@ def one(
 
 
 def add(total: Scores, more: Scores) -> None:
-    """Add these counts to the total."""
+    """Add the scores ``more`` to ``total``, name by name."""
     for key, score in more.items():
         total.setdefault(key, Score()).__iadd__(score)
 
 
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
-    """Return the sum over one scene, or all with an ending, and over one receiver, or all."""
+    """Return the sum of the scores of one fault.
+
+    Empty ``receiver``: over all receivers; empty ``scene``: over all scenes that end a drive.
+    """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():
         wanted = its_scene == scene if scene else its_scene not in DRIVES
@@ -102,7 +108,7 @@ def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> 
 
 
 def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
-    """Run all trials on all processors; return scores and the number of rehearsals."""
+    """Run all trials on all processors; return scores and the number of session runs."""
     jobs = [(scene, seed) for seed in range(scripts) for scene in kinds]
     total: Scores = {}
     rehearsals = 0

@@ -22,7 +22,7 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""Time at which the board runs and the driver knows it, in s."""
+"""Time from which the board runs and the driver knows that, in s."""
 STANDS_S: Final = 1.2
 """Time after the last command until the robot must be at rest, in s."""
 ESTOPPED_S: Final = 0.3
@@ -91,7 +91,7 @@ def _estop(active: bool) -> Callable[[Session, float], object]:
 
 
 def _common(random: Random) -> dict[str, object]:
-    """Draw settings that sometimes have an acceleration limit, another scale or another rate."""
+    """Draw a scene's settings: sometimes an acceleration limit, another scale or another rate."""
     return {
         "linear_scale": random.choice((70.0, 70.0, 233.0)),
         "rate_hz": random.choice((20.0, 20.0, 20.0, 10.0, 50.0)),
@@ -102,7 +102,7 @@ def _common(random: Random) -> dict[str, object]:
 
 
 def _leg(random: Random) -> tuple[list[Command], float]:
-    """Return a drive and the time of its last command."""
+    """Return the commands of one drive, and the time of the last one in s."""
     wishes = driving(random, FROM_S, FROM_S + random.uniform(0.1, 0.35), by_wheels=_wheels(random))
     return wishes, wishes[-1].at_s
 
@@ -112,7 +112,7 @@ def _wheels(random: Random) -> bool:
 
 
 def drive(rate_hz: float, random: Random) -> Scene:
-    """Only drive, by commands at this rate; the end is not examined."""
+    """Make a scene that only drives, with commands at this rate; its end is not judged."""
     wishes = driving(random, FROM_S, FROM_S + DRIVE_S, rate_hz=rate_hz)
     return Scene(
         kind=f"drive {rate_hz:g}",
@@ -124,7 +124,7 @@ def drive(rate_hz: float, random: Random) -> Scene:
 
 
 def timeout(random: Random) -> Scene:
-    """The commander stops sending."""
+    """Make a scene in which the commander stops sending, so that the command times out."""
     wishes, last_s = _leg(random)
     return Scene(
         kind="timeout",
@@ -136,7 +136,7 @@ def timeout(random: Random) -> Scene:
 
 
 def zero(random: Random) -> Scene:
-    """The commander sends zero, and repeats it for a while."""
+    """Make a scene in which the commander sends zero, and repeats it for a while."""
     wishes, last_s = _leg(random)
     gap_s = 1.0 / random.choice(RATES_HZ)
     until_s, now = last_s + random.uniform(0.0, 0.7), last_s + gap_s
@@ -153,7 +153,7 @@ def zero(random: Random) -> Scene:
 
 
 def switch(random: Random) -> Scene:
-    """Commands on cmd_vel and wheel_cmd alternate, with and without pauses."""
+    """Make a scene in which cmd_vel and wheel_cmd alternate, with and without pauses."""
     wishes: list[Command] = []
     now = FROM_S
     for number in range(4):
@@ -171,7 +171,7 @@ def switch(random: Random) -> Scene:
 
 
 def pause(random: Random) -> Scene:
-    """``~/pause`` is called while the robot drives or is at rest."""
+    """Make a scene in which ``~/pause`` is called while the robot drives or is at rest."""
     wishes, last_s = _leg(random) if random.random() < 0.7 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
     wishes.append(Command(asked_s, _request(Request.PAUSE)))
@@ -185,7 +185,7 @@ def pause(random: Random) -> Scene:
 
 
 def start(random: Random) -> Scene:
-    """``~/start`` is called for a paused board; a drive and its end follow."""
+    """Make a scene in which ``~/start`` is called for a paused board, then a drive and its end."""
     wishes = [Command(FROM_S, _request(Request.START))]
     wishes += driving(random, FROM_S + 0.05, FROM_S + random.uniform(0.3, 1.0))
     last_s = wishes[-1].at_s
@@ -201,7 +201,7 @@ def start(random: Random) -> Scene:
 
 
 def reset(random: Random) -> Scene:
-    """``~/reset`` is called while it drives; the board comes back and is started."""
+    """Make a scene with ``~/reset`` during a drive; the board reboots and is started."""
     wishes, last_s = _leg(random) if random.random() < 0.8 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
     wishes.append(Command(asked_s, _request(Request.RESET)))
@@ -215,7 +215,7 @@ def reset(random: Random) -> Scene:
 
 
 def estop(random: Random) -> Scene:
-    """The e-stop is latched while the commander still sends, and released."""
+    """Make a scene in which the e-stop is latched while commands continue, and then released."""
     begin_s = FROM_S + random.uniform(0.1, 0.3)
     released_s = begin_s + random.uniform(0.35, 0.6)
     wishes = driving(random, FROM_S, released_s - 0.05, by_wheels=_wheels(random))
@@ -230,7 +230,7 @@ def estop(random: Random) -> Scene:
 
 
 def goal(random: Random) -> Scene:
-    """Two goal poses are sent; they do not expire, so the e-stop ends the drive."""
+    """Make a scene with two goal poses; goals do not expire, so the e-stop ends the drive."""
     wishes = [
         Command(at_s, partial(_go, Pose(*(random.uniform(-9, 9) for _ in range(3)))))
         for at_s in (FROM_S, FROM_S + random.uniform(0.05, 0.4), FROM_S + 0.4)
@@ -248,7 +248,7 @@ def goal(random: Random) -> Scene:
 
 
 def leave(random: Random) -> Scene:
-    """The driver ends while the commander sends, sometimes with its e-stop latched."""
+    """Make a scene in which the driver ends while commands continue, also with a latched e-stop."""
     exits_s = FROM_S + random.uniform(0.1, 0.3)
     wishes = driving(random, FROM_S, exits_s, by_wheels=_wheels(random))
     if random.random() < 0.2:
@@ -265,7 +265,7 @@ def leave(random: Random) -> Scene:
 
 
 def kill(random: Random) -> Scene:
-    """The driver is killed, sometimes within a write; then its guard writes."""
+    """Make a scene in which the driver is killed, also within a write; then its guard writes."""
     wishes, last_s = _leg(random)
     killed_s = last_s + random.choice((0.0002, 0.0007, 0.0012, 0.002, 0.02))
     if random.random() < 0.2:

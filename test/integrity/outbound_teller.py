@@ -29,7 +29,7 @@ ACCEL_Z = -16384
 
 
 class Shown(NamedTuple):
-    """The state of a board as far as it is visible from what it sends."""
+    """The part of a board's state that can be seen in what the board sends."""
 
     mode: str
     """Mode: booting, paused or running."""
@@ -37,7 +37,7 @@ class Shown(NamedTuple):
 
 
 class Teller:
-    """One board. ``linear_scale``: LSB per m/s; ``goals``: whether its switch is on position."""
+    """A minimal board. ``linear_scale``: LSB per m/s; ``goals``: whether it drives to goals."""
 
     def __init__(self, linear_scale: float, *, goals: bool = False) -> None:
         self._linear_scale, self._goals = linear_scale, goals
@@ -46,7 +46,7 @@ class Teller:
         self._reboot()
 
     def moves_as(self, mode: int, words: Triple) -> None:
-        """Set the twist of the robot while it moves, from a motion frame."""
+        """Set the twist of the moving robot to what this motion frame commands."""
         a, b, c = words
         if self._goals:
             way = math.atan2(1e-3 * b - self._y, 1e-3 * a - self._x) - self._yaw
@@ -63,7 +63,7 @@ class Teller:
             )
 
     def step(self, shown: Shown) -> bytes:
-        """Let one tick pass; return what is sent in it."""
+        """Advance by one tick in this state; return the bytes that the board sends."""
         if shown.mode != self._mode:
             if self._mode == "booting":
                 self._reboot()

@@ -50,7 +50,7 @@ class BoardKind:
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """What was wrong in a trial, and the last writes before: time, bytes sent, bytes received."""
+    """An error in a trial, and the last writes before it: time, bytes sent, bytes received."""
 
     scene: str
     board: BoardKind
@@ -70,7 +70,7 @@ class Example:
 
 
 class Trial:
-    """A trial, played until its faults begin; each ``run`` continues from there.
+    """A trial whose undamaged beginning is played once; each ``run`` continues from there.
 
     ``memo`` may be shared by trials of one kind of receiver.
     """
@@ -95,7 +95,7 @@ class Trial:
         self._play(course.scene.faults_from_s)
 
     def run(self, line: Line, score: Score) -> None:
-        """Run to the end of the scene on this line, and add the counts to the score."""
+        """Play the rest of the scene on this line, and add the counts to the score."""
         trial = copy(self)
         trial._line, trial._judge = line, self._judge.branch(score)
         trial._receiver, trial._last = copy(self._receiver), self._last.copy()
@@ -129,7 +129,7 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip writes that arrive undamaged and change nothing, except for the last of them."""
+        """Skip writes that arrive undamaged and change nothing, up to the last of them."""
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1
         if (
@@ -158,7 +158,7 @@ class Trial:
         self._number = last
 
     def _write(self) -> None:
-        """Carry the next write over the line."""
+        """Send the next write over the line, and process what arrives."""
         course, number = self._course, self._number
         write, items = course.writes[number], course.items[number]
         self._number += 1
@@ -272,7 +272,7 @@ class Trial:
         self._changed(at_s)
 
     def _changed(self, at_s: float) -> None:
-        """Note that what the board shows may have changed."""
+        """Note that the visible state of the board may have changed."""
         if self._driven_when_due is None and at_s > self._course.scene.still_by_s:
             self._driven_when_due = self._driven
         if self._shows_at_s <= at_s:
@@ -294,7 +294,7 @@ class Trial:
         self._understood = self._course.understood(self._board.receiver)
 
     def _example(self, what: str) -> None:
-        """Keep the bytes of the score's first few faults."""
+        """Record the bytes that led to this error, for the first few errors of a score."""
         examples = self._judge.score.examples
         if len(examples) < EXAMPLES:
             examples.append(Example(self._course.scene.kind, self._board, what, tuple(self._last)))

@@ -14,7 +14,7 @@ Words = tuple[int, int, int]
 class Items:
     """Control frames (offset of the last byte, mode, words), and letters by offset.
 
-    moves, stops: whether there is a motion frame, or only other frames.
+    moves, stops: whether one of the frames is motion, and whether frames exist but none is motion.
     """
 
     frames: tuple[tuple[int, int, Words], ...] = ()
@@ -24,7 +24,10 @@ class Items:
 
 
 def is_motion(mode: int, words: Words) -> bool:
-    """Return whether a frame is motion; zeros in mode 01 are, as a goal on position control."""
+    """Return whether a frame is motion.
+
+    Zeros in mode 01 are motion too, because with position control they are a goal.
+    """
     return mode == 0x01 or (mode == 0x02 and any(words))
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two parsers under test with one interface: the driver's, and one that trusts headers."""
+"""The two parsers under test, with one interface: the driver's, and a plain one without checks."""
 
 import struct
 
@@ -12,7 +12,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 
 
 def key_of(frame: Frame) -> Key:
-    """Return the content of a decoded frame in the form of the true frames."""
+    """Return the kind and content of a decoded frame, in the form used for the true frames."""
     match frame:
         case ImuFrame(accel, gyro):
             return ("imu", accel, gyro)
@@ -25,7 +25,7 @@ def key_of(frame: Frame) -> Key:
 
 
 def driver() -> tuple[Feed, Feed]:
-    """Make the driver's decoder; return its functions to feed and to flush."""
+    """Make the driver's decoder; return the functions that feed and flush it."""
     decoder = FrameDecoder()
     return (
         lambda data, now: [key_of(frame) for frame in decoder.feed(data, now)],
@@ -34,7 +34,10 @@ def driver() -> tuple[Feed, Feed]:
 
 
 def plain() -> tuple[Feed, Feed]:
-    """Make a parser that finds a header, takes as many bytes as it requires, and trusts them."""
+    """Make a plain parser; return the functions that feed and flush it.
+
+    At a header it takes the number of bytes that such a frame has, without any check.
+    """
     held = bytearray()
 
     def feed(data: bytes, now: float) -> list[Key]:

@@ -18,7 +18,7 @@ Job = TypeVar("Job")
 
 
 def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes]:
-    """Return the pieces without the bytes that are lost, and with those that are added."""
+    """Damage a line; return the pieces without the bytes it loses, and with those it adds."""
     whole = b"".join(pieces)
     ends, at = [], 0
     for piece in pieces:
@@ -33,7 +33,7 @@ def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes
 
 
 def add(total: dict[Key, Any], more: Mapping[Key, Any]) -> None:
-    """Add these scores to those of the same keys."""
+    """Add each score in ``more`` to the score of the same key in ``total``."""
     for key, score in more.items():
         if key in total:
             total[key] += score

@@ -27,13 +27,13 @@ BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_report", "mart": "mart_report", "fejemis": "fejemis_report"}
 """By the board's name: the module that measures its codec."""
 SEEDS_OF_THE_PLAIN_PARSER = 4
-"""Number of streams for the plain parser; its many errors show in a few streams."""
+"""Number of streams for the plain parser; its errors are frequent, so a few streams show them."""
 
 Job = tuple[str, int, str]
 
 
 def one(seconds: float, job: Job) -> tuple[str, Scores]:
-    """Score one stream in a process of the pool."""
+    """Return a parser's name and its scores for one stream; runs in a process of the pool."""
     scenario, seed, parser = job
     return parser, run(scenario, seed, seconds, parser)
 
@@ -44,7 +44,7 @@ def rate(score: Score) -> str:
 
 
 def bound_of(fault: str, chunker: str) -> str:
-    """Return the bound as text."""
+    """Return the limits of this fault and chunking as text."""
     bound = BOUNDS[fault]
     if chunker not in bound.chunkers:
         return "none"

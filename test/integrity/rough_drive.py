@@ -26,7 +26,7 @@ STEEPEST_PWM: Final = 200.0
 """Greatest effort against a slope: 5 % of the motors' full effort."""
 HARDEST_BUMP_PWM: Final = 600.0
 HARDEST_PUSH_PWM: Final = 150.0
-"""Greatest effort of a push against a driving robot."""
+"""Greatest effort of a push against a driving robot, in PWM steps."""
 FASTEST_CARRY_MPS: Final = 0.5
 """Greatest speed of a robot at rest that is carried, in m/s."""
 SECONDS_BETWEEN_HANDS: Final = 20.0
@@ -55,7 +55,7 @@ class Outcome:
 
 
 def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
-    """Draw a robot with the usual spread of motors, controllers and scales."""
+    """Draw the settings of a robot with the usual spread of motors, controllers and scales."""
     random = Random(f"robot {seed}")
     motors = [
         MotorConstants(
@@ -91,7 +91,7 @@ def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
 
 
 class RoughDrive(Bench):
-    """A bench with delays on the line in both directions, a commander, and people around."""
+    """A simulated robot with a line that delays both ways, a commander, and people around."""
 
     def __init__(self, seed: int, delta_period_s: float = 0.04) -> None:
         self._random = random = Random(f"drive {seed}")
@@ -118,7 +118,7 @@ class RoughDrive(Bench):
         self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
-        """Send what is written to the board after the line's delay, and evaluate notices."""
+        """Send the driver's writes to the board after the line's delay, and evaluate notices."""
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)
@@ -139,7 +139,7 @@ class RoughDrive(Bench):
             self.settle()
 
     def go(self, seconds: float) -> Outcome:
-        """Drive for this time; return the outcome."""
+        """Drive for ``seconds``; return the outcome."""
         self.open()
         self.run(2.0)
         self._hands_at = self.now + self._random.expovariate(1 / SECONDS_BETWEEN_HANDS)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A short version of the integrity report: every bound, on streams that are long enough."""
+"""A short version of the integrity report, with streams long enough to test every limit."""
 
 import os
 from functools import partial
@@ -34,14 +34,14 @@ def scores() -> Scores:
     ("fault", "chunker"), [(fault, chunker) for fault in FAULTS for chunker in chunkings(fault)]
 )
 def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, scores: Scores) -> None:
-    """The bounds limit wrong frames and lost frames, over all scenarios."""
+    """The limits of wrong and of lost frames hold for the sum over all scenarios."""
     score = over_scenarios(scores, fault, chunker)
     assert BOUNDS[fault].holds(chunker, score), score
     assert score.out > 12_500
 
 
 def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
-    """On a stream without faults even the plain parser is right, from the first byte on."""
+    """On an undamaged stream even the plain parser scores no error, from the first byte on."""
     truth = generate(SCENARIOS["driving"], 1, 10.0)
     received = receive(truth, lambda length, _: list(range(length)), Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())
@@ -49,7 +49,7 @@ def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
 
 
 def test_the_judge_finds_what_the_plain_parser_makes_up() -> None:
-    """Otherwise the judge could not find errors of our parser either."""
+    """The plain parser makes many false frames; a judge that missed them would be useless."""
     truth = generate(SCENARIOS["gyro stuck at (-6, -5, -4)"], 1, 20.0)
     received = receive(truth, FAULTS["1 byte in 1,000 lost"], Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())

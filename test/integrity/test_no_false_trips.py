@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A short version of ``no_false_trips``: a minute for each kind of robot."""
+"""A short version of ``no_false_trips``: one minute for each kind of robot."""
 
 import pytest
 from rough_drive import RoughDrive
@@ -11,14 +11,14 @@ from rough_drive import RoughDrive
 def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
     seed: int, delta_period_s: float
 ) -> None:
-    """The robot has slip, slope and bumps, a late line, and people who push, hold and carry it."""
+    """The robots obey in spite of slip, slope, delays, and people who push or carry them."""
     outcome = RoughDrive(seed, delta_period_s).go(60.0)
     assert outcome.trips == []
     assert outcome.happened.total() > 0
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """A robot whose wheels turn twice as fast as commanded trips the monitor."""
+    """In the same drive a robot whose wheels turn twice as fast as commanded trips the monitor."""
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)
     assert drive.go(30.0).trips

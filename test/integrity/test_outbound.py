@@ -24,7 +24,7 @@ STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 
 
 class Losing:
-    """A line that loses bytes by their number, counted over all writes."""
+    """A line that loses the bytes with these numbers, counted over all writes."""
 
     def __init__(self, *numbers: int) -> None:
         self.whole = 0
@@ -36,7 +36,7 @@ class Losing:
 
 
 def on_all_receivers(course: Course, line: Line) -> Score:
-    """Run a course with the same damage on each receiver; return the total score."""
+    """Run a course with the same damage on each receiver; return the sum of the scores."""
     total = Score()
     for receiver in RECEIVERS:
         for _, board in boards(course.scene.kind, receiver):
@@ -45,13 +45,13 @@ def on_all_receivers(course: Course, line: Line) -> Score:
 
 
 def shown(score: Score) -> str:
-    """Describe the score, with the bytes that led to it."""
+    """Return a score as text, with the bytes that led to its errors."""
     return "\n".join([str(score), *map(str, score.examples)])
 
 
 @pytest.mark.parametrize("scene", ENDED)
 def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
-    """The receivers decode only what was sent, and the robot is at rest in time."""
+    """On an undamaged line receivers understand only what was sent, and the robot stops in time."""
     course = Course(ENDED[scene](Random(scene)))
     score = on_all_receivers(course, GOOD)
     found = score.strayed, score.overdue, score.uncommanded, score.false_letters, score.false_estops
@@ -60,7 +60,7 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """Every receiver is tested with one script."""
+    """Each receiver plays one script; it must keep the limits, as far as a short run shows them."""
     scores, _ = one(0.05, (scene, 0), LOSSES)
     for fault in LOSSES:
         score = Score()
@@ -75,7 +75,10 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """It is inert until the next write, whose zeros complete it and whose frame replaces it."""
+    """The incomplete frame has no effect until the next write.
+
+    The zeros before the next write complete it, and the frame of that write replaces it.
+    """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
         number
@@ -96,7 +99,7 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """Two Stops without zeros, the first one byte short, command 255 LSB for wheel C."""
+    """Two Stops without zeros between, the first a byte short, look like 255 LSB for wheel C."""
     judge = Judge()
     judge.write(parse(STOP), 0.0)
     judge.write(parse(STOP), 0.05)
@@ -108,7 +111,7 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """An earlier command is still commanded, at any age; one with a changed bit never was."""
+    """An earlier command is never an error, however old; one with a changed bit is."""
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")
     judge = Judge()
@@ -126,7 +129,7 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """The cases are a sent letter, a payload byte that acts, and a byte added by the line."""
+    """A sent letter is right. A payload byte that acts is false; one from the line is "added"."""
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)
     assert judge.letter(0x50, 25) == ""
@@ -136,7 +139,7 @@ def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
 
 
 def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
-    """No byte arrives after the first fault."""
+    """All bytes after a certain one are lost, so Stop never arrives: the judge counts the trial."""
     course = Course(ENDED["timeout"](Random("cut")))
     driving = next(n for n, items in enumerate(course.items) if items.moves)
     begin = next(n for n, write in enumerate(course.writes) if write.at_s >= FROM_S)
@@ -150,7 +153,7 @@ def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_passing_over_what_arrives_whole_changes_no_score(fault: str) -> None:
-    """A trial's shortcut is compared with a run over every write."""
+    """Skipping undamaged writes gives the same score as playing every write."""
 
     class Slow(Trial):
         def _skip(self) -> None:
@@ -167,7 +170,7 @@ def test_passing_over_what_arrives_whole_changes_no_score(fault: str) -> None:
 
 
 def test_a_write_is_read_by_the_layout_alone() -> None:
-    """A write contains zeros, frames and letters; anything else is an error."""
+    """Zeros, frames and letters are parsed; anything else raises ValueError."""
     items = parse(bytes(8) + STOP + bytes(8) + b"S")
     assert items.frames == ((16, 2, (0, 0, 0)),)
     assert items.letters == ((25, 0x53),)
@@ -176,7 +179,7 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """Scenes without an end are summed separately."""
+    """The sum over all endings leaves out scenes that only drive; those have a sum of their own."""
     scores = {
         ("a", "r", "timeout"): Score(trials=1),
         ("a", "r", "kill"): Score(trials=2),

@@ -50,7 +50,7 @@ TRUTHS = {name: generate(scenario, 11, SECONDS) for name, scenario in SCENARIOS.
 
 
 def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
-    """Return the frames of each call, the counts, and the frame that has begun."""
+    """Return the frames that each call decodes, the decoder's counts, and the incomplete frame."""
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(decoder, "take_run", lambda _held, at, context, *_: (at, context))
@@ -84,7 +84,7 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_streams_come_out_alike(scenario: str, fault: str, chunker: str) -> None:
-    """This holds for damaged streams and others, for each call and all counts."""
+    """With and without shortcuts, each call returns the same frames and counts, damaged or not."""
     chunks = chunks_of(scenario, fault, chunker, 1)
     assert outcome(chunks, quick=True) == outcome(chunks, quick=False)
 
@@ -97,7 +97,7 @@ pieces = st.sampled_from(
 @settings(max_examples=200)
 @given(st.lists(st.tuples(pieces, st.sampled_from([0.0, 0.001, 0.01, 0.2])), min_size=1))
 def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, float]]) -> None:
-    """The pieces come in any order, with any pauses."""
+    """Shortcuts change no result for pieces of streams and noise in any order, with any pauses."""
     now, chunks = 0.0, []
     for data, pause_s in arrivals:
         now += pause_s
@@ -112,7 +112,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, chunker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The end of each read and the mode are equal, too, with any requests in between."""
+    """Shortcuts change no reading of the driver's board, nor its mode, with requests in between."""
     chunks = chunks_of(scenario, fault, chunker, 2)
 
     def told() -> list[object]:
@@ -136,7 +136,7 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the tests above would compare nothing: most reads take this shortcut."""
+    """Most reads must take the shortcut; else comparing with and without it proves nothing."""
     fed = []
     feed = FrameDecoder.feed
 
@@ -153,7 +153,7 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the tests above would compare nothing: very few IMU frames are weighed."""
+    """Few IMU frames may be weighed one by one; else comparing the two ways proves nothing."""
     weighed = []
     weigh = decoder.Expectation.weigh
 
@@ -169,7 +169,7 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A jump, its aftershocks and the jump back, with frames after them, are not weighed."""
+    """The quick loop accepts a jump, its aftershocks and the jump back without weighing frames."""
     rest = ImuFrame((120, -80, -16384), (1, 2, 3))
     shock = [ImuFrame((9000, -80, -16384), (1, 2, 3)), ImuFrame((120, 7000, -16384), (1, 9000, 3))]
     sent = [rest, *shock, rest, rest, rest]
@@ -185,7 +185,7 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """This holds after any number of frames, and at most 6 frames are weighed again for it."""
+    """Weighing at most 6 frames again yields the knowledge after any number of frames."""
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]
@@ -205,7 +205,7 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
 
 
 def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the tests above would compare two full searches."""
+    """Most edges must be left out; else the comparison above would be of two complete searches."""
     edges = {True: 0, False: 0}
     pieces = trellis._Search.pieces
     chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
@@ -223,7 +223,7 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """Along every edge, the bound falls by no more than the edge costs."""
+    """The bound of the remaining cost falls along each edge by no more than the edge's cost."""
     least = least_costs(data)
     search = trellis._Search(
         data, NOTHING_KNOWN, Expectation(16384.0), InterFrameGaps(BYTE_S), "big"

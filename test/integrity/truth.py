@@ -22,7 +22,10 @@ Key = tuple[object, ...]
 
 @dataclass(slots=True)
 class Truth:
-    """Bytes, their arrival times, and the frames (content, first byte, one past the last)."""
+    """A true stream: bytes, their arrival times in s, and frames.
+
+    A frame consists of its content, its first byte, and one past its last byte.
+    """
 
     data: bytearray = field(default_factory=bytearray)
     times_s: list[float] = field(default_factory=list)
@@ -31,7 +34,7 @@ class Truth:
 
 @dataclass(slots=True)
 class Setpoint:
-    """Velocities that approach random targets, as in a drive; all zero for a robot at rest."""
+    """The velocity of a robot, which approaches random targets; zero for a robot at rest."""
 
     random: Random
     driving: bool
@@ -57,7 +60,7 @@ class Setpoint:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """The robot's motion, and what its sensor reads at rest."""
+    """The motion of a robot, and what its sensor reads at rest."""
 
     driving: bool = False
     imu_only: bool = False
@@ -66,7 +69,7 @@ class Scenario:
     accel_noise: float = 46.0
     gyro_noise: float = 6.5
     pauses: bool = False
-    """Whether the board is sometimes paused for seconds: one text per second, otherwise silence."""
+    """Whether the board is sometimes paused for seconds, with only one text per second."""
 
 
 SCENARIOS: dict[str, Scenario] = {
@@ -82,7 +85,7 @@ WITH_TEXTS = "paused now and then"
 
 
 def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
-    """Return what this board sends, from some moment of its life on."""
+    """Return what the board sends in this scenario for ``seconds``, from a random moment on."""
     random = Random(f"{scenario} {seed}")
     gauss = random.gauss
     bias = [random.uniform(-6, 6) for _ in range(3)]

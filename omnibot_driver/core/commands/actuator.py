@@ -28,9 +28,9 @@ class Actuator(Protocol):
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """Body velocity of the last command that was sent, in the board's axes, as rounded there.
+        """Body velocity of the last command sent, as rounded by the encoding, in the board's axes.
 
-        None if any motion is possible.
+        None if that command allows any motion.
         """
 
     @property
@@ -47,10 +47,10 @@ class Actuator(Protocol):
         """Begin a new connection, on which nothing has been sent and nothing is wanted."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Carry out this order from now on."""
+        """Send ``wanted`` from now on, in place of the previous order."""
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Note that a request to the board was sent."""
+        """Note that the packets of a request, which is not a motion order, were sent."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now, possibly none, and regard them as written."""

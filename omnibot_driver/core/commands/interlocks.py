@@ -2,8 +2,8 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method returns the reason why not, with a remedy, as a sentence; empty if it is possible. Knows
-modes and phases.
+Each method returns the reason why the action is not possible, as a sentence with a remedy, or an
+empty string if it is possible. This module knows modes and phases.
 """
 
 from omnibot_driver.core.board import Board, Mode
@@ -37,11 +37,11 @@ class Interlocks:
         self.missing = ""
 
     def why_not_request(self) -> str:
-        """Return the reason why no request is possible now; empty if one is."""
+        """Return the reason why requests are refused now; empty if they are allowed."""
         return "the driver is shutting down" if self.leaving else self.missing
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
-        """Return the reason why this motion is refused; empty if it is allowed.
+        """Return the reason why this motion is refused; empty if the motion is allowed.
 
         Call it once per command, because the motion interlock records each arrival.
         """

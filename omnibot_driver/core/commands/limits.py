@@ -70,7 +70,7 @@ class SpeedLimits:
         return BodyTwist(vx, vy, yaw_rate)
 
     def wheels(self, wanted_radps: Sequence[float]) -> tuple[float, ...]:
-        """Return the rates, all scaled alike until the fastest wheel is within its limit."""
+        """Return the rates, scaled by one factor so that the fastest wheel is within its limit."""
         return slow(wanted_radps, self.wheel_radps)
 
 
@@ -110,7 +110,7 @@ def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
 
 
 def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
-    """Return the values, scaled together until the largest magnitude is at most ``limit``."""
+    """Return the values, scaled by one factor to a largest magnitude of at most ``limit``."""
     largest = max(map(abs, values))
     return tuple(values) if largest <= limit else _scale(values, limit / largest)
 

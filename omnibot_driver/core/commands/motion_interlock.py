@@ -2,8 +2,8 @@
 
 """The motion interlock: refuses motion after the motion monitor has stopped the robot.
 
-Knows when commands arrive and when the monitor tripped; not why it did, nor what is commanded. Time
-is an argument.
+This module knows when commands arrive and when the monitor stopped the robot; it does not know why,
+nor what is commanded. Time is an argument.
 """
 
 import math
@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Time, in s, within which a second trip shows that the cause of the first was not found."""
+"""Time, in s, within which a second stop shows that the cause of the first was not removed."""
 
 
 class Until(Enum):
@@ -27,10 +27,10 @@ class Until(Enum):
 
 
 class MotionInterlock:
-    """The state of the interlock.
+    """The state of the interlock: whether motion is refused, and until when.
 
-    ``until``: what ends the refusal of motion. ``trips``: number of trips. ``starts``: whether the
-    board supports ~/start.
+    ``until``: what ends the refusal of motion. ``trips``: number of calls of ``trip``. ``starts``:
+    whether the board supports ~/start.
     """
 
     def __init__(self, *, starts: bool = True) -> None:
@@ -56,7 +56,7 @@ class MotionInterlock:
             self.start()
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
-        """Note a command, and return the reason why it is refused; empty if it is allowed.
+        """Note a command, and return the reason why it is refused; empty if not.
 
         ``stands``: whether it is a command to stand still, which is always allowed. The pause of
         ``timeout_s`` that ends a refusal begins after the last motion command, refused or not,
@@ -70,7 +70,7 @@ class MotionInterlock:
         return "" if stands or self.until is Until.NOTHING else self.reason(timeout_s)
 
     def reason(self, timeout_s: float) -> str:
-        """Return the reason why motion is refused, with a remedy; empty if it is allowed."""
+        """Return the reason why motion is refused, with a remedy; empty if motion is allowed."""
         if self.until is Until.RELEASE:
             return (
                 "the motion monitor has stopped the robot; send a zero command, or none for"

@@ -14,31 +14,31 @@ from omnibot_driver.core.values import value
 
 @value(frozen=True, slots=True)
 class Stop:
-    """Stand still."""
+    """The order to stand still."""
 
 
 @value(frozen=True, slots=True)
 class EmergencyStop:
-    """Stand still, also by the board's emergency stop if it has one."""
+    """The order to stand still, by the board's emergency stop too if the board has one."""
 
 
 @value(frozen=True, slots=True)
 class Drive:
-    """Move with this body velocity."""
+    """The order to move with this body velocity."""
 
     twist: BodyTwist
 
 
 @value(frozen=True, slots=True)
 class TurnWheels:
-    """Turn the wheels at these rates in rad/s, in the order of ``Traits.wheels``."""
+    """The order to turn the wheels at these rates in rad/s, in the order of ``Traits.wheels``."""
 
     rates_radps: tuple[float, ...]
 
 
 @value(frozen=True, slots=True)
 class GoTo:
-    """Drive to this pose in the board's earth frame, and stay there."""
+    """The order to drive to this pose in the board's earth frame, and stay there."""
 
     place: Pose
 

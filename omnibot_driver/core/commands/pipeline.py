@@ -2,8 +2,8 @@
 
 """The command pipeline: from a motion command to its set-point, expiry and supervision.
 
-Composes shaping, policy, the actuator and the motion monitor with its interlock. Knows no modes and
-no requests: ``interlocks.py`` decides whether a robot may be driven now.
+This module connects shaping, policy, the actuator and the motion monitor with its interlock. It
+knows no modes and no requests: ``interlocks.py`` decides whether a robot may be driven now.
 """
 
 import math
@@ -72,7 +72,7 @@ class CommandPipeline:
         self.monitored = settings.motion_monitor
 
     def configure(self, settings: SessionSettings, now: float) -> list[str]:
-        """Apply new settings from the next command and frame on; return notices for the user.
+        """Apply new settings to later commands and frames; return notices for the user.
 
         A motion in progress ends if a limit or the timeout has become stricter.
         """
@@ -95,7 +95,7 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        The robot is stopped if they cannot encode it.
+        The robot is stopped if the command cannot be encoded with these settings.
         """
         if self.policy.current is None:
             return []
@@ -107,7 +107,7 @@ class CommandPipeline:
         return []
 
     def figures(self, now: float) -> CommandFigures:
-        """Return the current authority and the counters of commands."""
+        """Return the topic that commands the robot, and the counters of commands."""
         current = self.policy.current
         return CommandFigures(
             source=current.authority.value if current else None,
@@ -131,9 +131,9 @@ class CommandPipeline:
         self._monitor.release()
 
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
-        """Return the command for a body velocity. Raises CommandRefused, as all commands do.
+        """Return the command for a body velocity. Raises CommandRefused if it is not allowed.
 
-        ``age_s``: age of the command by its sender's stamp, in s, by which it expires sooner.
+        ``age_s``: age of the command by its sender's stamp, in s; it shortens the time to expiry.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -152,7 +152,7 @@ class CommandPipeline:
         return self._shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Note that a request to the board was sent."""
+        """Note that the packets of a request, which is not a motion command, were sent."""
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
@@ -176,7 +176,7 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Return the fault that the newest estimate, or else the displacement, shows."""
+        """Return the fault in the newest estimate, or without an estimate in the displacement."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()
@@ -223,7 +223,7 @@ class CommandPipeline:
         return f" (commanded {commanded}; measured {measured})"
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
-        """Drop a goal whose frame has changed, or from which the robot drives away."""
+        """Drop a goal if its frame has changed or the robot drives away from it; return notices."""
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):
             return []

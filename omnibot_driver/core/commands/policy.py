@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The command policy: one authority at a time, expiry, the e-stop latch, proved stops.
+"""The command policy: one commanding topic at a time, expiry, the e-stop latch, proved stops.
 
-No board stops by itself. So when a command expires, Stop is repeated until displacements show that
-the robot stands. The actuator encodes it; time is an argument.
+No board stops without a command. So when a motion command expires, Stop is repeated until
+displacements show that the robot stands still. The actuator encodes Stop; time is an argument.
 """
 
 import math
@@ -21,14 +21,15 @@ STOPPING_S: Final = 1.0
 UNPROVED_S: Final = 5.0
 """Longest time for which Stop is repeated while nothing shows that the robot stands, in s."""
 ROUNDING_S: Final = 1e-6
-"""Margin after which a time has passed for certain, however it is rounded, in s."""
+"""Margin added to a wake-up time, in s, so that rounding cannot make it too early."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandSettings:
     """The settings of the policy.
 
-    ``timeout_s``: age at which a command expires; ``rate_hz``: rate of its repetition.
+    ``timeout_s``: age at which a command expires, in s; ``rate_hz``: rate at which a command
+    is repeated.
     """
 
     timeout_s: float = 0.5
@@ -38,7 +39,8 @@ class CommandSettings:
 class CommandPolicy:
     """The command in effect: what the robot should do now.
 
-    ``proof``: proof that the robot stands, fed with displacements and with what the actuator sends.
+    ``proof``: proof that the robot stands still, fed with displacements and with what the actuator
+    sends.
     """
 
     def __init__(
@@ -102,7 +104,7 @@ class CommandPolicy:
         self._actuator.apply(EMERGENCY_STOP if self.latched else STOP, now)
 
     def fall_silent(self, now: float) -> None:
-        """Send nothing more, and prove the last Stop anew."""
+        """Send nothing more, and begin a new proof that the robot obeyed the last Stop."""
         self.discard(now)
         self.quiet = True
         self.proof.begin()

@@ -33,13 +33,13 @@ class Encoder(Protocol):
         """Return the packets that make the robot stand still."""
 
     def emergency_stop(self) -> Packets:
-        """Return only the board's own emergency stop, without a Stop after it."""
+        """Return the board's own emergency stop alone, without Stop."""
 
     def encode(self, order: Order) -> Packets:
-        """Return the packets that encode this order. Raises CommandRefused if none can."""
+        """Return the packets for this order. Raises CommandRefused if it cannot be encoded."""
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the body velocity that these packets command, as rounded, in the board's axes."""
+        """Return the rounded body velocity that these packets command, in the board's axes."""
 
 
 class SetpointStream:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Set-points: a motion command, and the order that it means at each moment.
+"""Set-points: motion commands that return the order to send at each time.
 
 The actuator asks a ``Setpoint`` for its order whenever a frame is sent, so a set-point under an
 acceleration limit needs no timer of its own. Other modules decide whether it may be commanded, and
@@ -18,17 +18,17 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 LONGEST_STEP_S: Final = 0.05
-"""Longest time that one ramp step makes up for, in s, even if its frame is sent later."""
+"""Longest time, in s, for which one ramp step accelerates, even if its frame is sent later."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""Increase of the distance and of the angle to a goal, beyond the overshoot of any controller, that
-shows that the robot drives away."""
+"""Increases of the distance in m and the angle in rad to a goal that show that the robot drives
+away; they are larger than the overshoot of any controller."""
 
 
 class Authority(Enum):
-    """The topic that commands the robot; the value is its name. The newest one is in effect."""
+    """The topic that commands the robot, by name; the newest command is in effect."""
 
     BASE = "cmd_vel"
     WHEELS = "wheel_cmd"
@@ -99,7 +99,7 @@ class BaseSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Update ``is_zero`` with new settings; a ramp to what is now a standstill ends."""
+        """Update ``is_zero`` for new settings; end the ramp if it leads to a standstill now."""
         self.is_zero = self._is_zero(Drive(self._wanted))
         if self.is_zero:
             self._setpoint, self.settled = self._wanted, True
@@ -126,7 +126,7 @@ class SteadySetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Update ``is_zero`` with new settings."""
+        """Update ``is_zero`` for new settings of the board."""
         self.is_zero = self._is_zero(self._order)
 
 
@@ -135,8 +135,8 @@ class GoalSetpoint:
 
     * ``goal``: in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: ``Odometry.alignments`` at the time of the command; identifies how the two
-      frames lie.
+    * ``alignment``: ``Odometry.alignments`` at the time of the command; identifies the
+      relation between the two frames.
     * ``check``: the actuator's method, which raises CommandRefused if the order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """
@@ -169,7 +169,10 @@ class GoalSetpoint:
         self._check(self._order)
 
     def is_left_by(self, pose: Pose) -> bool:
-        """Return whether the robot drives away: it was clearly nearer to the goal before."""
+        """Return whether ``pose`` is clearly farther from the goal than an earlier pose.
+
+        Always False if the board does not drive straight to the goal.
+        """
         if not self._direct:
             return False
         way = pose.way_to(self._goal)

@@ -2,8 +2,8 @@
 
 """Command shaping: from what a caller wants to set-points in the board's axes and frame.
 
-Commands are checked and limited here. Knows the limits and the position of the board's control
-switch; not when anything is sent.
+Commands are checked and limited here. This module knows the limits and the position of the board's
+control switch; it does not know when anything is sent.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ ControlMethod = Literal["velocity", "position"]
 
 
 class CommandShaper:
-    """The checks and limits of motion commands. Every method raises CommandRefused.
+    """The checks and limits of motion commands. Every method may raise CommandRefused.
 
     ``limits`` may be replaced at any time. ``control``: position of the board's control switch, or
     None for a board without one.

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stop proof: whether displacements show that the robot stands since the last Stop.
+"""The stop proof: whether displacements show that the robot stands still after the last Stop.
 
-Boards do not acknowledge a stop, but displacements show it. Knows displacements and when Stop and
-motion were sent; not what happens while the proof is missing. Time is an argument.
+Boards do not acknowledge a stop, but displacements show it. This module knows displacements, and
+when Stop and motion were sent; not what happens while the proof is missing. Time is an argument.
 """
 
 import math
@@ -13,8 +13,8 @@ from omnibot_driver.core.readings import DisplacementReading
 
 STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
-"""Largest speeds of a robot that stands: above two encoder counts of a wheel in 40 ms, below the
-slowest linear command (0.014 m/s)."""
+"""Largest speeds of a robot at rest, in m/s and rad/s: above two encoder counts of a wheel in 40
+ms, below the slowest linear command (0.014 m/s)."""
 STILL_S: Final = 0.1
 """Default duration of standstill for a proof, in s: three displacements of 40 ms, rounded down."""
 SLACK_S: Final = 1e-6
@@ -26,17 +26,17 @@ before the wheels turned."""
 PROOFS: Final = 2.0
 """Factor on the duration of standstill; the product is the time to wait for the proof."""
 RAREST_S: Final = 1.0
-"""Longest period of displacements, in s; a longer displacement is that of a gap."""
+"""Longest period of displacements, in s; a longer one spans lost displacements."""
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s: they may have ended before Stop
 arrived."""
 
 
 class StopProof:
-    """The proof that the robot stands.
+    """The proof that the robot stands still.
 
-    * ``proved``: Stop was sent, no motion since, and the robot has stood for ``still_s``.
-    * ``owed``: motion was sent, and nothing has proved since then that the robot stands.
+    * ``proved``: Stop was sent, no motion since, and the robot has stood still for ``still_s``.
+    * ``owed``: motion was sent, and nothing has proved since then that the robot stands still.
     * ``measured``: a measured displacement has arrived since Stop was sent.
     """
 
@@ -47,7 +47,7 @@ class StopProof:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a proof: the robot's motion is unknown."""
+        """Discard the proof so far, as the robot's motion is unknown, and begin a new one."""
         self.proved = self.measured = False
         self._stopped_at = math.inf
         self._still_s, self._still = 0.0, 0

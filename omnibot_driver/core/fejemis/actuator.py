@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The set-point stream for both boards: repeats the lines, and resends them with each front angle.
+"""The set-point stream for both boards, which repeats the motion lines.
 
 While the encoder limits the drive board's speed, each new angle of the front wheel may allow more
-speed. So the lines are sent again with each angle, not only at the repetition rate. The module
-decides when a line is due, not what it contains.
+speed. So the lines are then sent again with each angle, not only at the repetition rate. The module
+decides when a line is due, not what the line contains.
 """
 
 import math
@@ -18,14 +18,14 @@ from omnibot_driver.core.fejemis.encoder import Encoder
 
 
 class Listener(Protocol):
-    """The object that must know of an emergency stop."""
+    """An object that is notified when an emergency stop begins or ends."""
 
     def wanted(self, *, estop: bool) -> None:
         """Note whether the order in force from now on is an emergency stop."""
 
 
 class PairStream(SetpointStream):
-    """The set-point stream of both boards; ``driving``: whether a motion is wanted."""
+    """The set-point stream of both boards; ``driving``: whether a motion is commanded."""
 
     def __init__(self, encoder: Encoder, proof: StopProof, listener: Listener) -> None:
         self.driving = False
@@ -33,12 +33,12 @@ class PairStream(SetpointStream):
         super().__init__(encoder, proof)
 
     def connect(self) -> None:
-        """Start a connection on which nothing has been sent."""
+        """Begin a new connection, on which motion has not been commanded yet."""
         self.driving = False
         super().connect()
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the wanted set-point, and notify the listener of an emergency stop or its end."""
+        """Replace the set-point, and notify the listener whether it is an emergency stop."""
         is_stop = wanted is None or isinstance(wanted, Stop | EmergencyStop)
         self.driving = not is_stop and not wanted.is_zero  # type: ignore[union-attr]
         self._listener.wanted(estop=isinstance(wanted, EmergencyStop))
@@ -47,7 +47,7 @@ class PairStream(SetpointStream):
         super().apply(wanted, now)
 
     def angle_told(self, angle_rad: float, now: float) -> bool:
-        """Take the front angle, in rad; return whether it shows that the wheel does not follow."""
+        """Take the front angle, in rad; return whether the wheel newly fails to follow."""
         if self.driving and self._pair.restless:
             self._said_at = -math.inf
         return self._pair.follower.look(angle_rad, now)

@@ -10,7 +10,7 @@ angle of less than 10° to the left.
 
 Without sums, the loss of any character is undetected. Then whole degrees are sent, in which any
 loss leaves a smaller number: beyond 90° the board would compute an inner wheel faster than the
-outer one. Of the sums the module knows only the modulus.
+outer one.
 """
 
 import math
@@ -28,7 +28,7 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Limit in degrees to the left: below it, a damaged angle to the right may arrive as this angle."""
+"""Limit in degrees: a damaged angle to the right may arrive as less than this to the left."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
@@ -39,7 +39,7 @@ class AngleRelay:
         self._owed_deg = 0.0
 
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
-        """Return the ``fwl`` line for the angle, without its sum; ``sums``: one is added."""
+        """Return the ``fwl`` line for the angle; ``sums``: whether the caller adds a sum."""
         angle_deg = math.degrees(angle_rad)
         wanted_deg = angle_deg + self._owed_deg
         text = _with_sum(round(10 * wanted_deg)) if sums else b"%d" % round(wanted_deg)
@@ -48,7 +48,7 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """Yield each value left if two characters are lost and the sum still fits; 0 if unreadable."""
+    """Yield each value that an undetected loss of two characters leaves; 0 if it is unreadable."""
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
             found = _NUMBER.match(text[:i] + text[i + 1 : j] + text[j + 1 :])

@@ -34,9 +34,9 @@ from omnibot_driver.core.traits import Traits
 
 
 class FejemisBoard(Board):
-    """One robot. ``settings`` may be replaced at any time.
+    """A Fejemis robot as a ``Board``; ``settings`` may be replaced at any time.
 
-    ``services``: the functions that only this board has.
+    ``services``: functions that only this kind of robot has, such as brush and lift.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -77,12 +77,12 @@ class FejemisBoard(Board):
 
     @property
     def mode(self) -> Mode:
-        """The mode: nominal while both halves send data and the drive board obeys."""
+        """The mode: nominal while both boards send data and the drive board obeys."""
         return self._inbound.mode
 
     @property
     def geometry(self) -> Geometry:
-        """Track B and wheelbase F as the drive board uses them, or as set while that is unknown."""
+        """Track and wheelbase in m as the drive board uses them; the settings while unknown."""
         return self._upkeep.geometry
 
     @property
@@ -93,7 +93,7 @@ class FejemisBoard(Board):
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both boards have sums."""
+        """Whether lines to both boards carry checksums."""
         return self._ports.with_sums
 
     @property
@@ -135,7 +135,7 @@ class FejemisBoard(Board):
     # Inbound
 
     def connect(self) -> None:
-        """Begin new connections: brush and lift are off, and both boards are configured again."""
+        """Begin new connections: switch brush and lift off, and configure both boards again."""
         self._now = -math.inf
         self._ports.begin(self._settings)
         self._translation.connect()
@@ -152,7 +152,10 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines, and fail the running job: the ports are closed."""
+        """Discard incomplete lines and fail the running job, as the ports are closed.
+
+        Return the result of that job as a reading.
+        """
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -160,19 +163,22 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def silence(self) -> None:
-        """Forget the mode and switch brush and lift off: neither half sends data."""
+        """Forget the mode, switch brush and lift off, and subscribe to the boards' data again.
+
+        Called when neither board sends data.
+        """
         self._inbound.mode = Mode.UNKNOWN
         for half in self._ports.halves:
             half.subscribe_again()
         self._upkeep.machine.off()
 
     def stalled(self) -> None:
-        """Keep brush and lift off after a stall: the guard has switched them off."""
+        """Switch brush and lift off after a stall, as the guard process may have done so."""
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that follow from elapsed time."""
+        """Act on timeouts, and return the readings that result."""
         self._open(now)
         self._look(now)
         return self._taken(now)
@@ -212,7 +218,7 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Latch or release the emergency stop, as ``estop`` says of the order now in force."""
+        """Latch the e-stop if ``estop`` (the order in force is an e-stop), else release it."""
         if not estop:
             self._obedience.release(self._now)
         elif not self._obedience.estopped:
@@ -248,9 +254,9 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start(self) -> Packets:
-        """Return ``start``, behind a Stop; nothing during an emergency stop.
+        """Return a Stop and then ``start``; nothing during an emergency stop.
 
-        Stop comes first because the board may obey the last command again.
+        The Stop comes first because after ``start`` the board may obey its last command again.
         """
         if self._obedience.estopped:
             return NO_PACKETS
@@ -259,18 +265,21 @@ class FejemisBoard(Board):
         return self.stop() + self._ports.line("drive", *self._upkeep.jobs.keep_power(), b"start")
 
     def pause(self) -> Packets:
-        """Stop the motion, send ``stop`` and switch off brush and lift."""
+        """Return packets that stop the motion, pause the drive board, and end brush and lift."""
         self._obedience.pause()
         self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
         self._upkeep.machine.off()
         return self.stop() + self.emergency_stop()
 
     def force_pause(self) -> Packets:
-        """Pause, as ``pause`` does."""
+        """Return the packets of ``pause``, which work in any mode."""
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return Stop and the emergency stop, each with brush and lift off."""
+        """Return what the guard process sends if this one fails: Stop, and emergency stop.
+
+        Both also switch brush and lift off.
+        """
         return self.wake(), self.emergency_stop() + self.stop()
 
     @property
@@ -284,7 +293,7 @@ class FejemisBoard(Board):
         return min(wake_at, self._inbound.watch.wake_at) if self.mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:
-        """Return the relayed front angle, ``start`` if due, and what keeps both boards sending."""
+        """Return the packets to send now: relayed front angle, ``start``, and requests."""
         packets = NO_PACKETS
         if (angle_rad := self._inbound.take_relay()) is not None:
             text = self._relay.text(angle_rad, sums=self.with_sums)

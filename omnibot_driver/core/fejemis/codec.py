@@ -2,8 +2,9 @@
 
 """Parser of one line of text: keyword, numbers and their ranges.
 
-A number outside its range is damage, as the boards cannot measure it. Extra fields are ignored,
-because newer firmware adds some; missing fields are damage. Sums and other lines are not looked at.
+A line is rejected as damaged if a field is missing, or a number is outside the range that the
+boards can measure. Extra fields are ignored, because newer firmware adds fields. Each line is
+parsed alone, and its checksum is checked elsewhere.
 """
 
 import math
@@ -43,7 +44,7 @@ Range = tuple[float, float]
 TURN: Final[Range] = (-180.0, 180.0)
 """Range of an angle, in degrees."""
 SPEED: Final[Range] = (-10.0, 10.0)
-"""Range of a rim's speed, in m/s."""
+"""Range of the speed of a wheel's rim, in m/s."""
 RATE: Final[Range] = (-4000.0, 4000.0)
 """Range of a turn rate, in degrees per second; a gyro of this kind does not measure more."""
 FORCE: Final[Range] = (-320.0, 320.0)
@@ -51,13 +52,13 @@ FORCE: Final[Range] = (-320.0, 320.0)
 FIELD: Final[Range] = (-5000.0, 5000.0)
 """Range of the magnetic field, in µT."""
 ANGLE: Final[Range] = (-7.0, 7.0)
-"""Range of an attitude angle, in rad, whatever its wrapping."""
+"""Range of an attitude angle, in rad; wide enough for any convention of wrapping."""
 HEADING: Final[Range] = (-1e4, 1e4)
-"""Range of a pose's heading, in rad; it need not be wrapped."""
+"""Range of a pose's heading, in rad; wide, as the board need not wrap the heading."""
 VOLTS: Final[Range] = (-1.0, 60.0)
 AMPS: Final[Range] = (-100.0, 100.0)
 NEAR: Final[Range] = (-1.0, 100.0)
-"""Range of a distance sensor, in m; a negative value is invalid."""
+"""Range of a distance sensor's value, in m; a negative value reports a failed measurement."""
 TIME: Final[Range] = (0.0, LONGEST_TIME_S)
 PLACE: Final[Range] = (-FARTHEST_M, FARTHEST_M)
 ANY: Final[Range] = (-1e10, 1e10)
@@ -84,13 +85,16 @@ def is_known(keyword: str) -> bool:
 
 
 def decimals_of(field: str) -> int:
-    """Return the count of characters after the point; -1 without a point."""
+    """Return the count of characters after the decimal point; -1 if the field has none."""
     _, point, after = field.partition(".")
     return len(after) if point else -1
 
 
 def numbers(fields: list[str], *ranges: Range) -> list[float] | None:
-    """Parse one field per range, ignoring extra ones; None if one is missing or out of range."""
+    """Return a number for each range; None if a field is missing, malformed or out of range.
+
+    Extra fields are ignored.
+    """
     if len(fields) < len(ranges):
         return None
     found = []
@@ -213,7 +217,7 @@ STATUS: Final = {
     "cpsteer": 1, "gyroo": 3, "acco": 3, "magw": 3, "mago": 3, "enc": 1, "mot": 1, "svp": 1,
     "svjt": 1, "tof1": 1, "gyroc": 1, "acccal2": 1, "brush": 1,
 }  # fmt: skip
-"""Keywords of status numbers and requested answers, with the fewest numbers of each."""
+"""Keywords of status lines and of answers to requests, with the least count of numbers of each."""
 WORDS: Final = ("id", "ver", "log", "confirm")
 _PARSERS: Final[dict[str, Parse]] = {
     "hbt": _heartbeat,

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The configuration that a board stores: read always, written only where the user has set it.
+"""The configuration that a board stores: always read, and written where the user has set values.
 
-What was written is read back, and written again until it agrees, and after each restart. A number
-is accepted only when two readings in a row agree: one in 99 damaged answers passes its sum, and the
-driver computes the geometry with these numbers. The module knows which line requests which numbers.
+Written values are read back, and written again until the board reports them, for ``TRIES`` at most.
+They are also written after each restart of the board. A number is accepted only when two readings
+in a row agree, because 1 in 99 damaged answers passes its checksum, and the driver computes the
+geometry with these numbers. The module knows which line requests which numbers.
 """
 
 import math
@@ -35,7 +36,7 @@ ON: Final[Mapping[Role, tuple[Written, ...]]] = {
 EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
-"""Relative difference allowed when a number is read back, as it is printed with few digits."""
+"""Relative difference allowed when a number is read back, as boards print few digits."""
 DIGIT: Final = 6e-4
 
 
@@ -46,15 +47,15 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """The last reading of each keyword."""
+        """The last reported numbers by keyword, confirmed by a second reading or not."""
         self.turned = False
-        """Whether ``confs`` is reported track first, as it is written; the help text has it
+        """Whether the board reports ``confs`` with the track first; by the help text it is
         last."""
         self.written = written
         self.begin()
 
     def begin(self) -> None:
-        """Read all numbers and write the settings again: the board is new or has loaded others."""
+        """Read all numbers and write the settings again, as the board may have other values now."""
         self.told.clear()
         self._once.clear()
         self._next_at = -math.inf
@@ -76,18 +77,18 @@ class Configuration:
 
     @property
     def known(self) -> bool:
-        """Whether every number was read, and every setting read back."""
+        """Whether every number was read, and every written setting was read back."""
         return not self._missing() and not self._unwritten()
 
     @property
     def pending(self) -> bool:
-        """Whether a new board may still lack the user's settings, so that it must not be driven."""
+        """Whether a new board may still lack the user's settings and must not be driven."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new
 
     def due(self, now: float, *, stands: bool) -> list[bytes]:
-        """Return the lines to send now; settings are written only while the robot is at rest."""
+        """Return the lines to send now; settings are written only if ``stands`` (at rest)."""
         if now < self._next_at:
             return []
         missing, unwritten = self._missing(), self._unwritten()
@@ -132,9 +133,10 @@ class Configuration:
 
     @property
     def geometry(self) -> Geometry | None:
-        """Track B and wheelbase F in m: as reported, else as set by the user, else None.
+        """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        A board that has not taken the user's values goes on with its own.
+        These are the user's values if the board reports the same or nothing yet, else the reported
+        values.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):
@@ -167,13 +169,13 @@ class Configuration:
 
 
 def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
-    """Return the line that writes the setting."""
+    """Return the line that writes ``numbers`` to the board as this setting."""
     words = " ".join(f"{number:.6g}" for number in numbers)
     return f"{setting.command} {words}".encode("ascii")
 
 
 def _near(told: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
-    """Return whether the numbers read back are the wanted ones but for their few digits."""
+    """Return whether the numbers read back equal the wanted ones within the printed digits."""
     return len(told) >= len(wanted) and all(
         abs(one - other) <= max(DIGIT, NEAR * abs(other))
         for one, other in zip(told, wanted, strict=False)

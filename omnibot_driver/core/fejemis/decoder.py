@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Decoder of one board's bytes: splits lines, checks sums, counts damage.
+"""Decoder of one board's bytes: splits lines, checks their checksums (sums), counts damaged lines.
 
-The manual shows lines without sums, the public host programs send lines with them. ``auto`` accepts
-both until heartbeats show which form the board uses; from then on only that form is accepted. Lines
-without a sum get a further check: the boards print each number with a fixed count of decimals, so a
-line whose decimals differ from those before it is damaged (``forms``).
+The manual shows lines without sums, but the public host programs send lines with sums. The setting
+``auto`` accepts both until heartbeats show which form the board uses; from then on only that form
+is accepted. The decoder also checks decimals: the boards print each number with a fixed count of
+decimals, so a line whose decimals differ from earlier lines of its kind is damaged (``forms``).
 
 The decoder does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
 bytes between calls, and looks at each byte a bounded number of times.
@@ -21,7 +21,7 @@ from omnibot_driver.core.fejemis.settings import LineSums
 from omnibot_driver.core.fejemis.sums import without_sum
 
 LONGEST_LINE: Final = 200
-"""Longest line in characters, as the boards' own buffers hold."""
+"""Longest line in characters, equal to the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
 """Heartbeats in a row that must have, or lack, a sum; a single one may be damaged."""
 
@@ -37,11 +37,11 @@ class DecoderStatistics:
 
 
 class FejemisDecoder:
-    """Decoder of one board's lines; ``sums``: whether they have sums, None while unknown.
+    """Decoder of one board's lines; ``sums``: whether the lines have sums, None while unknown.
 
-    ``changed``: the lines began or ceased to have sums; the owner resets it. ``doubtful``: the last
-    line had the other form, so lines to the board are sent without a sum. ``contradicted``: the
-    last line contradicts the setting.
+    ``changed``: the lines began or ceased to have sums; the owner resets this flag. ``doubtful``:
+    the last line differed from ``sums``, so lines to the board are sent without a sum.
+    ``contradicted``: the last line contradicts the setting ``line_sums``.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:
@@ -55,7 +55,7 @@ class FejemisDecoder:
 
     @property
     def line_sums(self) -> LineSums:
-        """The setting: with sums, without, or to be learnt."""
+        """The setting whether lines have sums: on, off, or auto, which learns from heartbeats."""
         return self._line_sums
 
     @line_sums.setter
@@ -82,7 +82,7 @@ class FejemisDecoder:
         return found
 
     def flush(self, now: float) -> list[Message]:
-        """Discard an incomplete line: the port is closed."""
+        """Discard an incomplete line, as the port is closed; return an empty list."""
         if self._held or self._cut:
             self._damaged(len(self._held))
         self._held, self._cut = b"", False
@@ -112,7 +112,7 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """Learn from heartbeats whether lines have sums: each board sends them unrequested."""
+        """Learn whether lines have sums from heartbeats, which each board sends unrequested."""
         if self._line_sums != "auto":
             self.contradicted = with_sum is not self.sums
             return

@@ -2,9 +2,9 @@
 
 """Encoder of an order as lines for both boards, given the front wheel's angle.
 
-Only the packets that are sent last determine the state: after ``meaning`` was called with them, the
-encoder knows the angle that the front wheel must reach, and whether the drive board is limited. The
-module knows geometry and lines, not when they are sent.
+Call ``meaning`` with the packets that are sent: only then does the encoder note the angle that the
+front wheel must reach, and whether the drive board's speed is limited. The module knows geometry
+and lines, not when the lines are sent.
 """
 
 from typing import Protocol
@@ -55,17 +55,17 @@ class Pair(Protocol):
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both boards have sums."""
+        """Whether lines to both boards carry checksums."""
 
     def remark(self, text: str) -> None:
         """Queue a notice that the user gets only once."""
 
 
 class Encoder:
-    """Encodes orders, with limited speed while the front wheel is off its angle (``held``).
+    """Encodes orders; ``held``: the speed is limited, as the front wheel is not at its angle yet.
 
-    ``restless``: whether to send the lines again with each angle: while the speed is limited, or
-    without sums, so that a damaged line is obeyed for 15 ms only, not for a repetition period.
+    ``restless``: whether to send the lines again with each front angle. That is so while the speed
+    is limited, and also if lines have no checksums: then a damaged line is obeyed for 15 ms only.
     """
 
     def __init__(self, pair: Pair, settings: FejemisSettings) -> None:
@@ -75,14 +75,14 @@ class Encoder:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the last order: motion is not commanded."""
+        """Forget the last order, and regard the robot as not commanded to move."""
         self.held = self._turning = False
         self._encoded: tuple[Packets, Steered] | None = None
         self.follower.begin()
 
     @property
     def restless(self) -> bool:
-        """Whether to send the lines again with the next angle."""
+        """Whether to send the lines again with the next angle of the front wheel."""
         return self.held or not self._pair.with_sums
 
     def stop(self) -> Packets:
@@ -105,7 +105,10 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the body twist that these packets command at the present front angle."""
+        """Return the body twist that these packets command at the present front angle.
+
+        Note the packets as sent. The twist is zero unless ``encode`` has just made them for motion.
+        """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:
             self.held = self._turning = False

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Check that the front wheel follows its commanded angle, and when to retry if it does not.
+"""Check that the front wheel follows its commanded angle; if not, motion is refused.
 
-Otherwise a sender that continues would move the robot for a second, again and again. So motion is
-refused until the wheel has moved, and after a second fault within a minute until ~/start. The
-module knows only angles and times.
+Without the refusal, a sender that continues would move the robot for a second, again and again.
+After a first fault, motion is refused until the wheel has moved; after a second fault within a
+minute, until ~/start is called. The module knows only angles and times.
 """
 
 import math
@@ -28,7 +28,7 @@ UNTIL_START: Final = (
 
 
 class Follower:
-    """The check; ``refusal``: why the robot must not be driven, empty while the wheel follows."""
+    """Check of the front wheel; ``refusal``: why the robot must not be driven, else empty."""
 
     def __init__(self) -> None:
         self.refusal = ""
@@ -50,7 +50,7 @@ class Follower:
         self._angle_rad = angle_rad
 
     def look(self, angle_rad: float, now: float) -> bool:
-        """Take the measured angle, in rad; return whether it shows a new fault to follow."""
+        """Take the measured angle, in rad; return whether the wheel newly fails to follow."""
         if self.refusal == UNTIL_IT_MOVES and abs(angle_rad - self._stuck_rad) > MOVED_RAD:
             self.refusal = ""
         if self._angle_rad is None or self.refusal:

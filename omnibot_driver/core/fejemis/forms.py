@@ -3,8 +3,9 @@
 """The form of each kind of line: how many fields, and how many decimals each number has.
 
 A board prints a kind of line always in the same form, so a line in another form has lost or gained
-characters. The form is learnt: another form that came three times in a row replaces it. A kind
-whose form keeps changing is not checked. The meaning of a line does not matter here.
+characters. The form of each kind is learnt from its lines; a new form replaces the learnt one after
+three lines in a row. A kind whose form keeps changing is not checked. The module does not know the
+meaning of a line.
 """
 
 from typing import Final
@@ -12,9 +13,9 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Lines among ``OF`` with a deviating form after which their kind is not checked any more.
+"""Deviating lines, among ``OF`` lines of a kind, after which the kind is not checked any more.
 
-Lines with a right sum are rarely damaged, so fewer deviations are enough."""
+Lines with a correct sum are rarely damaged, so for them the smaller ``VARIES`` is enough."""
 OF: Final = 24
 
 Form = tuple[int, ...]

@@ -11,12 +11,12 @@ from typing import Final
 from omnibot_driver.core.fejemis.messages import FrontAngle
 
 OLDEST_S: Final = 0.06
-"""Age of an angle in s, four lines, after which the robot is stopped."""
+"""Age of the last angle in s after which the robot is stopped: four periods of the angle's line."""
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all but the frame counter."""
 SICK_LINES: Final = 3
-"""Faulty lines in a row that prove a fault; two may be damaged."""
+"""Lines in a row that must report a fault of the sensor; fewer may be damaged lines."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Jump in degrees, beyond what the fastest servo explains, that is still accepted."""
@@ -33,7 +33,7 @@ BITS: Final = (
     (1, True, "magneto core loops not finished"),
     (0, False, "supply in 5 V mode"),
 )
-"""Bit number, expected value, and the meaning of the other value (manual, fwl)."""
+"""Diagnosis bits: number, expected value, and the meaning of the other value (manual, fwl)."""
 
 
 class FrontWheel:
@@ -65,23 +65,24 @@ class FrontWheel:
 
     @property
     def stale_at(self) -> float:
-        """Time at which the angle is too old unless another one comes, in s."""
+        """Time in s at which the last angle becomes too old, unless a new angle comes before."""
         return self.heard_at + OLDEST_S + 1e-6
 
     @property
     def drives_by_rad(self) -> float:
-        """Angle that the drive board gets, in rad: limited to ±90°, as it allows.
+        """Front angle to relay to the drive board, in rad, limited to ±90°.
 
-        Beyond that, by the manual's equations, its inner wheel would be faster than the outer one.
+        Beyond 90°, by the manual's equations, the drive board's inner wheel would be faster than
+        the outer one.
         """
         return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
 
     def known(self, now: float) -> bool:
-        """Return whether the angle is known, and recent enough to drive."""
+        """Return whether the sensor works, and its last angle is recent enough to drive."""
         return not self.fault and now - self.heard_at <= OLDEST_S
 
     def hear(self, told: FrontAngle, now: float) -> bool:
-        """Take an angle from the front board; return whether it may be relayed."""
+        """Take an angle from the front board; return whether the angle is accepted."""
         words = complaints(told)
         self._sick = self._sick + 1 if words else 0
         if words:
@@ -96,7 +97,7 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Return whether the wheel can have this angle, or the rejected one before confirms it."""
+        """Return whether the wheel can have reached this angle, or two angles in a row agree."""
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (

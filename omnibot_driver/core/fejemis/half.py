@@ -2,9 +2,9 @@
 
 """One of the two Teensy boards (a half), at one port: its identity, its streams, its silence.
 
-Its streams are subscribed, and subscribed again when they do not come: a line may be lost, and a
-board that restarts forgets all subscriptions. The module knows lines and times, not what a message
-is used for.
+The driver subscribes to the board's streams, and subscribes again when they do not come: a line may
+be lost, and a board that restarts forgets all subscriptions. The module knows lines and times, not
+what a message is used for.
 """
 
 import math
@@ -49,7 +49,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 class Half:
     """State of one board; ``identity``: from its heartbeats, None before the first.
 
-    ``restarted``: the board has restarted; the reader resets it.
+    ``restarted``: whether the board has restarted; the caller resets this flag.
     """
 
     def __init__(self, line_sums: LineSums) -> None:
@@ -58,7 +58,7 @@ class Half:
         self.unknown_words: dict[str, None] = {}
         """Lines of the driver that the firmware does not know."""
         self.rejected = 0
-        """Count of the driver's lines that arrived damaged."""
+        """Count of the driver's lines that the board rejected as damaged."""
         self.identity: int | None = None
         self.role: Role | None = None
         """Role of the board; None while unknown, or if its identity is neither of the two."""
@@ -73,7 +73,7 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the stream that it needs to drive arrives."""
+        """Whether the stream arrives without which the robot must not be driven."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -86,7 +86,7 @@ class Half:
         return bool(self.decoder.sums) and not self.decoder.doubtful
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """Return the messages in these bytes, without those whose time cannot be the board's."""
+        """Return the messages in these bytes, except those with an implausible board time."""
         return [message for message in self.decoder.feed(data, now) if self._admit(message, now)]
 
     @property
@@ -98,9 +98,9 @@ class Half:
         return [key for key in streams if f"sub {key} {streams[key]}" in self.unknown_words]
 
     def not_understood(self, now: float) -> bool:
-        """Return whether many lines were damaged or unknown; True at most once a second.
+        """Return whether many recent lines were damaged or unknown; True at most once a second.
 
-        Call it after each read.
+        To be called after each read.
         """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults

@@ -2,7 +2,7 @@
 
 """Pairs gyro and acceleration lines, which carry no time, into IMU samples with a time.
 
-The board measures both each ``PERIOD_S`` of its own clock, and sends them together. So samples are
+The board measures both every ``PERIOD_S`` of its own clock, and sends them together. So samples are
 counted, and a sample's time is a phase plus a whole count of periods. Phase and count come from the
 arrivals: a sample does not arrive before its time, and one that comes after a pose in the stream is
 not older than that pose.
@@ -26,8 +26,8 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Shortest interval of arrivals, in periods, at which a late sample proves a loss.
 
-If two samples in a row are late by a period and come apart, one was lost before them. After a stall
-of the host, samples arrive at once."""
+If two samples in a row are late by a period, but arrive with such an interval, a sample was lost
+before them. Samples that waited for a stalled host arrive at once instead."""
 CYCLE_S: Final = 0.0015
 """Time in s within which lines may come in any order, as one control cycle sends them."""
 PHASE_BLOCKS: Final = 3
@@ -35,7 +35,7 @@ BLOCK: Final = 100
 
 
 class ImuPairing:
-    """Pairs the lines into samples; ``unit``: that of the acceleration lines."""
+    """Pairs gyro and acceleration lines into samples; ``unit``: unit of the acceleration lines."""
 
     def __init__(self, unit: AccelerationUnit) -> None:
         self.unit: AccelerationUnit = unit
@@ -49,7 +49,7 @@ class ImuPairing:
         self._acceleration: tuple[Acceleration, float] | None = None
         self._count = 0
         self._skipped = 0
-        """Samples of which only one half came: not reported, but counted."""
+        """Count of samples since the last report of which only gyro or acceleration came."""
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
         self._floor_s: deque[float] = deque(maxlen=PHASE_BLOCKS)
@@ -108,7 +108,7 @@ class ImuPairing:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Make the phase as late as the arrivals of the last three blocks allow."""
+        """Set the phase to the latest that the last ``PHASE_BLOCKS`` of arrivals allow."""
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)
         if self._block_s < self._phase_s:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Handles each message: finds the board that sent it, what it stops, and whether the robot obeys.
+"""Handler of all messages: passes each to the parts that use it, and keeps the robot's mode.
 
-It hands a message to the part that uses it, and keeps the mode. It does not know bytes, nor how
-lines to the boards are written.
+The handler notices restarts, faults and pauses of the boards, which stop the robot. The module does
+not know bytes, nor how lines to the boards are written.
 """
 
 from collections.abc import Callable
@@ -20,13 +20,13 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""(angle in rad, now) -> whether this shows that the front wheel does not follow."""
+"""Takes the front angle in rad and the time in s; returns whether the wheel fails to follow."""
 
 
 class Inbound:
-    """Handler of all messages; ``mode``: nominal while both halves send and the drive board obeys.
+    """Handler of all messages; ``mode``: nominal while both boards send and the drive board obeys.
 
-    ``relay_rad``: an angle of the front wheel, in rad, that the drive board has not received yet;
+    ``relay_rad``: an angle of the front wheel, in rad, to be relayed to the drive board, or None;
     see ``take_relay``.
     """
 
@@ -45,18 +45,18 @@ class Inbound:
         self.begin()
 
     def begin(self) -> None:
-        """Begin new connections."""
+        """Begin new connections: forget the mode, the angle to relay, and all timeouts."""
         self.mode = Mode.UNKNOWN
         self.relay_rad: float | None = None
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return the angle to relay to the drive board, in rad, and forget it; None without one."""
+        """Return and clear the angle to relay to the drive board, in rad; None once relayed."""
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
-        """Decode bytes of one port, and act on their messages."""
+        """Decode the bytes that came at the port ``channel``, and act on the messages in them."""
         half = self._ports.halves[channel]
         for message in half.feed(data, now):
             if half.restarted:

@@ -2,10 +2,10 @@
 
 """Requests to the boards besides motion, one job at a time, and how their success is proved.
 
-The boards do not acknowledge requests. A calibration is proved by new offsets, read back twice with
-the same result, as one in 99 damaged answers passes its sum. A loaded configuration is proved by a
-reading after the request. A saved configuration cannot be seen, so heartbeats of both boards must
-come after the request. Time is an argument.
+The boards do not acknowledge requests. A calibration has succeeded when new offsets were read twice
+with the same result; a single answer is not enough, as 1 in 99 damaged answers passes its checksum.
+A configuration is loaded when it was read after the request. Saving cannot be checked, so it is
+only required that both boards send heartbeats after the request. The module does not read a clock.
 """
 
 import math
@@ -24,20 +24,20 @@ CALIBRATION_S: Final = 1.2
 """Duration of a calibration, which averages for about a second, in s."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""Times that a repeatable request is sent."""
+"""How many times a request is sent; a calibration is requested once."""
 UNCHANGED_S: Final = 4.0
-"""Time in s after which unchanged offsets prove that they were right before."""
+"""Time in s since the start of a calibration after which unchanged offsets are accepted."""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
     Job.CALIBRATE_GYRO: (b"gyroc", b"gyrooi", "gyroo"),
     Job.CALIBRATE_ACCELEROMETER: (b"acccal2", b"accoi", "acco"),
 }
-"""For each calibration: its command, the request of its result, the keyword of the answer."""
+"""For each calibration: its command, the request for its result, and the answer's keyword."""
 
 
 def whole_seconds(delay_s: float) -> int:
-    """Return the delay, rounded, or the next whole number without a pair of ``UNSEEN`` digits."""
+    """Return the delay in whole seconds, at least 1; more if its digits had an ``UNSEEN`` pair."""
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
         seconds += 1
@@ -47,8 +47,8 @@ def whole_seconds(delay_s: float) -> int:
 class Jobs:
     """The running job; ``done``: results for the caller to take.
 
-    ``powering_off``: power ends soon. ``reload``: a configuration was loaded, so it must be read
-    again; the caller resets it.
+    ``powering_off``: power ends soon. ``reload``: the boards have loaded a configuration; the
+    caller must read the configuration again and reset this flag.
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class Jobs:
 
     @property
     def at_rest(self) -> str:
-        """The reason why the robot must be at rest now; empty if it need not be."""
+        """The reason why the running job needs the robot at rest; empty if the robot may move."""
         job = self.job
         if job is not None and (job in OFFSETS or job is Job.LOAD):
             return f"a {job.value} is under way; wait for its answer"
@@ -83,9 +83,10 @@ class Jobs:
     def ask(
         self, job: Job, token: object, now: float, *, delay_s: float = 0.0, wait_s: float = 0.0
     ) -> None:
-        """Begin a job after ``wait_s``. Raises RequestRefused while another one runs.
+        """Begin a job after ``wait_s``. Raises RequestRefused while another job runs.
 
-        ``delay_s``: time until a power off cuts the power.
+        ``token``: identifies the job in its result. ``delay_s``: time until a power off cuts the
+        power.
         """
         if self.job is not None:
             raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
@@ -102,16 +103,16 @@ class Jobs:
             self._finish(False, f"{self.job.value} failed: {why}")
 
     def interrupt(self, why: str) -> None:
-        """Fail a job that needs the robot at rest, as its conditions were disturbed."""
+        """Fail the running job for the reason ``why`` if the job needs the robot at rest."""
         if self.at_rest:
             self.cancel(why)
 
     def drive_restarted(self) -> None:
-        """Forget a requested power off, as the restarted board has forgotten it too."""
+        """Forget a requested power off, as the restarted drive board has forgotten it too."""
         self.powering_off = False
 
     def keep_power(self) -> list[bytes]:
-        """Return the line that cancels a power off; empty if none was requested."""
+        """Cancel a requested power off; return the line for it, or an empty list if not needed."""
         lines = [b"on"] if self.powering_off else []
         if self.job is Job.POWER_OFF:
             self.cancel("it was called back")

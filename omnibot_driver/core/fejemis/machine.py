@@ -3,8 +3,8 @@
 """Brush, lift and lights of the front board: what is switched on, and the lines for it.
 
 Moving parts are switched on only by a call, and never for longer than requested: the lift runs for
-the time that is sent with its voltage. Whatever ends a drive for good (e-stop, pause, a lost board)
-switches both off. The board does not acknowledge lines, so each is sent several times.
+the time that is sent with its voltage. An e-stop, a pause or a lost board switches brush and lift
+off. The board does not acknowledge lines, so lines for brush and lights are sent several times.
 """
 
 import math
@@ -18,13 +18,13 @@ OFF: Final = (b"motv 0 0", b"brush 0")
 TIMES: Final = 3
 BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
-"""Period in s at which ``brush 1`` is repeated while it is on, as a line may be lost."""
+"""Period in s at which ``brush 1`` is repeated while the brush is on, as a line may be lost."""
 PACE_S: Final = 0.05
 """Shortest time between two voltages, or two colours, in s; only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest part of a wanted voltage; from it on, one exists whose damage is detected."""
+"""Smallest part of a wanted voltage that may be sent instead, to make damage detectable."""
 LEAST_TIME_S: Final = 0.04
 
 
@@ -39,9 +39,9 @@ class Machine:
         self.volts = 0.0
         self.colour: tuple[int, int, int] | None = None
         self._lift_line = b""
-        """The lift's line, not sent yet."""
+        """Line for the lift that is still to be sent; empty if the last line was sent."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """Times in s: when it is sent, when the next one may be, and when the lift stops."""
+        """Times in s: when the line is sent, when the next may follow, and when the lift stops."""
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf
@@ -70,7 +70,7 @@ class Machine:
     def lift(self, volts: float, now: float, longest_s: float) -> None:
         """Move the lift at ``volts`` (positive raises the wheel) for ``longest_s`` at most.
 
-        0 V stops it at once. Raises CommandRefused for NaN or infinity.
+        0 V stops the lift at once. Raises CommandRefused for NaN or infinity.
         """
         if not math.isfinite(volts):
             raise CommandRefused(
@@ -89,7 +89,7 @@ class Machine:
         self._led_at = max(now, self._led_again_at)
 
     def begin(self) -> None:
-        """Switch brush and lift off and send the colour again: the front board is new."""
+        """Switch brush and lift off and send the colour again, as a board has restarted."""
         self.off()
         self._led_left = TIMES if self.colour else 0
         self._led_at = -math.inf if self.colour else math.inf
@@ -102,7 +102,10 @@ class Machine:
         self._next_at = -math.inf
 
     def switch_off(self) -> list[bytes]:
-        """Switch brush and lift off and restore the lights; return the lines for it."""
+        """Switch brush and lift off; return the lines for it.
+
+        The lines also let the board show its own lights again.
+        """
         self.off()
         lights = [b"ledon 1", b"leds"] if self.colour else []
         return [*TIMES * OFF, *lights]
@@ -145,7 +148,7 @@ class Machine:
 
 
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
-    """Return a ``motv`` line whose damage its sum detects, and the time in s that it sends."""
+    """Return a ``motv`` line in which the sum detects damage, and the line's run time in s."""
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The messages of both boards' help lists that report something, with numbers as they are sent.
+"""The messages that the two boards send, one class for each kind, with numbers as sent.
 
-Units are the board's: degrees, m/s², µT, V, A, m, s. Messages that are only shown in diagnostics
-are a ``Status`` or ``Words``. The module knows neither the characters of a message nor its use.
+Units are the boards': degrees, m/s², µT, V, A, m, s. Messages that are only shown in diagnostics
+are a ``Status`` or ``Words``. The module neither parses nor uses messages.
 """
 
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from omnibot_driver.core.values import value
 
 @value(frozen=True, slots=True)
 class Heartbeat:
-    """``hbt``: the heartbeat.
+    """``hbt``: the heartbeat, with the board's time, identity, firmware version and voltage.
 
-    ``state``: on the drive board ``rcSource``, -1 while it is stopped.
+    ``state``: on the drive board its variable rcSource, -1 while the board ignores motion commands.
     """
 
     time_s: float
@@ -36,7 +36,7 @@ class FrontAngle:
 
 @value(frozen=True, slots=True)
 class BoardPose:
-    """``pose``: the board's dead reckoning; ``decimals``: those of x and y as sent."""
+    """``pose``: pose by the board's dead reckoning; ``decimals``: decimals of x and y as sent."""
 
     time_s: float
     x_m: float
@@ -47,7 +47,7 @@ class BoardPose:
 
 @value(frozen=True, slots=True)
 class WheelSpeeds:
-    """``vel``: speeds of the rims; ``time_s``: the board's time, where the firmware sends it."""
+    """``vel``: rim speeds of both wheels; ``time_s``: board's time, None if it was not sent."""
 
     left_mps: float
     right_mps: float
@@ -109,7 +109,7 @@ class Distance:
 
 @value(frozen=True, slots=True)
 class Infrared:
-    """``ir``: distances of both sensors in m, and the calibration where it is sent."""
+    """``ir``: distances of both sensors in m, and the calibration values if they were sent."""
 
     distances_m: tuple[float, float]
     calibration: tuple[float, ...] = ()
@@ -117,7 +117,7 @@ class Infrared:
 
 @value(frozen=True, slots=True)
 class WheelConfiguration:
-    """``conf``: radius of left and right wheel, gear, ticks, track, control period."""
+    """``conf``: both wheel radii, gear ratio, encoder ticks a revolution, track, control period."""
 
     left_radius_m: float
     right_radius_m: float
@@ -128,7 +128,7 @@ class WheelConfiguration:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The numbers without the period, which cannot be written."""
+        """All numbers except the control period, which cannot be written to the board."""
         return (
             self.left_radius_m,
             self.right_radius_m,
@@ -140,7 +140,7 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: by the help text first the distance of the steered wheel, then the track."""
+    """``confs``: by the help text, distance of the steered wheel from the axle, then track."""
 
     first_m: float
     second_m: float
@@ -164,7 +164,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """Text: a name, a version, an answer."""
+    """A line of text after a keyword: a name, a version, or an answer."""
 
     keyword: str
     text: str
@@ -172,7 +172,7 @@ class Words:
 
 @dataclass(frozen=True, slots=True)
 class Comment:
-    """A line that begins with ``#`` or ``--``, as the text of ``help``."""
+    """A line that begins with ``#`` or ``--``, such as a line of the board's help text."""
 
     text: str
 

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``rc`` lines for each board, in digits of which any two lost ones are detected.
+"""``rc`` lines for each board, written so that the loss of any two characters is detected.
 
-The numbers that can be written so have gaps (`numerals.py`), but a board does not need both numbers
-of a line exactly. The front board takes the angle from the ratio of speed and turn rate. The drive
-board takes the speed of the outer wheel from the root of the sum of their squares, with the sign of
-the speed. So each line is exact enough in that quantity, and the nearest such line to the command.
-Its sum is chosen so that it does not hide a lost character of a number (`outbound.py`).
+Not every number can be written so (`numerals.py`), but a board does not need both numbers of a line
+exactly. The front board takes the angle from the ratio of speed and turn rate. The drive board
+takes the speed of the outer wheel from the root of the sum of their squares, with the sign of the
+speed. Of all lines that are exact enough in that quantity, the nearest to the command is chosen.
+Lines whose sum may hide a lost character of a number are avoided (`outbound.py`).
 """
 
 import math
@@ -18,9 +18,9 @@ from omnibot_driver.core.fejemis.outbound import robust
 
 STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
-"""Speed of the outer wheel in m/s below which it is commanded to stop."""
+"""Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Smallest speed in m/s that has writable numbers around it."""
+"""Smallest speed in m/s near which there are enough numbers that can be written."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Relative speed error of a line that is tolerated."""
@@ -30,12 +30,12 @@ SLOWEST: Final = 30.0
 SCALES: Final = 4.0
 """Largest factor between a number for the front board and the commanded one."""
 Candidate = tuple[float, str, str]
-"""Cost, speed in m/s, turn rate in degrees per second; without signs."""
+"""A possible line: cost, text of the speed in m/s and of the turn rate in degrees/s, no signs."""
 
 
 @lru_cache(maxsize=512)
 def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes:
-    """Return the front board's line, whose angle is atan2(wheelbase · turn, speed).
+    """Return the front board's line, which sets the angle atan2(wheelbase · turn rate, speed).
 
     The magnitudes of speed and turn rate do not matter, only their ratio.
     """
@@ -63,7 +63,10 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 
 @lru_cache(maxsize=512)
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Return the drive line: its outer speed is sqrt(speed² + turn²) with the speed's sign."""
+    """Return the drive board's line, which sets the outer wheel to sqrt(speed² + turn²) in m/s.
+
+    The sign is that of the speed.
+    """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
         return STOP
@@ -85,7 +88,7 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the cheapest line whose sum is robust, or the cheapest if none has a robust sum."""
+    """Return the line of least cost among those that are ``robust``; if none is, among all."""
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)
     return next(filter(robust, lines), _line(signs, *found[0][1:]))

@@ -2,9 +2,10 @@
 
 """Numbers that can be written without two digits whose joint loss a sum does not detect.
 
-The source ``2`` is in each line, so its numbers do not contain ``1``. Of ``0`` and ``3`` they do
-not contain ``3``; with a point, they do not contain ``5``; with a minus sign, ``6``. So there are
-gaps, of which the largest is from 1 to 2.
+A sum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or ``-``
+and ``6``. Each line contains the source ``2``, so the numbers here do not contain ``1``. They also
+do not contain ``3``, nor ``5``, nor, in a line with a minus sign, ``6``. So between the numbers
+there are gaps, of which the largest (relative to the number) is from 1 to 2.
 """
 
 from bisect import bisect_left, bisect_right
@@ -19,7 +20,7 @@ LARGEST: Final = 4
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return these numbers from 0.0001 to 10000 in order, and their texts.
+    """Return all such numbers from 0.0001 to 10000 in rising order, and their texts.
 
     ``negative``: the line has a minus sign.
     """
@@ -37,9 +38,9 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 
 
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
-    """Return the nearest one to a positive number, with its text.
+    """Return the number of ``numerals`` nearest to a positive ``number``, with its text.
 
-    ``down``: the nearest one that is not above the number, where one exists.
+    ``down``: return the nearest that is not above ``number``, if such a number exists.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
@@ -49,14 +50,14 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
 
 
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return those from ``least`` to ``most``, with their texts."""
+    """Return the numbers of ``numerals`` from ``least`` to ``most``, with their texts."""
     numbers, texts = numerals(negative=negative)
     part = slice(bisect_left(numbers, least), bisect_right(numbers, most))
     return list(zip(numbers[part], texts[part], strict=True))
 
 
 def _written(mantissa: str, power: int) -> str:
-    """Return the text of three digits of which the first has this power of ten."""
+    """Return the text of the number with these three digits; ``power``: of ten, of the first."""
     if power >= SIGNIFICANT - 1:
         return mantissa + "0" * (power - SIGNIFICANT + 1)
     if power >= 0:

@@ -2,9 +2,10 @@
 
 """Whether the drive board obeys, by its heartbeat, and why not: a pause, or the driver's e-stop.
 
-``stop`` serves both the e-stop and the pause. The driver's own e-stop is not taken for a pause, and
-its release sends ``start`` until the heartbeat shows that the board obeys. A pause remains until
-the next start. The module knows rcSource and times, not lines.
+The driver sends ``stop`` to the board for both. The driver's own e-stop is not regarded as a pause:
+after its release, ``start`` is sent until the heartbeat shows that the board obeys. A pause remains
+until the user calls start. The module knows rcSource (the source of commands that the board reports
+to obey) and times, not lines.
 """
 
 import math
@@ -13,7 +14,7 @@ from typing import Final
 STOPPED: Final = -1.0
 """rcSource of a drive board that ignores all motion commands (manual, start)."""
 RELEASED_S: Final = 1.0
-"""Time in s for which ``start`` is repeated after an e-stop; the board may be stopped meanwhile."""
+"""Time in s after the release of an e-stop for which ``start`` is repeated, until it is obeyed."""
 START_AGAIN_S: Final = 0.2
 
 
@@ -35,7 +36,7 @@ class Obedience:
         self.pause_said = False
         self._released_at = -math.inf
         self.start_at = math.inf
-        """Time at which to send ``start``, in s."""
+        """Time in s at which ``start`` is to be sent; infinity if not at all."""
 
     def hear(self, source: float) -> None:
         """Take rcSource from a heartbeat of the drive board."""
@@ -62,7 +63,7 @@ class Obedience:
         self.estopped = False
 
     def stopped(self, now: float, *, was_paused: bool) -> bool:
-        """Return whether the drive board ignores commands, other than by the driver's e-stop."""
+        """Return whether the drive board is stopped for another reason than the driver's e-stop."""
         if self.source != STOPPED:
             return False
         if self.pause_said or was_paused:
@@ -70,7 +71,7 @@ class Obedience:
         return not self.estopped and now - self._released_at > RELEASED_S
 
     def start_due(self, now: float) -> bool:
-        """Return whether to send ``start`` now, and regard it as sent."""
+        """Return whether to send ``start`` now; if so, regard ``start`` as sent."""
         if now < self.start_at:
             return False
         again = now - self._released_at < RELEASED_S

@@ -4,12 +4,12 @@
 
 A pose is absolute, but has few digits: a millimetre in 20 ms is 0.05 m/s. The wheel speeds show the
 motion more finely. So a displacement is the integral of the speeds between two poses, corrected
-towards the pose. It is the complete difference of the poses if that and the integral differ by more
-than rounding: then lines were lost, or a wheel was turned quickly. The displacements add up to the
-pose.
+towards the newer pose. If the integral and the difference of the poses differ by more than
+rounding, lines were lost or a wheel was turned quickly; then the displacement is the difference of
+the poses. The displacements add up to the pose.
 
-A pose that such a robot cannot have reached is not used until the next one. If the two agree,
-either the pose before both was wrong, or the board has a new frame (``enc0``).
+A pose that the robot cannot have reached is held back until the next pose comes. If the two agree,
+either the pose before both was wrong, or the board has a new frame (command ``enc0``).
 """
 
 import math
@@ -20,25 +20,27 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Part of a difference within rounding that one displacement corrects."""
+"""Part of the difference between pose and speeds that one displacement corrects, if only rounding.
+"""
 ROUNDINGS: Final = 1.5
-"""Difference in digits within rounding: each pose is off by half a digit.
+"""Largest difference, in units of the last digit sent, that is explained by rounding.
 
-The heading turns the error of one axis into the other."""
+Each of two poses is off by half a unit, and the heading turns the error of one axis into the other.
+"""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""Distance in m and angle in rad that a pose may deviate from the motion by the speeds."""
+"""Distance in m and angle in rad by which a pose may differ from the integral of the speeds."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
 FRESH_S: Final = 0.1
-"""Age in s up to which speeds are used."""
+"""Age in s up to which wheel speeds are used."""
 LEAST_S: Final = 0.001
 STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""Poses in a row that agree with each other, but not with earlier ones, and prove a new frame."""
+"""Count of rejected poses in a row, each agreeing with the one before, that prove a new frame."""
 
 
 class PoseOdometry:
@@ -55,7 +57,7 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection; the board's frame may be unchanged."""
+        """Begin a new connection; the last pose is kept, as the board may still use its frame."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
         """Count of rejected poses in a row that agreed with the one before."""
@@ -70,7 +72,7 @@ class PoseOdometry:
         return speeds is not None and max(map(abs, (speeds.left_mps, speeds.right_mps))) > STILL_MPS
 
     def forget(self) -> None:
-        """Forget the frame: the restarted board has begun a new one."""
+        """Forget the last pose: the restarted board has begun a new frame."""
         self._restarted |= self._pose is not None
         self._settled_s = -math.inf
         self._pose = None
@@ -81,9 +83,9 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
 
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement up to this pose, and every 0.2 s the sum of all as a pose.
+        """Return the displacement up to this pose, and every 0.2 s also the sum of all as a pose.
 
-        The sum makes up for a displacement that is rejected afterwards.
+        That pose makes up for displacements that a later check rejects.
         """
         displacement = self.pose(pose, now)
         if displacement is None:
@@ -95,7 +97,10 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
-        """Return the displacement up to this pose; None for the first and for a rejected one."""
+        """Return the displacement up to this pose; None for a first or a rejected pose.
+
+        After a restart of the board, the first pose gives a displacement of 0.
+        """
         before = self._pose
         if before is None:
             self._begin_at(pose)
@@ -140,7 +145,7 @@ class PoseOdometry:
         )
 
     def _rolled(self, seconds: float, now: float) -> Pose | None:
-        """Return the motion by the speeds in ``seconds``; None if they are unknown then."""
+        """Return the motion in ``seconds`` by the wheel speeds; None if the speeds are too old."""
         speeds = self._speeds
         if speeds is None or now - self._speeds_at > FRESH_S or seconds > FRESH_S:
             return None

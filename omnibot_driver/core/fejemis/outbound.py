@@ -3,9 +3,9 @@
 """Lines to the boards, written so that damage cannot turn one command into another.
 
 A sum modulo 99 does not detect two lost characters whose codes add up to 99 or 198 (`0` and `3`,
-`1` and `2`, `.` and `5`, `-` and `6`). A motion line must not have both of a pair, see
-`motion_lines.py`. Two more kinds of damage depend on the sum, so the digits of a motion line are
-chosen by that too:
+`1` and `2`, `.` and `5`, `-` and `6`). A motion line must not contain both characters of a pair,
+see `motion_lines.py`. Two more kinds of damage are detected or not depending on the value of the
+sum, so the digits of a motion line are chosen to get a suitable sum:
 
 * A lost line end joins two lines. The result passes if the sum of the second line, with its prefix,
   equals the code of a character that was lost as well. So that sum must not be the code of a
@@ -31,7 +31,7 @@ _COMPLEMENTS: Final = tuple(
 
 @lru_cache(maxsize=1024)
 def line(text: bytes, *, sums: bool) -> bytes:
-    """Return the bytes of one line, with its sum if ``sums`` and its line end."""
+    """Return the bytes of one line with its line end, and with its sum in front if ``sums``."""
     if not sums:
         return text + b"\n"
     before = b"" if robust(text) else b"\n"
@@ -39,7 +39,7 @@ def line(text: bytes, *, sums: bool) -> bytes:
 
 
 def lines(*texts: bytes, sums: bool) -> bytes:
-    """Return the bytes of several lines, in order."""
+    """Return the bytes of several lines in order, each as ``line`` makes them."""
     return b"".join([line(text, sums=sums) for text in texts])
 
 

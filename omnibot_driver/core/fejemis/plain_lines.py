@@ -2,10 +2,11 @@
 
 """``rc`` lines without a sum, written so that undetected damage has little effect.
 
-A lost space or a lost source shifts each number to the place before it. The drive board takes the
-root of the sum of the squares of speed and turn rate; so it gets that root as the speed, with a
-turn rate of 0. Shifted, the line commands a stop. The remaining risk is a lost point or a lost
-digit after it; such a line is obeyed until the next one, which is sent with the next angle of the
+An ``rc`` line has a source (``2``), a speed and a turn rate. If a space or the source is lost, each
+later number takes the place before it. The drive board uses only the root of the sum of the squares
+of speed and turn rate; so it gets that root as the speed, with a turn rate of 0. If these numbers
+move one place, the line commands a stop. The remaining risk is a lost decimal point or a lost digit
+after the point; such a line is obeyed until the next line, which is sent with the next angle of the
 front wheel.
 """
 
@@ -15,14 +16,14 @@ from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, STOP
 
 
 def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Return the front board's line, in few digits, as short lines are damaged less often."""
+    """Return the front board's line with few digits, as short lines are damaged less often."""
     return b"rc 2 %s %s" % (_short(speed_mps, 4), _short(math.degrees(turn_radps), 2))
 
 
 def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line: the outer wheel's speed, forward or backward.
 
-    The turning follows from the angle of the front wheel.
+    The board computes the turn rate from the angle of the front wheel.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:

@@ -21,7 +21,7 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
 }  # fmt: skip
 """Requests for each board, sent in this order, repeatedly."""
 WITH_SUMS: Final = (b"svpi", b"svjti")
-"""Requests that need a sum: without its last character, each is a command that sets the servo."""
+"""Requests sent only with a sum: if their last letter is lost, they are commands to the servo."""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1
 
@@ -36,7 +36,7 @@ class Polls:
         self.begin()
 
     def begin(self) -> None:
-        """Begin the requests from the first one: the board is new."""
+        """Start again with the first request, as the board is new."""
         self._turn = 0
         self._next_at = self._sonar_at = -math.inf
 
@@ -50,7 +50,7 @@ class Polls:
         self._unknown = {text for text in ASKED[self._role] if text.decode("ascii") in words}
 
     def due(self, now: float, *, sums: bool) -> list[bytes]:
-        """Return the lines to send now; ``sums``: the board detects a damaged line."""
+        """Return the lines to send now; ``sums``: whether lines to the board have a sum."""
         texts = []
         if self._role == "drive" and now >= self._sonar_at:
             self._sonar_at = now + SONAR_EVERY_S
@@ -64,7 +64,7 @@ class Polls:
         return texts
 
     def hear(self, message: Message) -> None:
-        """Take an answer."""
+        """Store the answer to a request as text; ignore other messages."""
         if isinstance(message, Status):
             self.told[message.keyword] = " ".join(f"{number:g}" for number in message.numbers)
         elif isinstance(message, Words):

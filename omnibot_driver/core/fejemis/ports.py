@@ -40,30 +40,30 @@ class Ports:
             half.begin(settings.line_sums)
 
     def configure(self, settings: FejemisSettings) -> None:
-        """Apply the setting whether lines have sums."""
+        """Apply ``settings.line_sums``: whether lines have sums."""
         for half in self.halves:
             if half.decoder.line_sums != settings.line_sums:
                 half.decoder.line_sums = settings.line_sums
 
     @property
     def ready(self) -> bool:
-        """Whether both boards send their needed streams, and are one of each kind."""
+        """Whether one drive and one front board are connected and send what driving requires."""
         return all(half.ready for half in self.halves) and not self.trouble
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both boards have sums."""
+        """Whether lines to both boards carry checksums."""
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:
-        """Return the half with this role; None if neither has it, or both."""
+        """Return the half with this role; None if neither half or both have this role."""
         first, second = self.halves
         if first.role == role:
             return None if second.role == role else first
         return second if second.role == role else None
 
     def role(self, channel: int) -> Role:
-        """Return the role of the board at this channel, or the assumed one."""
+        """Return the role of the board at this channel; while unknown, the expected role."""
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
@@ -77,7 +77,7 @@ class Ports:
 
     @property
     def trouble(self) -> str:
-        """The reason why these boards are not one robot, with advice; empty while they may be."""
+        """The reason why the connected boards cannot be one robot, with advice; else empty."""
         for name, half in zip(PARAMETERS, self.halves, strict=True):
             if half.identity is not None and half.role is None:
                 return (

@@ -14,7 +14,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """Requests besides motion; the value is the name in messages to the user."""
+    """Requests besides motion; each value is the request's name in messages to the user."""
 
     CALIBRATE_GYRO = "gyro calibration"
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"
@@ -64,7 +64,7 @@ class BatteryReading:
 
 @value(frozen=True, slots=True)
 class RangeReading:
-    """Distance by one sensor; ``distance_m``: infinite if it does not detect anything."""
+    """Distance by one sensor; ``distance_m``: infinite if the sensor does not detect anything."""
 
     name: RangeName
     distance_m: float

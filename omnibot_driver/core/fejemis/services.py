@@ -2,7 +2,7 @@
 
 """Requests of the user besides motion: brush, lift, LED band, and jobs.
 
-The module knows when each request is allowed, not its lines or the proof of its success.
+The module knows when each request is allowed, not how the request is sent or confirmed.
 """
 
 from typing import Final, Protocol
@@ -17,7 +17,7 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""Time after Stop before a configuration is loaded, in s."""
+"""Time in s between a Stop and the loading of a configuration, for a robot that moves."""
 
 
 class Robot(Protocol):
@@ -25,7 +25,7 @@ class Robot(Protocol):
 
     @property
     def mode(self) -> Mode:
-        """The mode: nominal while both halves send data and the drive board obeys."""
+        """The mode: nominal while both boards send data and the drive board obeys."""
 
     @property
     def driving(self) -> bool:
@@ -33,7 +33,7 @@ class Robot(Protocol):
 
     @property
     def settings(self) -> FejemisSettings:
-        """The settings, which have the services' times and delays."""
+        """The settings, which include the time of the lift and the delay of a power off."""
 
 
 class Services:
@@ -46,7 +46,7 @@ class Services:
         self._odometry, self._told = odometry, told
 
     def set_brush(self, on: bool, now: float) -> None:
-        """Switch the brush on or off. Raises RequestRefused while it must not run."""
+        """Switch the brush on or off. Raises RequestRefused while the brush must not run."""
         if on and (reason := self._why_not_turn()):
             raise RequestRefused(f"brush not switched on: {reason}")
         self._upkeep.machine.set_brush(on)
@@ -54,7 +54,7 @@ class Services:
     def lift(self, volts: float, now: float) -> None:
         """Move the lift for ``command_timeout_s`` at most; positive volts raise the wheel.
 
-        Raises CommandRefused while it must not run.
+        Raises CommandRefused while the lift must not run.
         """
         if volts and (reason := self._why_not_turn()):
             raise CommandRefused(f"lift_cmd refused: {reason}")
@@ -66,7 +66,10 @@ class Services:
         self._upkeep.machine.set_colour(red, green, blue, now)
 
     def ask(self, job: Job, token: object, now: float) -> None:
-        """Begin a job, whose result comes as a JobDone. Raises RequestRefused."""
+        """Begin a job, whose result comes as a JobDone.
+
+        Raises RequestRefused if the job is not possible now.
+        """
         robot, moving = self._robot, self._odometry.moving
         if robot.mode is Mode.UNKNOWN:
             raise RequestRefused(

@@ -12,16 +12,16 @@ AccelerationUnit = Literal["m/s^2", "g"]
 
 
 class Written(Enum):
-    """Settings that a user may write to a board: the command, and the count of numbers."""
+    """Settings that a user may write to a board, each with its command and count of numbers."""
 
     WHEELS = "confw", 5
     """Radius of the left and right wheel in m, gear, encoder ticks a revolution, track in m."""
     STEERING = "confs", 2
     """Track and distance of the steered wheel from the axle, in m; on both boards."""
     FRONT_WHEEL = "fwoffset", 2
-    """Offset in degrees, and 1 where the angle is inverted."""
+    """Offset of the front angle in degrees, and 1 if the angle is inverted, else 0."""
     INFRARED = "irc", 4
-    """Raw values at 13 cm and 50 cm, of sensor 1, then 2."""
+    """Raw values of sensor 1 at 13 cm and 50 cm, then those of sensor 2."""
     MAGNETOMETER = "magcal", 12
     """Three offsets, then a 3 × 3 matrix, row by row."""
     ACCELEROMETER = "acccal", 6
@@ -43,9 +43,9 @@ class FejemisSettings:
     ``track_m``, ``wheelbase_m``: the geometry that is used until the boards report theirs.
     ``written``: values to write to the boards; all others are only read. ``line_sums``: whether
     lines carry a sum; ``auto`` learns it from the heartbeats. ``allow_reverse``: whether a negative
-    speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the longest time that is
-    sent with a voltage of the lift. ``power_off_delay_s``: between the request and the end of
-    power. ``low_cell_v``: voltage per cell below which a battery is reported as low.
+    speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the longest time that the
+    lift runs after one command. ``power_off_delay_s``: time from a request to switch off until the
+    power is cut. ``low_cell_v``: voltage per cell below which a battery is reported as low.
     """
 
     track_m: float = 0.4

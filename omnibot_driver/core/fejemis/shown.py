@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Diagnostics of this board only, by names for people."""
+"""Diagnostics that only a Fejemis has, as texts by readable names."""
 
 import math
 from typing import Final
@@ -11,14 +11,14 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Count of a board's latest unknown lines that are shown."""
+"""How many of the latest lines that a board's firmware does not know are shown."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 
 def own_figures(
     ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None
 ) -> dict[str, str]:
-    """Return version, identity and the values read from each board; ``source``: rcSource."""
+    """Return the diagnostics of both boards by name; ``source``: rcSource of the drive board."""
     front, machine = translation.front, upkeep.machine
     own = {"Ports": "swapped" if ports.swapped else "as configured"}
     for role in ROLES:

@@ -2,14 +2,15 @@
 
 """Conversion of a body twist into commands for both boards.
 
-The drive board does not obey ``rc`` literally: its outer wheel turns with the root of v² + w²,
-about the centre given by the *measured* front angle. So both numbers are multiplied by (`|v|` +
-`|w|`·B/2) / sqrt(v² + w²), which makes that root the speed of the outer wheel.
+The command ``rc`` carries a speed v and a turn rate w. The drive board does not obey both: it
+drives its outer wheel at the root of v² + w², about the centre given by the *measured* front angle.
+So the driver multiplies v and w by (`|v|` + `|w|`·B/2) / sqrt(v² + w²), which makes that root the
+wanted speed of the outer wheel.
 
-While the front wheel moves to its angle, the drive board gets a lower speed: at most as much as
-moves and turns the body no faster than commanded. A turn on the spot begins when the front wheel is
-across; until then the drive board is commanded to stop. The module knows geometry and angles, not
-lines.
+While the front wheel moves to its angle, the drive board gets a lower speed, so that the body moves
+and turns hardly faster than commanded. A turn on the spot begins when the front wheel has reached
+its angle; until then the drive board is commanded to stop. The module knows geometry and angles,
+not lines.
 """
 
 import math
@@ -21,21 +22,23 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Angle of the front wheel in rad from which the body turns on the spot."""
+"""Target angle of the front wheel in rad from which the command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
-"""Deviation in rad of the front wheel up to which a turn on the spot continues."""
+"""Deviation of the front wheel from its target, in rad, up to which a turn on the spot continues.
+
+Up to ``ALIGNED_RAD`` a turn on the spot may begin, and other motion has full speed."""
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation in rad of the front wheel whose effect on the body is tolerated while it moves."""
+"""Deviation of the front wheel, in rad, whose effect on the body's motion is tolerated."""
 
 
 @value(frozen=True, slots=True)
 class Steered:
-    """Command for both boards, and what the body does with it.
+    """A command for both boards, and the motion of the body that results.
 
-    ``speed_mps``, ``turn_radps``: for the front board; the drive board gets ``part`` of both.
-    ``angle_rad``: the front wheel's target. ``twist``: the body's motion at the present front
-    angle. ``whole``: the speed is not limited.
+    ``speed_mps``, ``turn_radps``: numbers for the front board; the drive board gets both multiplied
+    by ``part``. ``angle_rad``: the front wheel's target. ``twist``: the body's motion at the
+    present front angle. ``whole``: whether ``part`` is 1, so that the speed is not limited.
     """
 
     speed_mps: float
@@ -48,14 +51,14 @@ class Steered:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Geometry of the boards: B and F of the manual, in m."""
+    """Geometry of the robot in m: track and wheelbase, which the manual calls B and F."""
 
     track_m: float
     wheelbase_m: float
 
     @property
     def kinematics(self) -> SteeredKinematics:
-        """The kinematics with wheels of 1 m radius, whose rates are the speeds of the rims."""
+        """Kinematics for wheels of 1 m radius: wheel rates in rad/s are rim speeds in m/s."""
         return SteeredKinematics(1.0, self.track_m, self.wheelbase_m)
 
 
@@ -63,7 +66,7 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def scale(twist: BodyTwist, track_m: float) -> float:
-    """Return the factor for both numbers of ``rc``; 1 at rest."""
+    """Return the factor by which both numbers of an ``rc`` command are multiplied; 1 at rest."""
     root = math.hypot(twist.vx_mps, twist.yaw_rate_radps)
     return outer_mps(twist, track_m) / root if root else 1.0
 
@@ -78,7 +81,7 @@ def steer(
 ) -> Steered:
     """Return the command for both boards; ``angle_rad``: the front angle, None while unknown.
 
-    ``turning``: the body turns on the spot already.
+    ``turning``: whether the body already turns on the spot.
     """
     target_rad = geometry.kinematics.steering_rad(wanted)
     factor = scale(wanted, geometry.track_m)
@@ -103,7 +106,7 @@ def steer(
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
     """Return the body's twist from the outer wheel's speed and the front angle.
 
-    It follows the manual's equations. A negative speed is backward.
+    The equations are the manual's. A negative ``outer_mps`` is backward.
     """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)
@@ -113,7 +116,7 @@ def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTw
 def told_twist(
     speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
 ) -> BodyTwist:
-    """Return the body's twist when the drive board gets this command, by the manual's equations."""
+    """Return the twist of a body whose drive board obeys these numbers of ``rc``."""
     outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
     return body_twist(outer, geometry, angle_rad)
 
@@ -121,7 +124,7 @@ def told_twist(
 def _allowed(
     wanted: BodyTwist, geometry: Geometry, target_rad: float, angle_rad: float, *, turning: bool
 ) -> float:
-    """Return the outer rim's largest speed at this front angle, in m/s; infinity without limit."""
+    """Return the speed limit of the outer rim at this front angle, in m/s, or infinity."""
     off_rad = abs(angle_rad - target_rad)
     if abs(target_rad) >= ACROSS_RAD:
         near = off_rad <= (STILL_ALIGNED_RAD if turning else ALIGNED_RAD)

@@ -2,9 +2,9 @@
 
 """The sum before a line, ``;NN``, by which a board detects most damaged lines.
 
-NN is the sum of the characters from 0x20 on, modulo 99, plus 1. One damaged line in 99 passes, and
-so does a line that lost a ``c``, or two characters whose codes add up to 99. The module knows
-characters, not the meaning of a line.
+NN is the sum of the codes of all characters from 0x20 on, modulo 99, plus 1. The sum does not
+detect 1 in 99 damaged lines, the loss of a ``c`` (code 99), or the loss of two characters whose
+codes add up to 99. The module knows characters, not the meaning of a line.
 """
 
 import re
@@ -16,17 +16,17 @@ _SUMMED: Final = re.compile(rb";([0-9]{2})(.*)", re.DOTALL).fullmatch
 
 
 def sum_of(text: bytes) -> int:
-    """Return the sum of the characters after the prefix, 1..99."""
+    """Return the sum, 1..99, of a line's text without its ``;NN``."""
     return sum(text.translate(None, _CONTROL)) % MODULUS + 1
 
 
 def with_sum(text: bytes) -> bytes:
-    """Return the text with its sum in front, without a line end."""
+    """Return the text with its sum, ``;NN``, in front; a line end is not added."""
     return b";%02d%s" % (sum_of(text), text)
 
 
 def without_sum(line: bytes) -> tuple[bytes, bool | None]:
-    """Return the text of a line, and whether its sum is right (None without a sum)."""
+    """Return the text of a line, and whether its sum is right (None if the line has none)."""
     if not line.startswith(b";"):
         return line, None
     found = _SUMMED(line)

@@ -2,9 +2,9 @@
 
 """Conversion of a Teensy's time into the host's time, and stamps for the readings of both boards.
 
-A line comes late, never early, so the arrivals lie above a straight line over the Teensy's time
-(`core/timing/clock_fit.py`). A time that is later than a line can be, or earlier than possible, was
-damaged, or the board has restarted.
+A line arrives late, never early. So the clock is the straight line below all arrival times, drawn
+over the Teensy's time (`core/timing/clock_fit.py`). If a Teensy's time is too far from the clock,
+the line was damaged, or the board has restarted.
 """
 
 from collections.abc import Sequence
@@ -15,21 +15,22 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Largest time in s by which a line may seem early; beyond, its time cannot be true."""
+"""Longest time in s by which a line may seem to arrive early; else its time is implausible."""
 LATE_S: Final = 1.0
-"""Largest delay of a line in s, even if the host was busy; beyond, its time is another one."""
+"""Longest delay of a line in s, even if the host was busy; else its time is implausible."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""Difference in s between times that agree.
+"""Largest difference in s between times that agree.
 
-``AGAIN`` implausible times in a row that agree, over ``AGAIN_AFTER_S`` or longer, belong to a board
-that has restarted. Lines that waited while the host was stalled arrive at once."""
+If ``AGAIN`` implausible times in a row agree, over ``AGAIN_AFTER_S`` or longer, the clock begins
+again with them. A shorter series may be lines that waited for a stalled host and arrived at once.
+"""
 SMALLEST_STEP_S: Final = 1e-6
 
 
 class TeensyClock:
-    """Clock of one board; ``restarted``: the last time seen began a new time base."""
+    """Clock of one board; ``restarted``: whether the last time showed a restart of the board."""
 
     def __init__(self) -> None:
         self.restarted = False
@@ -40,12 +41,12 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """The first of the implausible times, with its arrival, and their count."""
+        """Count of implausible times in a row; ``_odd``: the first one, and when it arrived."""
         self._last_s = 0.0
 
     @property
     def known(self) -> bool:
-        """Whether a time has been seen."""
+        """Whether the board has sent a time."""
         return self._fit is not None
 
     @property
@@ -54,19 +55,19 @@ class TeensyClock:
         return 0.0 if self._fit is None else (TICK_S / self._fit.slope_s - 1.0) * 1e6
 
     def host_s(self, board_s: float) -> float:
-        """Return the host's time at a time of the board, in s."""
+        """Convert a time of the board to the host's time, in s."""
         assert self._fit is not None
         tick = int(board_s / TICK_S)
         return self._fit.at(tick) + board_s - tick * TICK_S
 
     def board_s(self, host_s: float) -> float:
-        """Return the board's time at a time of the host, in s, as if without delay."""
+        """Convert a time of the host to the board's time, in s (inverse of ``host_s``)."""
         assert self._fit is not None
         near_s = host_s - self.host_s(self._last_s) + self._last_s
         return near_s + (host_s - self.host_s(near_s))
 
     def see(self, board_s: float, now: float) -> bool:
-        """Take the time in a line that has just come; return whether it can be the board's."""
+        """Take the board time of a line that came at ``now``; return whether it is plausible."""
         self.restarted = False
         if self._fit is not None:
             late_s = now - self.host_s(board_s)
@@ -82,7 +83,7 @@ class TeensyClock:
         return True
 
     def _is_new_time(self, board_s: float, now: float) -> bool:
-        """Return whether enough implausible times agree, and then begin anew with this one."""
+        """Return whether enough implausible times agree; if so, begin the clock again here."""
         if self._odd is None or abs((board_s - self._odd[0]) - (now - self._odd[1])) >= AGREE_S:
             self._odd, self._odds = (board_s, now), 1
             return False
@@ -99,9 +100,10 @@ class TeensyClock:
 
 
 class StampedReadings:
-    """The readings of one call with their stamps; a ``ReadingClock``.
+    """The readings of one call of the board, with their timestamps; a ``ReadingClock``.
 
-    The stamps of one kind of reading increase, and are not later than the call.
+    The timestamps of one kind of reading increase. Those of past samples are limited to the time
+    of the call.
     """
 
     skew_ppm = 0.0
@@ -112,12 +114,12 @@ class StampedReadings:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a call, without readings."""
+        """Forget the readings of the last call."""
         self.readings: list[Reading] = []
         self._stamps: list[float] = []
 
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
-        """Add a reading with its stamp."""
+        """Add a reading; move ``stamp_s`` if it is after ``now`` or not after the last stamp."""
         kind = type(reading)
         stamp_s = min(stamp_s, now)
         last_s = self._last.get(kind)
@@ -128,14 +130,14 @@ class StampedReadings:
         self._stamps.append(stamp_s)
 
     def restart(self) -> None:
-        """Do nothing: the stamps come from the board's own times."""
+        """Do nothing, as the timestamps come from the board's own times."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the stamps of the readings, as they were added."""
+        """Return the timestamps of the added readings; ``now`` for each if their count differs."""
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of a single reading."""
+        """Return the timestamp of the first added reading; ``now`` before the first."""
         return self._stamps[0] if self._stamps else now

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Notices for the user of this robot: each sentence at most once in a while.
+"""Notices for the user of this robot: each text is shown at most once in ``TELL_EVERY_S``.
 
-The module knows sentences and times. A repeated stop keeps its notice, but with an empty text.
+A notice that stops the robot is always added, but with an empty text if it is a repetition.
 """
 
 import math
@@ -15,14 +15,14 @@ TELL_EVERY_S: Final = 10.0
 
 
 class Told:
-    """Collects notices; ``notices``: those that the caller has not taken yet."""
+    """Collects notices; ``notices``: the notices that the caller has not taken yet."""
 
     def __init__(self) -> None:
         self.notices: list[NoticeReading] = []
         self._told_at: dict[str, float] = {}
 
     def halt(self, text: str, now: float) -> None:
-        """Add a notice that the robot is stopped, with the reason."""
+        """Add a notice that stops the robot; ``text``: the reason for the user."""
         self.notices.append(NoticeReading(self._news(text, now), halt=True))
 
     def tell(self, text: str, now: float) -> None:

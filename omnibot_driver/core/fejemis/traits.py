@@ -11,7 +11,7 @@ from omnibot_driver.core.traits import Traits
 
 DRIVE: Final = 0
 FRONT: Final = 1
-"""Channels as configured; the heartbeats show which board is on which channel."""
+"""Channels of the two boards as configured; heartbeats show whether the ports are swapped."""
 
 TRAITS: Final = Traits(
     channels=("drive", "front"),

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversion of both boards' messages into readings in SI units, each with its stamp.
+"""Conversion of both boards' messages into readings in SI units, each with its timestamp.
 
-The module knows units and readings, not which messages come or what follows from them.
+The module knows units and readings; it does not act on the readings.
 """
 
 import math
@@ -39,11 +39,11 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time between two notices of a low battery, in s."""
 PERIOD_S: Final = 0.03
-"""Age in s of the last IMU sample up to which an orientation gets its stamp."""
+"""Age in s of the last IMU sample up to which an orientation gets that sample's timestamp."""
 
 
 class Translation:
-    """Converts messages to readings; ``front``: the front wheel, ``odometry``: the motion."""
+    """Converter of messages to readings; ``front``: state of the front wheel."""
 
     def __init__(self, settings: FejemisSettings) -> None:
         self._settings = settings
@@ -61,7 +61,7 @@ class Translation:
         self._imu.unit = settings.acceleration_unit
 
     def connect(self) -> None:
-        """Begin new connections."""
+        """Forget the state of earlier connections."""
         self.front.begin()
         self.odometry.begin()
         self._imu.begin()
@@ -69,17 +69,17 @@ class Translation:
         self._imu_stamp_s = -math.inf
 
     def restarted(self) -> None:
-        """Forget the frame and the IMU's phase: the drive board has restarted."""
+        """Forget the odometry's frame and the IMU's sampling times: the drive board restarted."""
         self.odometry.forget()
         self._imu.begin()
         self._pose_s = -math.inf
 
     def add(self, reading: Reading, now: float) -> None:
-        """Add a reading that is stamped with its arrival."""
+        """Add a reading whose timestamp is its time of arrival, ``now``."""
         self.stamped.add(reading, now, now)
 
     def extra(self, content: object, now: float) -> None:
-        """Add a value that only this board has."""
+        """Add a value that only this kind of robot has, with ``now`` as its timestamp."""
         self.add(ExtraReading(content), now)
 
     def steering(self, angle_rad: float, now: float) -> None:
@@ -159,7 +159,7 @@ class Translation:
 
 
 def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
-    """Return x, y, z, w of rotations about the fixed axes x, y, z in this order."""
+    """Return the quaternion x, y, z, w of rotations about the fixed axes x, y, z in this order."""
     cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
     cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
     cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)

@@ -2,8 +2,8 @@
 
 """Keeps both boards sending and configured, and runs requests besides motion.
 
-It composes subscriptions, polls, configuration, jobs, and what moves on the front board. It knows
-which of them has something to send, not how the answers are used.
+The module combines subscriptions, polls, configuration, jobs, brush, lift and lights. It collects
+the lines that these parts have to send; it does not use the answers.
 """
 
 from typing import Final
@@ -22,7 +22,10 @@ GEOMETRIES_DIFFER_M: Final = 0.002
 
 
 class Upkeep:
-    """The parts: ``machine`` for brush, lift and lights, ``jobs``, and the others by role."""
+    """Upkeep of both boards; ``machine``: brush, lift and lights; ``jobs``: the running job.
+
+    ``configurations`` and ``polls`` have one entry for each board's role.
+    """
 
     def __init__(self, ports: Ports, settings: FejemisSettings) -> None:
         self._ports, self._settings = ports, settings
@@ -37,14 +40,14 @@ class Upkeep:
             configuration.configure(settings.written)
 
     def begin(self) -> None:
-        """Begin new connections: all is off, and both boards are read and configured again."""
+        """Begin new connections: switch brush and lift off, and configure both boards again."""
         self.machine.off()
         self.jobs.begin()
         for role in ROLES:
             self._begin(role)
 
     def restarted(self, role: Role) -> None:
-        """Configure a restarted board again; what moved on the front board stays off."""
+        """Configure a restarted board again, switch brush and lift off, and fail a job."""
         self._begin(role)
         self.machine.begin()
         self.jobs.cancel(f"the {role} board has restarted")
@@ -57,12 +60,12 @@ class Upkeep:
 
     @property
     def geometry(self) -> Geometry:
-        """Track B and wheelbase F as the drive board uses them, or as set while that is unknown."""
+        """Track and wheelbase in m as the drive board uses them; the settings while unknown."""
         nominal = Geometry(self._settings.track_m, self._settings.wheelbase_m)
         return self.configurations["drive"].geometry or nominal
 
     def hear(self, role: Role, message: Message, now: float) -> None:
-        """Pass a message to the parts that it may answer."""
+        """Pass a message of the board ``role`` to jobs, configuration and polls."""
         configurations = self.configurations
         self.jobs.hear(role, message, now)
         configurations[role].hear(message)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Timeouts: a silent half, or an angle or a pose that is too old to drive.
+"""Timeouts: a silent board, or an angle or a pose that is too old to drive.
 
 The module knows when lines came, not what they contain.
 """
@@ -16,7 +16,7 @@ from omnibot_driver.core.fejemis.told import Told
 NO_POSE_S: Final = 0.25
 """Age of the pose in s after which the robot is stopped."""
 NO_ANGLE_S: Final = 0.25
-"""Silence of the front board in s after which brush and lift are off: it may have restarted."""
+"""Time in s without a front angle after which brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
 """Silence in s after opening a port at which its board is reported missing."""
@@ -31,16 +31,16 @@ class Watch:
         self.begin()
 
     def begin(self) -> None:
-        """Begin new connections."""
+        """Forget earlier timeouts, as new connections begin."""
         self.blind = self.unposed = False
         self._begun_at = math.inf
 
     def open(self, now: float) -> None:
-        """Note the time of the first input, in s."""
+        """Note that the ports are open at ``now``; only the first call counts."""
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:
-        """Report what must stop the robot; return whether a half was lost."""
+        """Add notices of timeouts that stop the robot; return whether a board was lost."""
         lost = [self._look_at(channel, now) for channel in (0, 1)]
         self._look_at_age(now, driving=driving)
         return any(lost)

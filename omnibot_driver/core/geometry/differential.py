@@ -24,7 +24,7 @@ class DifferentialKinematics:
 
     @property
     def rims(self) -> "DifferentialKinematics":
-        """Kinematics of wheels of 1 m, whose rates are the speeds of the rims."""
+        """The same kinematics with wheels of 1 m radius, whose rates are the rims' speeds."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

@@ -28,7 +28,7 @@ class Kinematics(Protocol):
         """Names of the driven wheels' joints, as in the robot's description."""
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """Return the part of this twist that the wheels can make."""
+        """Return the part of this twist that the wheels can produce without slip."""
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, ...]:
         """Return the wheel rates in rad/s that make the feasible part of this twist."""

@@ -28,11 +28,11 @@ class OmniKinematics:
 
     @property
     def rims(self) -> "OmniKinematics":
-        """Kinematics of wheels of 1 m, whose rates are the speeds of the rims."""
+        """The same kinematics with wheels of 1 m radius, whose rates are the rims' speeds."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """Return the complete twist: three wheels have three degrees of freedom."""
+        """Return ``twist`` unchanged: three omni wheels can produce every twist in the plane."""
         return twist
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, float, float]:

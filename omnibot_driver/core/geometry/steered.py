@@ -29,7 +29,7 @@ class SteeredKinematics:
 
     @property
     def rims(self) -> "SteeredKinematics":
-        """Kinematics of wheels of 1 m, whose rates are the speeds of the rims."""
+        """The same kinematics with wheels of 1 m radius, whose rates are the rims' speeds."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
@@ -47,8 +47,7 @@ class SteeredKinematics:
     def steering_rad(self, twist: BodyTwist) -> float:
         """Return the steered wheel's angle in rad, from -pi/2 to pi/2; 0 at rest.
 
-        Positive is to the left. For a turn on the spot it is across the body: at pi/2 for a turn to
-        the left.
+        Positive is to the left. For a turn on the spot to the left the angle is pi/2.
         """
         speed, sideways = twist.vx_mps, self.wheelbase_m * twist.yaw_rate_radps
         if speed < 0.0:

@@ -45,7 +45,7 @@ class BiasCorrector:
         self._correction = correction
 
     def estimate(self, reading: ImuReading, stamp_s: float) -> ImuEstimate:
-        """Return the reading without biases."""
+        """Return the reading minus the biases, and pass it to the calibration."""
         (x, y, z), (bias_x, bias_y, bias_z) = reading.specific_force, self._correction.accel_bias
         force = x - bias_x, y - bias_y, z - bias_z
         (u, v, w) = rate = reading.angular_velocity
@@ -54,12 +54,12 @@ class BiasCorrector:
         return ImuEstimate(stamp_s, force, (u - bias_u, v - bias_v, w - bias_w))
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Take the displacement that the wheels report."""
+        """Pass a displacement of the wheels to the calibration, as evidence of motion or rest."""
         self.calibration.displaced(reading.dx_m, reading.dy_m, reading.dyaw_rad)
 
     @property
     def advice(self) -> str:
-        """Advice on the setting that the measured gravity contradicts; empty if it agrees."""
+        """Advice on settings that the measured gravity contradicts; empty if they agree."""
         gravity_mps2 = self.calibration.gravity_mps2
         return "" if gravity_mps2 is None else self._board.gravity_advice(gravity_mps2)
 

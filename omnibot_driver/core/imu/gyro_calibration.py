@@ -38,7 +38,7 @@ STILL_RAD: Final = 0.002
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """MPU-6050 product specification, section 6.1: initial zero-rate output."""
 REFINEMENT: Final = 0.05
-"""Part of the difference to one block's bias that is corrected: half of it in about 14 s."""
+"""Fraction of the bias error that one block of ``BLOCK_S`` corrects: half of it in about 14 s."""
 
 
 class Look:
@@ -110,7 +110,7 @@ class GyroCalibration:
         self._look = Look()
         self._token: object = None
         self.wake_at = math.inf
-        """Time at which ``tick`` has work, in s."""
+        """Time at which a running measurement fails, in s; infinity while nothing is measured."""
 
     @property
     def measuring(self) -> bool:
@@ -133,7 +133,7 @@ class GyroCalibration:
             self.give_up("no two seconds of readings without a gap; check ~/state, then call again")
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """Take a reading of the IMU, raw except for the accelerometer's bias."""
+        """Add an IMU reading, with the gyro's bias and without the accelerometer's, in SI units."""
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()
@@ -143,7 +143,7 @@ class GyroCalibration:
             self._conclude()
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
-        """Take a displacement that the wheels report."""
+        """Add a displacement that the wheels report, in any axes, as evidence of motion or rest."""
         self._look.displaced(dx_m, dy_m, dyaw_rad)
 
     def _conclude(self) -> None:

@@ -29,7 +29,7 @@ Counts = tuple[int, int, int]
 
 
 def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
-    """Return advice on the settings by the specific force at rest; empty if that is gravity."""
+    """Return advice on settings if the force at rest is not gravity; empty if it is."""
     if abs(gravity_mps2 / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
         return ""
     wrong = f"at rest the accelerometer measures {gravity_mps2:.2f} m/s² instead of gravity: "

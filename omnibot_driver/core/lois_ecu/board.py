@@ -2,9 +2,9 @@
 
 """The LOIS ECU as a ``Board`` of the driver: an adapter around ``LoisConversation``.
 
-It computes its own odometry and returns it ``odom_rate_hz`` times a second, predicted from one
+This class computes odometry and returns it ``odom_rate_hz`` times a second, predicted from one
 group of ticks to the next. Displacements show whether the robot obeys and whether it is at rest.
-They are marked as not measured where the board does not report the motion.
+A displacement is marked as not measured where the board does not report the motion.
 """
 
 import math
@@ -37,8 +37,8 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Pause in s before a reset is repeated: longer than wheels roll on, and four groups of ticks
-take."""
+"""Pause in s before a reset is repeated: longer than stopped wheels roll on, and longer than four
+groups of ticks."""
 STEADY_S: Final = 0.3
 """Time in s without new counts after which ticks are steady: more than one period of the ticks."""
 
@@ -65,7 +65,7 @@ class LoisEcuBoard(Board):
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """Settings that cannot be read from the board."""
+        """Settings of the board and the robot, which the board does not report."""
         return self._ecu.settings
 
     @settings.setter
@@ -85,12 +85,12 @@ class LoisEcuBoard(Board):
 
     @property
     def advice(self) -> str | None:
-        """Advice on settings that contradict the data; None if there is none."""
+        """Advice on settings that contradict the received data; None if all settings agree."""
         return self._ecu.advice
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether the ticks of both wheels count now, so that they can prove a standstill.
+        """Whether ticks of both wheels count now, so that unchanged ticks prove a standstill.
 
         The public firmware counts a wheel's ticks only while its RPM target is positive.
         """
@@ -105,7 +105,7 @@ class LoisEcuBoard(Board):
         self._connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Decode bytes; return the readings that they complete.
+        """Decode ``data``, and return the readings that its bytes complete.
 
         If only ``mode`` changes, the result is ``NOTHING_MEASURED``.
         """
@@ -116,7 +116,7 @@ class LoisEcuBoard(Board):
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings that held lines still give, as the line is closed."""
+        """Return the readings from bytes and groups held back so far, as the port closes."""
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
@@ -124,7 +124,7 @@ class LoisEcuBoard(Board):
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return held groups that nothing has contradicted, and odometry that is due."""
+        """Return readings of groups whose waiting time is over, and the odometry that is due."""
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)
@@ -200,7 +200,7 @@ class LoisEcuBoard(Board):
         self._leaving = True
 
     def due(self, now: float) -> Packets:
-        """Return the lines that are due: settings, repeated resets, and RPM 0/0 after a Stop."""
+        """Return the lines to write now: settings, repeated resets, and RPM 0/0 after a Stop."""
         if self._leaving:
             return NO_PACKETS
         once, self._once = self._once, NO_PACKETS
@@ -224,7 +224,7 @@ class LoisEcuBoard(Board):
             self._say_reset_again(now)
 
     def encode(self, order: Order) -> Packets:
-        """Return the lines of an order. Raises CommandRefused for a pose."""
+        """Return the lines that command ``order``. Raises CommandRefused for a goal pose."""
         match order:
             case Drive(twist):
                 return packed(self._ecu.velocity(twist))
@@ -241,11 +241,11 @@ class LoisEcuBoard(Board):
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Return Stop. Its ``:`` begins a new line, so the board discards a partial one."""
+        """Return Stop. Its ``:`` begins a new line, so the board discards a partial line before."""
         return self.stop()
 
     def stop(self) -> Packets:
-        """Return duty 0/0."""
+        """Return the Stop line, which commands duty 0/0."""
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
@@ -253,7 +253,7 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and a reset of the board's counters; it is repeated until they show it."""
+        """Return Stop and a counter reset; ``due`` repeats the reset until the counters show it."""
         self._resets_left, self._reset_shown = RESETS, False
         return self._reset()
 
@@ -273,7 +273,7 @@ class LoisEcuBoard(Board):
     # What only this board has
 
     def set_led(self, on: bool, now: float) -> None:
-        """Switch the board's LED; the line is repeated, as single lines are lost."""
+        """Switch the board's LED; the line is sent several times, as lines may be lost."""
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:

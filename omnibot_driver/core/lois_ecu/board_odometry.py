@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes between two groups of 0x20: turn, distance, and the wheel speeds behind its velocity.
+"""Changes between two odometry groups (0x20): turn, distance, and wheel speeds from the velocity.
 
-The public firmware integrates whole RPM of both wheels. Its position does not change while both
-speeds are equal, and its velocity is that of the last tick. Works on groups, without their times.
+The public firmware integrates whole RPM of both wheels. The position in 0x20 does not change while
+both wheel speeds are equal, and the velocity in 0x20 is that of the last tick. Works on groups,
+without their times.
 """
 
 import math
@@ -18,12 +19,13 @@ MOST_RPM: Final = 150.0
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """Changes that a group of 0x20 reports since the group before.
+    """Changes that an odometry group (0x20) reports since the group before.
 
-    ``turned_m``: distance of the right rim minus that of the left one. ``along_m``: distance of the
-    middle of the axle. ``still``: neither changed. If ``same_velocity`` holds too, no tick came,
-    unless both speeds are equal. ``speeds_mps``: speeds of the left and right rim at the last tick,
-    without the fraction of an RPM; None where the velocity does not give them.
+    ``turned_m``: distance of the right rim minus that of the left rim. ``along_m``: distance of the
+    middle of the axle. ``still``: position and heading did not change. If ``same_velocity`` holds
+    too, no tick came, unless both wheel speeds are equal. ``speeds_mps``: speeds of the left and
+    right rim at the last tick, rounded down to whole RPM; None where the velocity does not give
+    wheel speeds.
     """
 
     turned_m: float
@@ -34,7 +36,7 @@ class Told:
 
 
 class OdometryReader:
-    """Comparison of each odometry group with the one before, for wheels of this size."""
+    """Comparison of each odometry group with the group before, for a track and a wheel size."""
 
     def __init__(self, track_m: float, rpm_mps: float) -> None:
         self._track_m, self._rpm_mps = track_m, rpm_mps
@@ -45,9 +47,9 @@ class OdometryReader:
         self._before = None
 
     def take(self, group: BoardOdometry) -> Told | None:
-        """Return the changes since the last group.
+        """Return what changed from the last group to ``group``.
 
-        Return None for a first group, and for a pose that is not finite.
+        Return None for the first group, and for a group whose pose is not finite.
         """
         if not all(map(math.isfinite, (group.x_m, group.y_m, group.yaw_rad))):
             return None

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Delay of a group of ticks: how much later than usual it was read, by the board's time in it.
+"""Delay of a group of ticks: how much later than usual it was read, by the board's clock in it.
 
-The public firmware's clock stands still while it sends, so it falls behind by 4 to 36 %. What it
-has sent is known, and a line takes about 1.2 ms. The manual's clock does not stop. Both models are
-tried, and the one that fits the arrivals better is used: a straight line below the last of them,
-because a read may be late but never early. Works on clock counts, numbers of lines and arrival
-times.
+The public firmware's clock stands still while the board sends, so the clock falls behind by 4 to
+36 %. The number of sent lines is known, and each takes about 1.2 ms. A board as in the manual has a
+clock that does not stop. Both models of the clock are fitted to the last arrivals, and the better
+fit is used. The fit is a straight line below all arrivals, because a read may be late but never
+early. Works on clock counts, numbers of lines and arrival times.
 """
 
 import math
@@ -23,16 +23,16 @@ GROUPS_KEPT: Final = 25
 """Number of groups kept: five seconds, in which a crystal off by 100 ppm drifts by 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
-"""Longest plausible delay in s; more shows a restart of the board, or a clock of an unknown
-kind."""
+"""Longest plausible delay in s; a longer one means that the board has restarted, or that its clock
+has another unit."""
 UNKNOWN_S: Final = 0.012
 """Standard deviation of an arrival in s, while the clock is unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Longest time in s between groups that were read together, after a stall: the last of them is the
-least late."""
+"""Longest time in s between groups that were read together after a pause of the reader. Only the
+last of them is kept, as its delay is the smallest."""
 Point = tuple[float, float]
-"""Arrival time in s, and how far the board's time is behind it, in s."""
+"""Arrival time in s, and how far the board's clock is behind the arrival time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
 
 
@@ -44,11 +44,11 @@ class BoardTime:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the clock, as the line or the board is new."""
+        """Forget what is known of the clock, after a reconnection or a restart of the board."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrival minus board time since the beginning, in s: as it is, and minus the lines'
-        sending time."""
+        """Arrival time minus board time since the first group, in s: for a clock that runs always,
+        and for one that stands still while lines are sent."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -58,13 +58,13 @@ class BoardTime:
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
-        """Count this many lines that the board sent."""
+        """Add ``lines`` to the number of lines that the board has sent."""
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         """Return the delay in s of ticks that arrive at ``now``.
 
-        It is at least zero, and never dates ticks before earlier ones.
+        The delay is at least zero. ``now`` minus the delay never lies before the previous result.
         """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s

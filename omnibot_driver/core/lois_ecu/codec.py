@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Messages as lines and back: a table of the host's commands, and one case for each report.
+"""Encoding of messages as lines, and decoding: all commands, and reports of one line.
 
 Sources: the ECU's manual; the public firmware for the order of words within a payload. Groups of
 several lines are parsed in ``groups``, records in ``record_lines``.
@@ -60,7 +60,7 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """The form of a command: its byte, its class, and its payload from its fields and back."""
+    """A command's byte and class, and the functions from its fields to its payload and back."""
 
     code: Code
     kind: type
@@ -107,7 +107,7 @@ _BY_CODE: Final[dict[int, Form]] = {form.code: form for form in _FORMS}
 
 
 def encode_command(command: Command, *, with_sum: bool = True) -> bytes:
-    """Return the line of a command. Raises FrameError for a value or a period out of range."""
+    """Return the line that encodes ``command``. Raises FrameError for a value out of range."""
     code, payload = _said(command)
     return encode_line(code, payload, with_sum=with_sum)
 
@@ -144,7 +144,7 @@ def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
 
 
 def encode_report(report: Report) -> bytes:
-    """Return all lines of a report as the board sends it. Raises FrameError if it does not fit."""
+    """Return the lines of a report as a board sends it. Raises FrameError if a value is too big."""
     match report:
         case EStopButton(pressed):
             return encode_line(Code.ESTOP_BUTTON, int(pressed))
@@ -191,7 +191,7 @@ def _encode_record(record: Record) -> bytes:
 
 
 def single_report(line: Line) -> Report | None:
-    """Decode a line that is a complete report; None if it is not a valid one."""
+    """Decode the report that ``line`` holds completely; None if it does not hold a valid one."""
     payload = line.payload
     low = payload & 0xFFFF
     high, middle, last = payload >> 16, low >> 8, low & 0xFF

@@ -2,10 +2,10 @@
 
 """Decoder from a stream of bytes to reports.
 
-A line ends with a line feed and begins at the last ``:`` before it, so a line that lost its end
-does not cost another one. Anything else is counted and discarded. A line that lost or gained
-characters has a wrong length. Two lines can become one only if fourteen characters between them are
-lost, and the result would have to pass the checksum too.
+A line ends with a line feed and begins at the last ``:`` before that. So when a line loses its
+end, the next line can still be decoded. All other bytes are counted and discarded. A line that lost
+or gained characters has a wrong length. Two lines can become one only if fourteen characters
+between them are lost, and the result would have to pass the checksum too.
 
 This module does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
 bytes between calls, and looks at each byte a bounded number of times.
@@ -28,7 +28,8 @@ LONGEST_LINE: Final = 256
 class DecoderStatistics:
     """Counters of the decoder since its creation.
 
-    ``lines``: valid lines; ``faults``: pieces that were not a line.
+    ``lines``: valid lines; ``faults``: pieces of input that were discarded, because they were not a
+    line.
     """
 
     lines: int = 0
@@ -37,11 +38,11 @@ class DecoderStatistics:
 
 
 class LoisDecoder:
-    """Decoder of one serial line.
+    """Decoder of the bytes from one serial port.
 
-    Without ``sum_required``, lines without a checksum are accepted too. ``terminal``: lines of a
-    sensor are expected, so text is not damage. ``times``: when the last line of each report of the
-    last call arrived; the report may have been held since.
+    If ``sum_required`` is false, lines without a checksum are accepted too. ``terminal``: the board
+    passes on a sensor's lines, so text is returned and not regarded as damage. ``times``: for each
+    report of the last call, when its last line arrived, which may be before that call.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:
@@ -66,7 +67,7 @@ class LoisDecoder:
 
     @property
     def resolves_at(self) -> float:
-        """Latest time for the next ``feed``, with or without bytes."""
+        """Time by which ``feed`` must be called again, even without bytes, in s."""
         return self._assembler.resolves_at
 
     @property
@@ -75,17 +76,17 @@ class LoisDecoder:
         return self._assembler.in_record
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record of this many samples; others are discarded."""
+        """Expect a record with these numbers of samples; discard every other record."""
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
-        """Forget the board's counters, as it was asked to set them to zero."""
+        """Accept any next counts, as the board was commanded to set its counters to zero."""
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:
-        """Return the reports that these bytes complete, in the order of the line.
+        """Return the reports that ``data`` completes, in the order in which they were sent.
 
-        Without bytes, return held reports if nothing has followed them for some time.
+        If ``data`` is empty, return the report that was held back, if it has waited long enough.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))
@@ -102,7 +103,7 @@ class LoisDecoder:
         return self._untimed(found)
 
     def flush(self, now: float) -> list[Report]:
-        """Return the reports that held lines still give, as the line is closed."""
+        """Return the report that was held back, if it is complete, as the port closes."""
         if self._held or self._cut_bytes:
             self._damaged(len(self._held) + self._cut_bytes)
         self._held, self._cut_bytes = b"", 0

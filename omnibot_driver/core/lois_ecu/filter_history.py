@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""History of a filter's states, to go back to before a change that was noticed late.
+"""History of a filter's states, to restore one from before a restart that was noticed late.
 
 Works on states and times, without their meaning.
 """
@@ -11,7 +11,7 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 
 KEPT: Final = 32
-"""Number of states kept: groups that may arrive before a restart is noticed."""
+"""Number of stored states: at least as many as groups that arrive before a restart is noticed."""
 
 
 class FilterHistory:
@@ -22,7 +22,7 @@ class FilterHistory:
         self._kept: deque[tuple[float, list[float], list[list[float]]]] = deque(maxlen=KEPT)
 
     def forget(self) -> None:
-        """Discard all states, as they are in another frame."""
+        """Discard all stored states, because the odometry frame has changed."""
         self._kept.clear()
 
     def keep(self, now: float) -> None:
@@ -31,9 +31,9 @@ class FilterHistory:
         self._kept.append((now, list(self._filter.mean), covariance))
 
     def go_back(self, then_s: float) -> float | None:
-        """Restore the filter's last state up to ``then_s``, or else the oldest.
+        """Restore the filter's last state at or before ``then_s``, or else the oldest stored state.
 
-        Return the time of that state; None if none was kept.
+        Return the time of the restored state in s; None if no state is stored.
         """
         if not self._kept:
             return None

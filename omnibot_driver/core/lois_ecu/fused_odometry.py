@@ -10,17 +10,18 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import Covariance
 
 Source = Literal["standing", "ticks", "ticks and heading", "commands and heading", "commands"]
-"""What the motion of the last interval is known from."""
+"""Source of the motion since the last estimate; "standing" means that the robot is at rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class FusedOdometry:
-    """The odometry at ``stamp_s``: pose and covariance in its frame, twist in the body's.
+    """The odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
 
     ``twist_covariance``: variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
-    ``displacement``: motion since the estimate before, in the robot's axes. ``wheel_ways_m``:
-    distances of nominal wheels since then, the board's left and right. ``predicted``: nothing was
-    received for this time yet. ``blind``: the board did not report some of the motion.
+    ``displacement``: motion since the previous estimate, in the robot's axes. ``wheel_ways_m``:
+    distances of the board's left and right wheel since the previous estimate, for wheels of nominal
+    size. ``predicted``: ticks for this time have not arrived yet. ``blind``: the motion is known
+    from commands, as ticks do not show it.
     """
 
     stamp_s: float

@@ -97,7 +97,7 @@ class Assembler:
         return self._record.begun
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record of this many samples; others are discarded."""
+        """Expect a record with these numbers of samples; discard every other record."""
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:

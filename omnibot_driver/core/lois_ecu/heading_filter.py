@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Filter of compass headings that rejects the false ones of the public firmware at north.
+"""Filter of compass headings that rejects the false headings of the public firmware near north.
 
 The firmware averages three numbers of 0 to 359 degrees: between 359 and 1 it reports 120 or -121. A
-heading is accepted if it differs from the last one by what the odometry turned meanwhile. Another
-heading is accepted when ``SURE_AFTER`` further ones agree with it, and it is not one of the two
-that north is mistaken for. Works on degrees and the odometry's yaw.
+heading is accepted if it differs from the last accepted one by the turn of the odometry since then.
+Any other heading is accepted only when ``SURE_AFTER`` further headings agree with it. A false
+heading (about 120 or -120 degrees while the robot faces north) is not accepted. Works on degrees
+and the odometry's yaw.
 """
 
 import math
@@ -13,7 +14,7 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Part of the odometry's turn by which a heading may be off, besides ``NEAR_DEG``."""
+"""Fraction of the odometry's turn by which a heading may be wrong, in addition to ``NEAR_DEG``."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)
@@ -28,7 +29,7 @@ class HeadingFilter:
         self.forget()
 
     def forget(self) -> None:
-        """Treat the next heading as the first, which must be confirmed."""
+        """Treat the next heading as the first, which is rejected until a second one agrees."""
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
         self._agreed = 0
@@ -57,7 +58,7 @@ class HeadingFilter:
         return True
 
     def _mistaken(self, heading_deg: float, yaw_rad: float) -> bool:
-        """Return whether the robot faces north, and this is a false heading of the firmware."""
+        """Return whether this is one of the false headings that the firmware reports near north."""
         if self._last is None or abs(_expected(self._last, yaw_rad)) > NORTH_DEG:
             return False
         return any(

@@ -51,10 +51,10 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 
 
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
-    """Parse the characters from ``:`` to the line feed; None if they are not a line.
+    """Parse the characters from ``:`` to the line feed; None if they are not a valid line.
 
-    A carriage return before the line feed is accepted. Without ``sum_required`` a line may also
-    lack the checksum; a checksum that is there must be right in any case.
+    A carriage return before the line feed is accepted. If ``sum_required`` is false, the line may
+    lack the checksum; if the line has a checksum, it must be right in any case.
     """
     if text.endswith(b"\r\n"):
         text = text[:-2] + END
@@ -69,9 +69,9 @@ def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
 
 
 def from_pair(left: int, right: int) -> int:
-    """Return the payload of two 16-bit words, signed or unsigned.
+    """Return the 32-bit payload of two 16-bit words, each signed or unsigned.
 
-    Raises FrameError when one does not fit.
+    Raises FrameError when a number does not fit 16 bits.
     """
     if not (-0x8000 <= left <= 0xFFFF and -0x8000 <= right <= 0xFFFF):
         raise FrameError(f"{left} and {right} do not fit two words of 16 bits")
@@ -79,7 +79,7 @@ def from_pair(left: int, right: int) -> int:
 
 
 def unsigned_pair(payload: int) -> tuple[int, int]:
-    """Return the high and the low word, unsigned."""
+    """Return the high and the low 16-bit word of a payload, unsigned."""
     return payload >> 16, payload & 0xFFFF
 
 
@@ -89,12 +89,12 @@ def signed(word: int) -> int:
 
 
 def signed_pair(payload: int) -> tuple[int, int]:
-    """Return the high and the low word, in two's complement."""
+    """Return the high and the low 16-bit word of a payload, in two's complement."""
     return signed(payload >> 16), signed(payload & 0xFFFF)
 
 
 def from_float(number: float) -> int:
-    """Return the payload of a float32. Raises FrameError when the number is too large."""
+    """Return the payload that encodes ``number`` as float32. Raises FrameError if too large."""
     try:
         (payload,) = _WORD.unpack(_FLOAT.pack(number))
     except OverflowError as error:
@@ -103,6 +103,6 @@ def from_float(number: float) -> int:
 
 
 def to_float(payload: int) -> float:
-    """Return the float32 of a payload; it may be NaN or infinite."""
+    """Return the float32 number that a payload encodes; the number may be NaN or infinite."""
     (number,) = _FLOAT.unpack(_WORD.pack(payload))
     return float(number)

@@ -12,10 +12,10 @@ from enum import Enum, IntEnum
 from typing import Final
 
 PERIOD_ONCE: Final = 0xFFFE
-"""Value instead of a period in ms: the message is sent once, then never."""
+"""Value in place of a period in ms: the board sends the message once, and not periodically."""
 PERIOD_OFF: Final = 0xFFFF
 MOST_SAMPLES: Final = 1024
-"""Largest number of samples in a record; a longer one never completes."""
+"""Largest number of samples in a record; the board never completes a longer record."""
 
 RECORD_END: Final = 0x00000000
 HEADING_END: Final = 0x016A016A
@@ -24,7 +24,7 @@ HEADING_PADDING: Final = 0x016A
 
 
 class Code(IntEnum):
-    """The command bytes."""
+    """Command bytes that begin the protocol's lines."""
 
     DUTY = 0x01
     RPM = 0x02
@@ -88,7 +88,7 @@ class TerminalMode(IntEnum):
 
 
 class RecordKind(Enum):
-    """The kinds of records."""
+    """What the board can record: tick times (RPM), torques or compass headings."""
 
     RPM = "rpm"
     TORQUE = "torque"
@@ -146,7 +146,7 @@ class RecordHeading:
 
 @dataclass(frozen=True, slots=True)
 class WriteSetting:
-    """A command that writes a setting."""
+    """A command that writes one of the board's float32 settings."""
 
     setting: Setting
     value: float
@@ -154,9 +154,9 @@ class WriteSetting:
 
 @dataclass(frozen=True, slots=True)
 class SetPeriod:
-    """A command that sets the period of a stream.
+    """A command that sets how often the board sends a message.
 
-    ``period_ms``: below ``PERIOD_ONCE``, or ``PERIOD_ONCE``, or ``PERIOD_OFF``.
+    ``period_ms``: 1 to 65533 ms, or ``PERIOD_ONCE``, or ``PERIOD_OFF``.
     """
 
     stream: Stream
@@ -203,7 +203,7 @@ Command = (
 
 @dataclass(frozen=True, slots=True)
 class EStopButton:
-    """The emergency stop button was pressed or released; either sets both set-points to zero."""
+    """A press or release of the e-stop button; both make the board set its set-points to zero."""
 
     pressed: bool
 
@@ -243,7 +243,7 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """Encoder ticks since the board started or was reset, and its clock when it sent them.
+    """Encoder ticks since the board started or was reset, and its clock when it sent the ticks.
 
     ``time_counts``: ns by the manual, ms in the firmware; wraps at 2³². Ticks are signed.
     """
@@ -257,7 +257,7 @@ class Ticks:
 class BoardOdometry:
     """The board's own dead reckoning, in its earth frame; velocities may be NaN or infinite.
 
-    ``appended``: it came behind a Ticks group, under that group's command byte.
+    ``appended``: the group came right behind a group of ticks, with the command byte of the ticks.
     """
 
     x_m: float
@@ -271,9 +271,9 @@ class BoardOdometry:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A record; left and right have as many samples as requested.
+    """A complete record; ``left`` and ``right`` have as many samples as requested.
 
-    A heading record has only left ones. RPM: time of a tick in the board's unit (``COUNT_S`` in
+    A record of headings has only ``left``. RPM: time of a tick in the board's unit (``COUNT_S`` in
     ``record_request``); torque: 12-bit values of an ADC; heading: degrees.
     """
 
@@ -284,7 +284,7 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class TerminalLine:
-    """A line of a serial input that is passed through."""
+    """A sensor's line of text, which the board passes through in a terminal mode."""
 
     text: str
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on what is misconfigured, by bytes that are not lines and by the settings themselves.
+"""Advice on what is misconfigured, found from bytes that are not lines and from the settings.
 
-It is one sentence at most. Advice by bytes (another board, a wrong setting) is given only while
-lines are not understood. Works on bytes and settings, without times.
+The advice is one sentence at most. Advice from bytes (another board, a wrong setting) is given only
+while valid lines do not arrive. Works on bytes and settings, without times.
 """
 
 import re
@@ -27,11 +27,11 @@ OWN_GAINS: Final = (
     " by 0.04 m on average, in a few drives by 0.2 to 2 m. Run calibrate step, or set these"
     " parameters"
 )
-"""Advice for missing gains. Its figures are from 150 forward drives of the compiled firmware with
-wheels of the right size."""
+"""Advice if the user has not set all gains. Its figures are from 150 forward drives of the compiled
+firmware, with correct wheel sizes."""
 LOOK_AT: Final = 600
-"""Number of bytes without a valid line after which advice is given: the board sends at least 70 of
-them a second."""
+"""Number of bytes without a valid line after which advice is given; the board sends at least 70
+bytes per second."""
 
 _LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
 _NMEA: Final = re.compile(rb"[$!][A-Z]{2}[A-Z]{3},")
@@ -39,9 +39,9 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 
 
 class Suspicion:
-    """Detection of a misconfiguration by received bytes.
+    """Detection of a misconfiguration from the received bytes.
 
-    Call ``look`` with all bytes, and ``understood`` when some of them were a report.
+    Call ``look`` with all received bytes, and ``understood`` when a report was decoded from them.
     """
 
     def __init__(self) -> None:
@@ -49,11 +49,11 @@ class Suspicion:
         self._seen = b""
 
     def understood(self) -> None:
-        """Clear the advice, as a valid line shows that it is the right board."""
+        """Clear the advice, as a decoded report shows that the board is the right one."""
         self._seen, self.advice = b"", None
 
     def look(self, data: bytes) -> None:
-        """Examine more bytes; give advice when enough of them were not understood."""
+        """Examine more received bytes; set ``advice`` once ``LOOK_AT`` bytes gave no report."""
         if not data:
             return
         self._seen = (self._seen + data)[-2 * LOOK_AT :]
@@ -62,7 +62,7 @@ class Suspicion:
 
 
 def own_gains(settings: LoisEcuSettings) -> str:
-    """Return the names of gains that keep the board's values; empty if not in RPM mode."""
+    """Return the names of the gains that the user has not set; empty if not in RPM mode."""
     if settings.drive_mode != "rpm":
         return ""
     return ", ".join(gain.name.lower() for gain in GAINS if gain not in settings.written)

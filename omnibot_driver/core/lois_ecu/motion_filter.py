@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kalman filter of how both wheels move, and of what the board's counters make of it.
+"""Kalman filter of both wheels' motion, and of what the board's counters report of that motion.
 
 States of each wheel: its distance, speed and acceleration, the ticks that should have counted, the
 speed that the firmware measured last, and a bias. States of the body: its position, and the changes
@@ -74,11 +74,11 @@ class MotionFilter:
         self.wheels = (Wheel(0), Wheel(PER_WHEEL))
         self.tick_m = self.rpm_mps = self.track_m = self.turn_sign = 1.0
         self.reverse_gain = 1.0
-        """Speed over target of a wheel that rolls backward steadily."""
+        """Ratio of speed to target for a wheel that rolls backward steadily."""
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Least difference of both measured speeds since this was last reset, in m/s."""
+        """Least difference of both measured speeds since the last reset of this value, in m/s."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 
@@ -97,7 +97,7 @@ class MotionFilter:
         return self.filter.mean[PER_WHEEL * wheel + WAY]
 
     def rounded_mps(self, wheel: int) -> float:
-        """Return what the firmware drops of a measured speed, in m/s."""
+        """Return the fraction of an RPM that the firmware drops from a measured speed, in m/s."""
         if self.wheels[wheel].course.kind == "rpm":
             return self.filter.mean[BIAS + wheel]
         return ROUNDED * self.rpm_mps
@@ -117,7 +117,7 @@ class MotionFilter:
 
     @property
     def resting(self) -> bool:
-        """Whether nothing is commanded and nothing moves."""
+        """Whether both wheels have a target of zero and an estimated speed of zero."""
         return not any(
             wheel.course.target_mps or self.speed_mps(index)
             for index, wheel in enumerate(self.wheels)
@@ -157,17 +157,17 @@ class MotionFilter:
                 self.filter.forget(wheel.base + state, 0.0, 0.0)
 
     def shift(self, index: int, way_m: float, stddev_m: float) -> None:
-        """Move this wheel by ``way_m`` further than estimated, with this standard deviation."""
+        """Add ``way_m`` to a wheel's estimated distance, with this standard deviation in m."""
         terms = self._way_terms(index)
         for state, factor in terms:
             self.filter.mean[state] += factor * way_m
         self.filter.disturb(terms, stddev_m**2)
 
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
-        """Add an error of the distance of this wheel, and of all that follows from it.
+        """Add an error to a wheel's distance, and to all states that depend on that distance.
 
-        ``stddev_m``: its standard deviation. ``counted``: it is of the distance before the wheel's
-        ticks stopped counting.
+        ``stddev_m``: standard deviation of the error. ``counted``: the error arose before the
+        wheel's ticks stopped counting.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -176,7 +176,7 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return the terms that depend on a distance of this wheel that was not measured."""
+        """Return the terms that an unmeasured distance of this wheel changes."""
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = [*self._way_terms(index), (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
@@ -192,7 +192,7 @@ class MotionFilter:
         return [*terms, (base + COUNT, counts)] if counts else terms
 
     def learn_gain(self, index: int, speed_mps: float) -> None:
-        """Take a reported speed; if the wheel rolls backward steadily, it shows the gain."""
+        """Update ``reverse_gain`` by a reported speed, if the wheel rolls backward steadily."""
         wheel = self.wheels[index]
         target_mps = wheel.course.target_mps
         if self.tuned and target_mps < 0 and wheel.steady:
@@ -227,7 +227,7 @@ class MotionFilter:
             self._begin_biases()
 
     def _begin_biases(self) -> None:
-        """Reset the biases: relative for a driven duty, else what the firmware drops, in m/s."""
+        """Reset the biases: of duty a relative one; else the dropped fraction of an RPM, in m/s."""
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:
                 self.filter.forget(BIAS + index, 0.0, DUTY_STDDEV**2)
@@ -267,7 +267,7 @@ class MotionFilter:
                 self.filter.forget(wheel.base + PUSH, 0.0, 0.0)
 
     def _measure_speeds(self, step: Step, before: tuple[float, float]) -> None:
-        """Predict the speeds that the firmware keeps, and what 0x20 integrates of them.
+        """Predict the speeds that the firmware keeps, and the resulting changes of 0x20.
 
         The firmware measures at each tick of either wheel. So a wheel that rolls alone is measured
         as it is, while a wheel at rest beside a rolling one keeps the speed that it had.

@@ -36,8 +36,8 @@ ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group of ticks to another round. Soon after a group the next one is often on
-its way, and the board is deaf."""
+"""Times in s from a group of ticks to the next round of settings, varied because the board is deaf
+while it sends another group."""
 CONFIRMED_WITHIN: Final = 0.35
 """Part by which the ticks' period may differ from the requested one."""
 MOST_ROUNDS: Final = 40
@@ -48,7 +48,7 @@ BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 
 
 class SettingsWriter:
-    """Queue of settings; ``due`` returns what to write now."""
+    """Queue of setting commands; ``due`` returns the lines to write now."""
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self.settings = settings
@@ -63,17 +63,17 @@ class SettingsWriter:
 
     @property
     def confirmed(self) -> bool:
-        """Whether the board has answered, and its ticks come with our period."""
+        """Whether the board has sent the requested date, and sends ticks with the set period."""
         return self._answered and self._in_period
 
     @property
     def done(self) -> bool:
-        """Whether all that was to be written has been sent as often as it should."""
+        """Whether all queued commands have been sent, each in all of its rounds."""
         return not self._queue and not self._rounds_left
 
     @property
     def ignored(self) -> bool:
-        """Whether the board sends, and seems to ignore its commands."""
+        """Whether twice the usual rounds were sent and the board has not confirmed the settings."""
         return self._rounds >= 2 * ROUNDS and not self.confirmed
 
     @property
@@ -92,13 +92,13 @@ class SettingsWriter:
         self._in_period = self._answered = False
 
     def write(self, command: Command, now: float) -> None:
-        """Queue one more command, repeated like the others."""
+        """Queue one more command, to be sent ``ROUNDS`` times."""
         for count in range(ROUNDS):
             self._queue.append((now + count * ROUND_S, command))
         self._queue = deque(sorted(self._queue, key=lambda entry: entry[0]))
 
     def ticks_came(self, now: float) -> None:
-        """Note a group of ticks; its period may confirm the requested one."""
+        """Note that ticks arrived, and compare their measured period with the requested one."""
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
         if len(self._arrivals) < 4:
@@ -111,7 +111,7 @@ class SettingsWriter:
             self._rounds_left, self._round_at_s = 1, now + away_s
 
     def date_came(self) -> None:
-        """Note that the date has come, which was requested."""
+        """Note that a GPS date arrived, which shows that the board obeys requests."""
         self._answered |= self._rounds > 0
 
     def due(self, now: float, *, driving: bool) -> bytes:
@@ -130,7 +130,7 @@ class SettingsWriter:
         return data
 
     def _turned(self, rounds: int) -> list[Command]:
-        """Return all commands, in an order that begins at another one in each round.
+        """Return all commands, beginning with a different command in each round.
 
         A round may take as long as the board takes from one group to the next. With the same order
         it would then be deaf for the same line in each round.

@@ -35,13 +35,13 @@ MOST_RPM: Final = 50
 """Largest set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""Number of set-points after a Stop with RPM 0/0 before them; more than one, as it may be lost."""
+"""Number of set-points after a Stop before which RPM 0/0 is sent: several, as lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
-    """Return the rounded pair, and whether it was slowed down to ``most``.
+    """Return the pair as integers of at most ``most``, and whether they were scaled down.
 
-    If one value exceeds ``most``, both are scaled alike.
+    If one value exceeds ``most``, both are scaled by the same factor.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0
@@ -50,7 +50,7 @@ def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], 
 
 
 def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
-    """Return the set-points in written bytes, which are complete lines, in order."""
+    """Return the set-points among complete lines that were written, in order."""
     length = LENGTH if with_sum else LENGTH_WITHOUT_SUM
     found: list[SetRpm | SetDuty] = []
     for line in data.splitlines(keepends=True):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Plausibility of a complete group of lines: its ranges, and its change since the one before.
+"""Plausibility of a complete group of lines: its ranges, and its change since the group before.
 
 A group that is not reachable from the last one is kept aside. If the next one is reachable from it,
 the board has started anew (a restart, a reset), and that next one is accepted. Works on values and
@@ -30,7 +30,7 @@ SLOWEST_CLOCK: Final = 0.5
 SURE_AFTER: Final = 2
 """Number of further clock steps in one unit after which the clock has that unit."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest clock step in s to learn from; arrivals measure shorter ones badly."""
+"""Shortest clock step in s from which the unit is learnt; arrival times blur shorter ones."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -46,9 +46,9 @@ def wrapped(difference: int) -> int:
 
 
 class Gate(Generic[Group]):
-    """Check of each group against the last accepted one.
+    """Check of each group against the last accepted group.
 
-    ``reachable(before, after, duration_s)`` returns whether one can follow the other.
+    ``reachable(before, after, duration_s)`` returns whether ``after`` can follow ``before``.
     """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:
@@ -57,7 +57,7 @@ class Gate(Generic[Group]):
         self._aside: tuple[Group, float] | None = None
 
     def passes(self, group: Group, now: float) -> bool:
-        """Return whether to accept this group, and remember it."""
+        """Return whether to accept this group; store it to compare the next group with it."""
         aside = self._aside
         if self._last is not None and not self.would_pass(group, now):
             if aside is None or not self._reachable(aside[0], group, now - aside[1]):
@@ -78,7 +78,7 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what was learnt about the board's counters."""
+        """Forget what was learnt about the board's counters; a subclass may override this."""
 
 
 class TicksGate(Gate[Ticks]):
@@ -90,7 +90,7 @@ class TicksGate(Gate[Ticks]):
         self._steps = 0
 
     def passes(self, group: Ticks, now: float) -> bool:
-        """Return whether to accept these ticks, and remember them."""
+        """Return whether to accept these ticks; store them, and learn the clock's unit."""
         last = self._last
         passed = super().passes(group, now)
         if passed and last is not None and now - last[1] > LEARNT_FROM_S:
@@ -151,7 +151,7 @@ def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: f
 
 
 def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
-    """Return whether a group is in range; NaN is not, but velocities may be anything."""
+    """Return whether a group's position is in range (NaN is not). Velocities are not checked."""
     match group:
         case GpsPosition(latitude, longitude):
             return abs(latitude) <= 90.0 and abs(longitude) <= 180.0

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings of a LOIS ECU besides motion, in SI units and REP-103 axes: values only.
+"""Readings of a LOIS ECU other than odometry, in SI units and REP-103 axes: values only.
 
-EStopButton, Record and TerminalLine are passed on as they are.
+The messages EStopButton, Record and TerminalLine serve as readings too.
 """
 
 from dataclasses import dataclass
@@ -58,14 +58,14 @@ class RecordFailed:
 
 @dataclass(frozen=True, slots=True)
 class TerminalLeft:
-    """Notice that a terminal mode has ended; presses of the button meanwhile are unknown."""
+    """Notice that a terminal mode has ended, in which presses of the e-stop button are unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class WheelReading:
-    """Rotation of both wheels since the last reading, in rad, by ticks where they count.
+    """Rotation of both wheels since the last reading, in rad.
 
-    ``measured``: it is not taken from commands alone.
+    ``measured``: the rotation is known from ticks or a standstill, and not from commands.
     """
 
     left_rad: float

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Assembly of a requested record from its lines, up to its end: complete or not at all.
+"""Assembly of a requested record from its lines; an incomplete record is discarded.
 
 Works on lines, without characters and times.
 """
@@ -58,7 +58,7 @@ class RecordAssembler:
         return self._code is not None
 
     def expect(self, kind: RecordKind, left: int, right: int) -> None:
-        """Expect a record of this many samples; others are discarded."""
+        """Expect a record with these numbers of samples; discard every other record."""
         self._expected = kind, left, right
         self._begin(None)
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Request of a record, which is repeated until the record begins to arrive, as lines are lost.
+"""Request of a record, sent again until the record begins to arrive, as the board may lose lines.
 
-It also finds out whether the record arrives or fails. A repetition makes the board start the record
-anew, so all of them are sent within a short time.
+The request also finds out whether the record arrives or fails. Each repetition makes the board
+start the record anew, so all repetitions are sent within a short time.
 """
 
 import math
@@ -75,9 +75,9 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the readings, with the awaited record or the reason why it will not come.
+        """Return the readings, with the awaited record or the reason why the record will not come.
 
-        ``prevented``: why the board will not send it, as a sentence; empty if it may.
+        ``prevented``: why the board will not send the record, as a sentence; empty if it may.
         """
         if self.kind is None:
             return found
@@ -110,7 +110,7 @@ class RecordRequest:
         return self._begun_s + SAID_AFTER_S[self._said]
 
     def due(self, now: float) -> Command | None:
-        """The command to send now; None if none is due."""
+        """Return the command to send now; None if nothing is due."""
         if now < self.wake_at:
             return None
         self._begun_s = min(self._begun_s, now)

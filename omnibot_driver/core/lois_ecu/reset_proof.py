@@ -14,9 +14,9 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 FEW_TICKS: Final = 20
 """Most ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""More ticks than any wheel rolls before the counts show a reset that has arrived."""
+"""Number of ticks that exceeds what a wheel rolls before its counts show an obeyed reset."""
 STEADY_TICKS: Final = 3
-"""Lowest count that cannot be backlash, for wheels at rest."""
+"""Lowest count of a wheel at rest that cannot come from backlash."""
 UNPROVED_S: Final = 2.5
 """Time in s to wait for a proof where none may come; meanwhile the reset is repeated."""
 

@@ -42,7 +42,7 @@ class RestingWheel:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew: the next speed is the first."""
+        """Forget all speeds; treat the next one as the first."""
         self._lately: deque[tuple[float, float]] = deque(maxlen=64)
         self._told_rpm = 0.0
         self._fell_at_s = -SWINGS_S
@@ -58,7 +58,7 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Take an estimated speed where none was reported. The last reported speed is kept."""
+        """Record an estimated speed in RPM for ``since_s`` in which no speed was reported."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
@@ -86,7 +86,7 @@ class RestingWheel:
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
-        """Return the chances by the number of repetitions of this speed; empty if it rolls."""
+        """Return the chances of rest by number of repetitions; empty if the wheel rolls."""
         if not SLOWEST_RPM < rpm < FASTEST_RPM:
             return ()
         if rpm > FAST_RPM:

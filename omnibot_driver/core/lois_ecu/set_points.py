@@ -35,7 +35,7 @@ class SetPoints:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection."""
+        """Begin a new connection: forget the set-points that were sent."""
         self._said: SetRpm | SetDuty | None = None
         self.stopped_at_s = math.inf
         self.stood = False

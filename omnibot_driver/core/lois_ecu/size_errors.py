@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Covariance of a pose by errors of the wheels' sizes, and by a slip of both alike.
+"""Covariance of a pose due to errors of the wheels' sizes, and to a slip common to both wheels.
 
-Such an error is the same all along a drive, so it turns the robot further and further, and soon its
-effect is not proportional to it. So the drive is repeated with each error in either direction: the
-spread of the resulting poses is the covariance. Works on distances of the wheels.
+Such an error is constant during a drive, so the error of the yaw grows, and the error of the pose
+soon is not proportional to the cause. So the drive is repeated with each error in either direction:
+the spread of the resulting poses is the covariance. Works on distances of the wheels.
 """
 
 import math
@@ -15,7 +15,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
 
 KINDS: Final = 3
-"""Number of errors: left wheel, right wheel, both alike."""
+"""Number of kinds of errors: size of the left wheel, size of the right wheel, slip of both."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

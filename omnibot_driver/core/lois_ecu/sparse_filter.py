@@ -32,7 +32,7 @@ class SparseFilter:
         self.covariance = whole
 
     def disturb(self, terms: Terms, variance: float) -> None:
-        """Add an error of this variance along ``terms``."""
+        """Add to the covariance one error of this variance, which changes states by ``terms``."""
         covariance = self.covariance
         for i, a in terms:
             row = covariance[i]
@@ -49,7 +49,7 @@ class SparseFilter:
         self.mean[state] = mean
 
     def variance_of(self, terms: Terms) -> float:
-        """Return the variance of this combination of states."""
+        """Return the variance of the sum of states that ``terms`` weight."""
         covariance = self.covariance
         return max(sum(a * b * covariance[i][j] for i, a in terms for j, b in terms), 0.0)
 

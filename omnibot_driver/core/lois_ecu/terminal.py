@@ -15,10 +15,10 @@ from omnibot_driver.core.lois_ecu.messages import TerminalMode
 
 SENSORS: Final = (TerminalMode.GPS, TerminalMode.COMPASS)
 UNPROVED_S: Final = 2.0
-"""Time in s for which a robot is stopped that cannot be seen at rest."""
+"""Time in s for which Stop is sent to a robot whose standstill cannot be seen."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""Time in s after a change of the mode in which a report may have been sent before it."""
+"""Time in s after a mode was written in which reports from before the change still arrive."""
 
 
 class ModeChange:
@@ -31,7 +31,7 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """Sensor's mode that was written to the board, until its protocol is received again."""
+        """Sensor's mode that was written to the board; None once the protocol is received again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
         self._stopping_since_s: float | None = None

@@ -61,7 +61,7 @@ class Translation:
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """Settings that cannot be read from the board."""
+        """Settings of the board and the robot, which the board does not report."""
         return self._settings
 
     @settings.setter
@@ -158,7 +158,7 @@ class Translation:
 
     @property
     def ticks(self) -> Ticks | None:
-        """Last ticks; None since the line is new, or a reset was sent."""
+        """Last ticks; None before the first ticks of a connection."""
         return self._ticks
 
     def _displaced(self, estimates: list[FusedOdometry]) -> list[LoisReading]:

@@ -18,7 +18,7 @@ from omnibot_driver.core.lois_ecu.terminal import ModeChange
 
 
 class Upkeep:
-    """Scheduler of these writes; ``due`` returns what to write now.
+    """Scheduler of settings, modes, records and recovery; ``due`` returns what to write now.
 
     ``heard_at_s``: when valid lines of the board last arrived.
     """

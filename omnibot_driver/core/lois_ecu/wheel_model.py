@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 HEARD_S: Final = 0.008
-"""Time in s from our writing until the board has read the line."""
+"""Time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
 """Periods of the speed controller in s, by the manual and of the public firmware."""

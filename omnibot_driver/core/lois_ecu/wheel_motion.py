@@ -31,7 +31,7 @@ SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that the ground adds to a speed, in (m/s)² per s."""
 WINDUP_M: Final = 0.08
-"""Distance in m that a wheel at rest lacks when it starts: the controller winds up by it."""
+"""Integral of the missing speed, in m, at which the controller sets a resting wheel in motion."""
 DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
@@ -66,9 +66,10 @@ class Step:
 
 
 class Wheel:
-    """What is known of one wheel besides the filter's states, which begin at ``base``.
+    """State of one wheel in addition to its states in the filter, which begin at index ``base``.
 
-    ``blind``: it moved, or should have, while its ticks did not count, since this was last cleared.
+    ``blind``: since this was last cleared, the wheel moved or had a target while its ticks did not
+    count.
     """
 
     def __init__(self, base: int) -> None:
@@ -80,11 +81,11 @@ class Wheel:
         """Forget all commands and history, as the board has just started."""
         self.course = WheelModel(self.course.step_s)
         self.restless_mps = 0.0
-        """Size of the last changes of speed in m/s, fading."""
+        """Largest recent difference of target and speed, in m/s; decays with time."""
         self.unsettled_mps = 0.0
-        """Size of the last set-point's change alone in m/s, fading, until the wheel is halted."""
+        """Difference of target and speed at the last set-point, in m/s; decays with time."""
         self.wound_m = 0.0
-        """Distance in m that the wheel has lacked since its controller was reset."""
+        """Integral of the missing speed since the controller was reset, in m."""
         self.cut = False
         """Whether the wheel is without power until the controller has wound up."""
         self.rolls_on = False
@@ -94,9 +95,9 @@ class Wheel:
         self.rolled_s = math.inf
         """Speed in m/s when the controller was reset, and the time in s since then."""
         self.locked = False
-        """Whether it is at rest without power, as the speed that it keeps exceeds its target."""
+        """Whether the wheel rests without power, as the speed measured last exceeds its target."""
         self.rests = False
-        """Whether it is at rest, as the speed that it keeps shows."""
+        """Whether the wheel is at rest, as shown by a measured speed that stays the same."""
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:

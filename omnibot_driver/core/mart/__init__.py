@@ -2,7 +2,7 @@
 
 """The MART motion controller: one request at a time, in UDP datagrams.
 
-The package knows bytes and times only; sockets and ROS are elsewhere.
+The package handles bytes and times only; sockets and ROS are handled elsewhere.
 """
 
 from omnibot_driver.core.mart.replies import Fail, MartDecoder, Ok, Other, parse

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What to ask the server after the stop port was used for an unknown motion.
+"""The queries to the server after the stop port was used for an unknown motion.
 
-SL ends RM and B in such a way that a later SM or SRM hangs the server for good. So neither is sent
-before the server has shown that no motion is in progress, or that the robot moves: the server gives
-its name, and refuses RST IMU while a motion is in progress. This module knows commands and replies.
-Time is an argument.
+SL ends RM and B in such a way that a later SM or SRM hangs the server for good. So SM and SRM are
+sent only once RST IMU has shown that the server knows of no motion (it refuses RST IMU during a
+motion), or the encoder has shown that the robot moves. This module knows commands and replies. Time
+is an argument.
 """
 
 import math
@@ -24,17 +24,17 @@ from omnibot_driver.core.packets import Packets
 STOP_AGAIN_S: Final = 3.0
 """Time in s after which SL and SS are sent again.
 
-A controlled move keeps the server silent until one of them arrives and ends it.
+During a controlled move the server is silent until SL or SS arrives and ends the move.
 """
 APART_S: Final = 0.4
-"""Time in s between two counts that show whether the robot moves."""
+"""Time in s between the two encoder counts that show whether the robot moves."""
 
 
 class Asking(Stops):
     """The part of the pilot that finds out which motion is in progress."""
 
     def _ask_what_moves(self, now: float) -> None:
-        """Begin to ask the server what is in progress."""
+        """Begin to find out which motion is in progress."""
         self._stopping = None
         self.conversation.give_up(now)
         self.state, self.motion = State.ASKING, Motion.UNKNOWN
@@ -78,7 +78,7 @@ class Asking(Stops):
             self._lose(now, "the stop port has ended a motion, and the server does not know it")
 
     def _sweep(self, now: float) -> None:
-        """Stop with SRM and SM, which cannot hang the server in this situation."""
+        """Stop any motion with SRM and SM, which cannot hang the server now."""
         if self._lost_told:
             self._lost_told = False
             self._notice("the server answers again; the driver first stops any motion", halt=True)
@@ -86,5 +86,5 @@ class Asking(Stops):
         self._halt(now)
 
     def _unanswered(self, word: Word) -> None:
-        """Note a missing reply: ask for the server's name again, as it may be gone."""
+        """Note a missing reply: require the server's name again, as the server may be gone."""
         self._named_s = -math.inf

@@ -3,7 +3,7 @@
 """The MART controller as a ``Board`` of the driver, backed by its pilot.
 
 The controller sends nothing by itself: each measurement is the reply to a query of the pilot.
-During a controlled move it answers nothing, so that silence is expected.
+During a controlled move the controller answers nothing, so silence is expected then.
 """
 
 import math
@@ -41,9 +41,9 @@ TRAITS: Final = Traits(
     slack_radps=0.6,
 )
 UNREAD_S: Final = 0.5
-"""Time in s without a reading after which any other reply is reported as NOTHING_MEASURED.
+"""Time in s without a reading after which any reply is reported as NOTHING_MEASURED.
 
-A robot that drives is measured more often than this.
+Measurements of a moving robot come more often than this.
 """
 EXPECTED_EVERY_S: Final = 0.2
 
@@ -75,7 +75,7 @@ class MartBoard(Board):
 
     @property
     def figures(self) -> BoardFigures:
-        """The counters and states for diagnostics, with the motor board's state by name."""
+        """The counters and states for diagnostics."""
         pilot = self._pilot
         return BoardFigures(
             rates_hz={},
@@ -95,7 +95,7 @@ class MartBoard(Board):
 
     @property
     def refusal(self) -> str:
-        """The reason why the robot must not be driven, with a remedy; empty if it may be."""
+        """The reason why motion is refused, with a remedy; empty while motion is allowed."""
         return self._pilot.refusal
 
     # Inbound
@@ -106,7 +106,10 @@ class MartBoard(Board):
         self._mode = Mode.UNKNOWN
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Return the readings that follow from a datagram of this channel."""
+        """Return the readings that a datagram from this channel brings.
+
+        NOTHING_MEASURED is added if a reply brings no reading and none came for UNREAD_S.
+        """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
         readings = self._pilot.take()
@@ -120,7 +123,7 @@ class MartBoard(Board):
         return readings
 
     def silence(self) -> None:
-        """Forget the mode: the server has been silent for too long and may have been restarted."""
+        """Set the mode to unknown, as the silent server may have been restarted."""
         self._mode = Mode.UNKNOWN
         self._pilot.fell_silent()
 
@@ -158,40 +161,43 @@ class MartBoard(Board):
         return min(times)
 
     def actuator(self, proof: StopProof) -> "Conductor":
-        """Return the actuator, which passes orders to the pilot and reports to ``proof``."""
+        """Return the actuator; its pilot notes stops and starts in ``proof``."""
         self._pilot.proof = proof
         return Conductor(self._pilot)
 
     def wake(self) -> Packets:
-        """Return the stop commands.
+        """Return the commands that stop the robot at the beginning of a connection.
 
-        The pilot repeats them, and awaits the reply before anything else.
+        The pilot repeats them until the server answers; it sends other requests only after that.
         """
         return self.stop()
 
     def stop(self) -> Packets:
-        """Return the commands that stop the present state of motion."""
+        """Return the packets with the commands that stop the present motion."""
         said = self._pilot.stop_words
         return tuple((word.channel, word.request().data) for word in said)
 
     def emergency_stop(self) -> Packets:
-        """Return the same as ``stop``: the controller does not have an emergency stop."""
+        """Return the packets of ``stop``: the controller does not have an emergency stop."""
         return self.stop()
 
     # What only this board has
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin a job; a JobDone reports its result. Raises RequestRefused."""
+        """Begin a job; a JobDone with this ``token`` reports its result later.
+
+        Raises RequestRefused while another job is under way, or if a log was not started.
+        """
         self._pilot.jobs.ask(job, token, now, *arguments)
 
     @property
     def resting(self) -> bool:
-        """Whether the robot is proved to be at rest and the server is free."""
+        """Whether measurements show that the robot is at rest, and the server is free."""
         return self._pilot.state is State.STILL and self._pilot.proof.proved
 
 
 class Conductor:
-    """The actuator: passes what is wanted to the pilot, which sends one request at a time."""
+    """The actuator: passes commands to the pilot, which sends one request at a time."""
 
     rate_hz = 20.0
 
@@ -209,7 +215,7 @@ class Conductor:
         return self._pilot.wake_at
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the order is slower than the controller can drive; a GoTo never is."""
+        """Return whether the order is below the slowest speeds; False for each GoTo."""
         if isinstance(order, GoTo):
             return False
         return not isinstance(order, Drive) or not (
@@ -221,7 +227,7 @@ class Conductor:
         """Do nothing: ``MartBoard.connect`` has reset the pilot."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Carry out ``wanted`` from now on."""
+        """Replace the command to carry out by ``wanted``."""
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:

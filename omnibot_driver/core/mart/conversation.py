@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One request at a time, and the decision which reply belongs to it.
+"""The exchange with the server: one request at a time, and the choice of its reply.
 
 Replies carry no number, and datagrams are lost, duplicated and late. So a reply is matched by its
 form, its failure text and the least time that its command takes. A reply that does not match is
@@ -32,7 +32,7 @@ from omnibot_driver.core.mart.words import (
 from omnibot_driver.core.packets import Packets
 
 QUICKEST_S: Final = 0.1
-"""Shortest margin in s on top of a query's own time before it is given up."""
+"""Shortest time in s to wait for a query's reply, in addition to the time the server needs."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
 """Factor and addend in s by which an unanswered query raises ``trip_s``.
@@ -40,21 +40,21 @@ LOSS, LOSS_S = 1.5, 0.02
 The query may have been given up too soon, so the next one is awaited longer.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""Duration of an exchange above which the network is disturbed, and for how long, in s.
+"""An exchange longer than SLOW_S (s) shows a disturbed network for the next DISTURBED_S (s).
 
-A network that delays, loses or duplicates a datagram may do so again. For DISTURBED_S, each reply
-may belong to an earlier question.
+A network that delays, loses or duplicates a datagram may do so again. While it is disturbed, each
+reply may belong to an earlier query.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
-"""Failure texts that a check may return before its least time: it is refused, or finds no IMU."""
+"""Failure texts that a check of the IMU may return at once: it is refused, or finds no IMU."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """A request that is not answered yet; it is given up at ``until_s``."""
+    """A request without a reply yet; at ``until_s`` the driver stops waiting for the reply."""
 
     request: Request
     sent_s: float
@@ -70,8 +70,8 @@ class Pending:
 class Answer:
     """A reply together with the request that it answers.
 
-    ``took_s``: time from the request to the reply in s; ``when``: the time at which the reply was
-    true.
+    ``took_s``: time from the request to the reply in s; ``when``: the time at which the value
+    in the reply was measured.
     """
 
     request: Request
@@ -81,7 +81,7 @@ class Answer:
 
     @property
     def word(self) -> Word:
-        """The command that is answered."""
+        """The command of the answered request."""
         return self.request.word
 
 
@@ -98,7 +98,7 @@ class Conversation:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: no request is pending."""
+        """Begin a new connection, and forget all earlier requests and replies."""
         self.pending: Pending | None = None
         self._owed_until_s: dict[Form, float] = {}
         self._copies_until_s: dict[Form, float] = {}
@@ -107,17 +107,21 @@ class Conversation:
         self._disturbed_s = self._doubled_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
-        """Return whether nothing is pending, and no late reply can be mistaken for its own."""
+        """Return whether ``word`` may be sent now.
+
+        That is so if no request is pending, and no late reply can be mistaken for the reply to a
+        query ``word``. The queries in PRESSING are sent in spite of late replies.
+        """
         if self.pending is not None:
             return False
         return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
 
     def heard(self, form: Form, now: float) -> None:
-        """Note that a reply of this form came; a duplicate of it may come later."""
+        """Note that a reply of this form came, whose duplicate may come within ``delay_s``."""
         self._copies_until_s[form] = now + self.delay_s
 
     def certain_from_s(self, word: Word) -> float:
-        """Return the time from which no reply to ``word`` can be a duplicate of an earlier one."""
+        """Return the time from which no late reply can be taken for the reply to ``word``."""
         until = [
             each.get(form, -math.inf)
             for form in word.forms
@@ -130,18 +134,18 @@ class Conversation:
         return now < self._disturbed_s + DISTURBED_S
 
     def doubles(self, now: float) -> bool:
-        """Return whether unexpected replies came recently: duplicates or late ones."""
+        """Return whether duplicate or late replies came recently."""
         return now < self._doubled_s + DISTURBED_S
 
     def owes(self, form: Form, now: float) -> None:
-        """Note that a reply of this form may still be on its way."""
+        """Note that a reply of this form may still come, within ``delay_s``."""
         until_s = now + self.delay_s
         self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def settle(self, now: float) -> None:
-        """Note that the server has answered its last request.
+        """Note that the server has answered the last request.
 
-        Earlier replies come within ``delay_s`` or are lost.
+        Replies to earlier requests then come within ``delay_s`` or are lost.
         """
         for form, until_s in self._owed_until_s.items():
             self._owed_until_s[form] = min(until_s, now + self.delay_s)
@@ -150,7 +154,10 @@ class Conversation:
         return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
 
     def ask(self, request: Request, now: float, takes_s: float | None = None) -> Packets:
-        """Send a request that expects a reply within ``takes_s`` (default: its command's limit)."""
+        """Return the packets that send the request, and wait for its reply.
+
+        ``takes_s``: longest time that the server needs, in s (default: the limit of the command).
+        """
         patience_s = self._patience_s(request.word)
         if takes_s is not None:
             patience_s = takes_s + 2 * self.delay_s
@@ -158,7 +165,7 @@ class Conversation:
         return ((request.word.channel, request.data),)
 
     def give_up(self, now: float) -> Word | None:
-        """Stop waiting for the pending request, and return its command."""
+        """Stop waiting for the pending request; return its command, or None without a request."""
         if self.pending is None:
             return None
         word = self.pending.word
@@ -167,7 +174,7 @@ class Conversation:
         return word
 
     def overdue(self, now: float) -> Word | None:
-        """Give up the pending request if its time is over; return its command, else None."""
+        """Give up the pending request if its reply is overdue; return its command, else None."""
         if self.pending is None or now < self.pending.until_s:
             return None
         if self.pending.word.kind is Kind.QUERY:
@@ -176,7 +183,7 @@ class Conversation:
         return self.give_up(now)
 
     def hear(self, reply: Reply, now: float) -> Answer | None:
-        """Return the answer that this reply is, or None for a late or duplicate reply."""
+        """Return the reply with its request, or None if the reply is late, duplicate or foreign."""
         pending = self.pending
         if isinstance(reply, Ok):
             self.heard(reply.form, now)
@@ -208,10 +215,10 @@ class Conversation:
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether the reply is a duplicate of the answer to another query.
+        """Return whether the reply to ``word`` is a duplicate of the reply to another query.
 
-        That is so if another query was just answered identically, but this one was answered
-        differently the last time. Its own reply is then still to come.
+        That is assumed if another query was just answered identically, but ``word`` was answered
+        differently the last time. The reply to ``word`` is then still to come.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA
@@ -221,9 +228,9 @@ class Conversation:
     def _has_come(
         self, reply: Ok | Fail, now: float, *, but: Word | None = None, kind: Kind | None = None
     ) -> bool:
-        """Return whether a command was answered identically within the last ``delay_s``.
+        """Return whether an identical reply to a command came within the last ``delay_s``.
 
-        ``but``: a command that is left out; ``kind``: the only kind of command to regard.
+        ``but``: a command to leave out; ``kind``: the only kind of command to look at.
         """
         return isinstance(reply, Ok) and any(
             each == reply and until_s > now and word is not but and kind in (None, word.kind)
@@ -231,15 +238,15 @@ class Conversation:
         )
 
     def _owes_until(self, word: Word, sent_s: float) -> None:
-        """Note that the reply to a request, sent at ``sent_s``, may still come."""
+        """Note that the reply to ``word``, sent at ``sent_s``, may still come."""
         until_s = sent_s + word.takes_s + 2 * self.delay_s
         for form in word.forms:
             self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def _patience_s(self, word: Word) -> float:
-        """Return how long a reply is awaited, in s.
+        """Return how long to wait for the reply to ``word``, in s.
 
-        Queries and changes have a short limit, so that a robot that drives is soon measured again.
+        The time is short for queries and changes, so that a moving robot is soon measured again.
         """
         longest_s = 2 * self.delay_s
         if word.kind in (Kind.QUERY, Kind.CHANGE):

@@ -4,8 +4,8 @@
 
 The sources are: a wheel that slips or has another size, a gyro that drifts, motors that differ
 where the heading is unknown, the beginning and end of each motion, and replies whose time is known
-only within the network's delay. This module knows metres, rad and seconds; it does not know where
-they come from.
+only within the network's delay. This module knows metres, rad and seconds; it does not know how
+they are measured.
 """
 
 import math
@@ -24,7 +24,7 @@ It grows with the root of the time.
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
 END_M, END_RAD = 0.004, math.radians(0.4)
-"""Standard deviations that each motion adds, in m and rad: how it begins, and rolls out."""
+"""Standard deviations that the start and roll-out of each motion add, in m and rad."""
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviation of a turn on the spot that the server reports in whole degrees.
 
@@ -35,11 +35,11 @@ PIVOT: Final = 0.01
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation of the heading after a straight controlled move, in rad."""
 BEND_WALK: Final = 0.5
-"""Part of the error of a guessed turn that is independent in each step."""
+"""Part of the error of a turn known from commands alone that is independent in each step."""
 ASTRAY: Final = 0.7
-"""Part of a distance by which its end may be off, ahead and aside, per rad² of heading variance."""
+"""Position error, as a part of the distance driven, per rad² of heading variance."""
 SPREAD: Final = 0.3
-"""Standard deviation of a time anywhere in an interval, as a part of its length (1/√12)."""
+"""Standard deviation of a time within an interval, as a part of the interval (1/√12)."""
 CLOCK_S: Final = 0.01
 """Least uncertainty of a reply's time, in s, as on a good network."""
 Errors = list[tuple[float, float, float, float]]
@@ -106,19 +106,19 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Note that a motion has begun: a guess of its turn may be corrected later."""
+        """Note that a motion has begun, so that ``heading_told`` can remove its heading error."""
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove the heading error of this motion's guessed turn, as the heading is reported now.
+        """Remove the heading error of a turn known from commands alone.
 
-        The error of the position to which the guess has led remains.
+        To be called when the server reports the heading. The resulting position error remains.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
 
     def add(self, m2: float, rad2: float) -> None:
-        """Add an independent error of the position in each direction, and one of the heading."""
+        """Add independent errors by their variances: of x and y (m²), and of the heading (rad²)."""
         self._walk = self._walk.with_errors(_around(m2, rad2))
 
     def end(self) -> None:
@@ -130,7 +130,7 @@ class Doubt:
         self.add(0.0, STRAIGHT_STDDEV_RAD**2)
 
     def end_turn(self, spun_rad: float, told_rad: float | None) -> None:
-        """Add the errors of a turn on the spot that has ended; arguments as for ``turn``."""
+        """Add the errors of a turn on the spot that has ended; arguments as in ``turn``."""
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
@@ -146,7 +146,7 @@ class Doubt:
         return anywhere(pivot_m, math.sqrt(variance))
 
     def total(self, more: Errors) -> Covariance:
-        """Return the covariance, including the further errors ``more`` since the last count."""
+        """Return the covariance of the pose, including the errors ``more`` since the last count."""
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
         size, bias, *others = self._levers
         errors = [(scale, *size), (drift, *bias), *((1.0, *lever) for lever in others)]
@@ -154,7 +154,7 @@ class Doubt:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return independent errors with these standard deviations, in m (each direction) and rad."""
+    """Return independent errors with these standard deviations: of x and y, and of the heading."""
     return _around(way_m * way_m, turn_rad * turn_rad)
 
 

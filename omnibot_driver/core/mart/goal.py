@@ -3,8 +3,8 @@
 """The plan to a goal pose by controlled moves: turn to it, drive straight, turn to its heading.
 
 Each move is a number of whole degrees or inches and ends a little beside its target, so the rest is
-planned again after each. This module knows poses and the commands for moves; it does not know when
-they are sent.
+planned anew after each move. This module knows poses and the commands for moves; it does not know
+when they are sent.
 """
 
 import math
@@ -20,34 +20,34 @@ NEAR_M: Final = 0.04
 NEAR_RAD: Final = math.radians(2.5)
 SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""After ENOUGH_MOVES moves, ENOUGH_M (m) from the goal is near enough.
+"""After ENOUGH_MOVES moves, a distance of ENOUGH_M (m) from the goal is near enough.
 
-Each further move would turn the robot round to the goal first.
+To come nearer, the robot would have to turn towards the goal first.
 """
 STRETCH: Final = 1.3
 """Initial ratio of the driven to the requested length of straight moves: 15.8 in for 12 in."""
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
-"""A turn that brings the robot nearer to its heading by less than this is not made."""
+"""Least improvement of the heading in degrees for which a turn is made."""
 WIDER: Final = 0.5
-"""Part by which each turn in a row widens the heading tolerance, as small turns overshoot."""
+"""Part of NEAR_RAD by which each turn in a row widens the tolerance, as turns overshoot."""
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal; after them the goal is given up."""
 
 
 LEAST_LIKE: Final = 0.35
-"""Largest part by which a single move differs from what was requested."""
+"""Largest difference of a single move from the request, as a part of the request."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
-"""Usual duration of a move: a constant in s, plus s per degree or inch, doubled if SLOW."""
+"""Usual duration of a move: a constant in s, plus s per degree or inch (doubled if SLOW)."""
 LONGER: Final = 1.4
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A controlled move that has ended, compared with what was measured of it.
+    """A controlled move that has ended, with its measurements.
 
-    ``request``: what was requested; ``way_m``, ``turned_rad``: what was counted since it began;
-    ``lasted_s``: its duration; ``quiet_s``: longest time that a duplicate of it may have run before
+    ``way_m``, ``turned_rad``: distance and turn by the encoder since the move began; ``lasted_s``:
+    duration of the move; ``quiet_s``: longest time that a duplicate of the move may have run before
     the encoder was read.
     """
 
@@ -69,10 +69,9 @@ class Done:
         return number * INCH_M if self.is_straight else math.radians(number)
 
     def may_have_run_twice(self, delay_s: float) -> bool:
-        """Return whether a duplicate of the move may have run after it.
+        """Return whether the server may have run the move twice, as its datagram was duplicated.
 
-        That happens on a network that duplicates datagrams; the count then covers the duplicate
-        alone.
+        The encoder count then covers the second run alone.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         number = float(self.request.data.split()[-1])
@@ -84,10 +83,10 @@ class Done:
 
 
 class Surplus:
-    """The measured excess of controlled moves over what was requested.
+    """The measured excess of controlled moves over the requested distances and turns.
 
-    It is a number of degrees for turns, and a ratio for straight moves, which the server ends by
-    time.
+    The excess of turns is a number of degrees. That of straight moves is a ratio, as the server
+    ends them by time.
     """
 
     def __init__(self) -> None:
@@ -95,7 +94,7 @@ class Surplus:
         self._stretch = {True: STRETCH, False: STRETCH}
 
     def learn(self, request: Request, way_m: float, turned_rad: float) -> None:
-        """Learn from a move that has ended; ``way_m`` and ``turned_rad`` may have any sign."""
+        """Learn from the measurement of a finished move; the signs of the values are ignored."""
         parts = request.data.split()
         slow, asked = b"SLOW" in parts, float(parts[-1])
         if request.word in (TF, TB):
@@ -109,7 +108,7 @@ class Surplus:
     def degrees(self, wanted: float, *, slow: bool) -> int:
         """Return the number of degrees to request for a turn by ``wanted`` degrees.
 
-        It is 0 if a turn would leave the robot no nearer, as even the smallest turn is too large.
+        The result is 0 if no possible turn would bring the robot nearer by at least WORTH_DEG.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
@@ -123,10 +122,10 @@ class Surplus:
 
 @dataclass(slots=True)
 class Move:
-    """The progress towards one goal.
+    """The progress towards the goal ``place``.
 
-    ``said``: number of moves so far; ``turns``: number of turns at the end of these, without a
-    straight move between; ``given_up``: whether the goal is finished, or a move has failed.
+    ``said``: number of moves sent so far; ``turns``: number of turns since the last straight move;
+    ``given_up``: whether the goal is finished, or a move has failed.
     """
 
     place: Pose
@@ -135,7 +134,7 @@ class Move:
     given_up: bool = False
 
     def begin(self, request: Request) -> None:
-        """Note that this move is sent."""
+        """Count this move as sent."""
         self.said += 1
         self.turns = 0 if request.word in (TF, TB) else self.turns + 1
 

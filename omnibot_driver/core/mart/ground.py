@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The base of the pilot: the believed state of server and robot, and the sending of commands.
+"""The base of the pilot: the state of server and robot, and the sending of commands.
 
 This module knows states and commands; it does not know why a command is sent. Time is an argument.
 """
@@ -35,16 +35,16 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryRe
 
 STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 ESTOP_REPEAT_S: Final = 0.1
-"""Interval in s of the stops while the e-stop is latched.
+"""Interval in s at which stops are sent while the e-stop is latched.
 
-A server whose robot is at rest answers them with ``fail`` and does nothing.
+A server whose robot is at rest answers each stop with ``fail`` and does nothing.
 """
 
 
 class Ground:
     """The state that all parts of the pilot share.
 
-    ``readings``: readings that are still to be taken. ``settings`` may be replaced.
+    ``readings``: readings that the caller has not taken yet. ``settings`` may be replaced.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -124,7 +124,7 @@ class Ground:
 
     @property
     def refusal(self) -> str:
-        """The reason why the robot must not be driven, with a remedy; empty if it may be."""
+        """The reason why motion is refused, with a remedy; empty while motion is allowed."""
         if self.state is State.LOST:
             return (
                 "the server is lost: cut the motor power if the robot moves, then restart the"
@@ -137,7 +137,7 @@ class Ground:
         return self.odometry.told(now, blind_since_s=self.blind_since_s)
 
     def take(self) -> list[Reading]:
-        """Return the readings that came since the last call."""
+        """Return the readings and the results of jobs that came since the last call."""
         if self.jobs.done:
             self.readings += map(ExtraReading, self.jobs.done)
             self.jobs.done.clear()
@@ -175,7 +175,7 @@ class Ground:
         return by_reference and odometry.heading.from_s < self._rested_s
 
     def _require(self, word: Word) -> None:
-        """Raise AssertionError, as for a defect, if the present state forbids the command."""
+        """Raise AssertionError if the command is not allowed in the present state."""
         if not may_say(self.state, word, self.motion):
             raise AssertionError(f"{word.text} must not be said while {self.state.value}")
 

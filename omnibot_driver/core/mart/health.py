@@ -2,7 +2,7 @@
 
 """The reasons not to drive: the motor board's state, the IMU, obstacles, a wrong server.
 
-This module knows the slower measurements and their limits; it does not know what follows from them.
+This module knows the slower measurements and their limits; it does not stop the robot.
 Time is an argument.
 """
 
@@ -34,20 +34,20 @@ BITS: Final = {
 NO_READ: Final = 255
 HALTING: Final = 4 | 8 | 16 | 32
 FRONT_IN, REAR_IN = 19, 15
-"""Distances in inches; the controller stops for an obstacle that is nearer."""
+"""Distances in inches in front and behind; the controller stops for nearer obstacles."""
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
-"""Largest difference of two readings that are regarded as alike, in V and inches."""
+"""Largest difference of two readings that confirm each other, in V and inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of similar readings in a row that are believed, where a reply may be to another query."""
+"""Similar readings in a row needed to accept one that may be the reply to another query."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 REFERENCE_FAILS: Final = 2
 """Number of bare ``fail`` replies to RM in a row that show a defective server.
 
-RM may fail once after a stop that took long, while the robot is at rest.
+A single ``fail`` can also come from an intact server, after a stop that took long.
 """
 
 
@@ -84,8 +84,8 @@ class Health:
     ) -> list[Reading]:
         """Return the readings from a reply to one of the slower queries.
 
-        ``uncertain``: the reply may be to another query, so its value is reported only when it was
-        repeated.
+        ``uncertain``: whether the reply may be to another query, so that the value is reported only
+        after similar values came several times in a row.
         """
         if word is VOLTS:
             self._voltages.append(reply.number)
@@ -114,9 +114,9 @@ class Health:
         return []
 
     def _is_of_another(self, word: Word, inches: float) -> bool:
-        """Return whether the distance is as likely the answer to another query.
+        """Return whether the distance is probably the reply to another query.
 
-        That is so for 0, and for the value that the other sonar has reported.
+        That is assumed for 0 inches, and for the value that the other sonar has reported.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
@@ -126,9 +126,9 @@ class Health:
         return any(abs(number - volts) < SAME_V for volts in self._voltages)
 
     def _status(self, bits: int) -> None:
-        """Note the motor board's status; a nonzero one is believed when it is repeated.
+        """Note the motor board's status, but a nonzero status only when it comes twice in a row.
 
-        A late reply to ENC looks the same.
+        A late reply to ENC looks like a status.
         """
         if not 0 <= bits <= NO_READ:
             return
@@ -145,7 +145,7 @@ class Health:
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
-        """Note that RMRA has changed in this motion; a single change may come from a late reply."""
+        """Note a change of RMRA; HEADING_CHANGES changes prove that RMRA works in this motion."""
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
@@ -161,7 +161,7 @@ class Health:
 
     @property
     def bits(self) -> str:
-        """The faults that MCSTAT reports, by name."""
+        """The faults that MCSTAT reports, as text; "none" without faults, or "unknown"."""
         if self.status is None:
             return "unknown"
         if self.status == NO_READ:
@@ -170,14 +170,14 @@ class Health:
 
     @property
     def tripped(self) -> str:
-        """What the motor board reports against driving the motors; empty if they may be driven."""
+        """The motor board's faults that forbid driving; empty without such faults."""
         if self._encoder_fails >= ENCODER_FAILS or self.status == NO_READ:
             return "nothing (it does not answer ENC or MCSTAT)"
         return self.bits if (self.status or 0) & HALTING else ""
 
     @property
     def refusal(self) -> str:
-        """The reason why the robot must not be driven, with a remedy; empty if it may be."""
+        """The reason why motion is refused, with a remedy; empty while motion is allowed."""
         if self.stranger:
             return f"the server is not a motion controller; it calls itself '{self.stranger}'"
         if self.tripped:
@@ -192,7 +192,7 @@ class Health:
         return ""
 
     def obstacle(self, motion: Motion, now: float) -> bool:
-        """Return whether a sonar has recently seen an obstacle too near in this direction."""
+        """Return whether the sonar in the direction of motion has recently seen a near obstacle."""
         side: Side = "rear" if motion is Motion.REVERSE else "front"
         least = REAR_IN if motion is Motion.REVERSE else FRONT_IN
         inches, at_s = self._sonars_in.get(side, (-1, -math.inf))

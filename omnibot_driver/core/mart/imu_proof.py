@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The proof that the IMU is alive, and the command that gives it.
+"""The check that the IMU is alive: the command, and its last results.
 
-RST IMU gives the proof without a motion; MCR SLOW 0 is used if the server does not have that
-command. The server closes the IMU when RST IMU fails, so the check is repeated before the driver
-believes it. This module knows replies and times; it does not know what is started. Time is an
+RST IMU checks without a motion; MCR SLOW 0 is used if the server does not have RST IMU. The server
+closes the IMU when RST IMU fails, so the driver repeats a failed RST IMU before it regards the IMU
+as dead. This module knows replies and times; it does not know which motion is started. Time is an
 argument.
 """
 
@@ -23,18 +23,18 @@ from omnibot_driver.core.mart.words import (
 )
 
 PROVED_S: Final = 0.2
-"""Oldest proof of the IMU with which a motion may start, in s."""
+"""Largest age in s of a successful check of the IMU with which a motion may start."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""Usual duration of a check in s. Half of any excess is regarded as the delay of its reply."""
+"""Usual duration of a check in s; half of any excess is taken for the delay of the reply."""
 FAILS: Final = {RESET: 3, CHECK: 1}
-"""Number of failures in a row after which the IMU is regarded as dead."""
+"""Number of failed checks in a row after which the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
 
 
 class ImuProof:
-    """The result of the last checks of the IMU.
+    """The results of the last checks of the IMU.
 
-    ``word``: the command that checks it; ``dead``: whether the last checks found no IMU;
+    ``word``: the command that checks the IMU; ``dead``: whether the last checks found no IMU;
     ``again_s``: earliest time of the next check.
     """
 
@@ -42,18 +42,18 @@ class ImuProof:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: nothing is proved."""
+        """Begin a new connection, and forget the results of earlier checks."""
         self.word: Word = RESET
         self.dead = False
         self.again_s = self._proved_s = -math.inf
         self._fails = 0
 
     def fresh(self, now: float) -> bool:
-        """Return whether the last proof is recent enough for a motion to start."""
+        """Return whether the last successful check is recent enough for a motion to start."""
         return now <= self._proved_s + PROVED_S
 
     def used(self) -> None:
-        """Note that a motion starts; the next one needs another proof."""
+        """Note that a motion starts; the next motion needs a new check."""
         self._proved_s = -math.inf
 
     def lost(self) -> None:
@@ -66,11 +66,14 @@ class ImuProof:
         return RESET.request() if self.word is RESET else CHECK.request(0)
 
     def missed(self, now: float) -> None:
-        """Note that a check was not answered."""
+        """Note that a check was not answered; the next one is due after REPEAT_S."""
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check; return whether the reply is an expected one."""
+        """Evaluate the reply to a check; return False for a failure that is not about the IMU.
+
+        ``took_s``: time from the check to the reply, in s.
+        """
         if isinstance(reply, Ok):
             self.dead, self._fails = False, 0
             self._proved_s = now - max(0.0, took_s - PROBE_S[word]) / 2
@@ -86,5 +89,5 @@ class ImuProof:
         return True
 
     def retries(self, now: float) -> bool:
-        """Return whether to check a dead IMU again, with the command that moves nothing."""
+        """Return whether to check a dead IMU again now; only RST IMU, which moves nothing, may."""
         return self.dead and self.word is RESET and now >= self.again_s

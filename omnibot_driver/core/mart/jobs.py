@@ -2,8 +2,8 @@
 
 """Requests to the controller besides motion, one job at a time: gyro bias, dock, log, files.
 
-A file comes as a name with a size, then as pieces of 512 bytes without numbers. A lost or
-duplicated piece shows in the size, or as two identical pieces. This module knows commands and
+A file comes as a name with a size, then as unnumbered pieces of 512 bytes. A lost or duplicated
+piece is detected by the total size, or by two identical pieces. This module knows commands and
 replies; it does not know when the command port is free. Time is an argument.
 """
 
@@ -22,7 +22,7 @@ PIECE: Final = 512
 QUIET_S: Final = 1.0
 """Time in s without a piece after which a file is regarded as complete."""
 TIMES: Final = 3
-"""Number of attempts at a job that may be repeated."""
+"""Largest number of attempts at a job in REPEATED."""
 
 
 class Job(Enum):
@@ -55,9 +55,9 @@ REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 class Jobs:
     """The job that is under way, and the results of those that have ended.
 
-    ``done``: results that are still to be taken; ``logging``: whether LOG was answered in this
-    connection; ``ended``: whether EXIT was sent, so that the server has ended; ``moving``: whether
-    the controlled move of the job was sent.
+    ``done``: results that the caller has not taken yet; ``logging``: whether LOG was answered with
+    ok in this connection; ``ended``: whether EXIT was sent, which ends the server; ``moving``:
+    whether the controlled move of the job was sent.
     """
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ class Jobs:
 
     @property
     def collecting(self) -> bool:
-        """Whether pieces of a file are awaited."""
+        """Whether the job waits for pieces of a file."""
         return self._size >= 0
 
     @property
@@ -103,7 +103,8 @@ class Jobs:
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job.
 
-        Raises RequestRefused while another is under way, and for a log that was not started.
+        Raises RequestRefused while another job is under way, and for a download of a log that was
+        not started.
         """
         if self.job is not None:
             raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
@@ -117,9 +118,9 @@ class Jobs:
         self._until_s = now + WITHIN_S.get(job, USUAL_S)
 
     def next(self, now: float, *, stands: bool) -> Request | None:
-        """Return the request to send, or None.
+        """Return the job's request if it is to be sent now, else None.
 
-        ``stands``: whether the robot is proved to be at rest.
+        ``stands``: whether measurements have shown that the robot is at rest.
         """
         return self._request if stands and not self._waiting else None
 
@@ -167,7 +168,7 @@ class Jobs:
             )
 
     def piece(self, data: bytes, now: float) -> None:
-        """Keep a datagram that arrived while pieces of a file are awaited, if its size fits."""
+        """Keep a datagram as a piece of the file, if its size is that of a piece."""
         if len(data) in (PIECE, self._size % PIECE):
             self._pieces.append(data)
             self._piece_s = now + QUIET_S
@@ -175,7 +176,7 @@ class Jobs:
                 self._piece_s = now + QUIET_S / 3
 
     def tick(self, now: float) -> None:
-        """End a file that is complete, and a job that takes too long."""
+        """End the download if no more pieces come, or a job that has taken too long."""
         if self.collecting and now >= self._piece_s:
             self._close_file()
         elif self.job is not None and now >= self._until_s:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The evaluation of the answers to queries: counts, headings, and a robot that moves uncommanded.
+"""The evaluation of replies to queries: counts, headings, and motion without a command.
 
 This module knows answers and their recipients; it does not know when a query is sent. Time is an
 argument.
@@ -72,7 +72,7 @@ class Measuring(Starts):
             self._learn(reading.dyaw_rad, now)
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
-        """Stop a robot that moves although it should be at rest, as its counts show.
+        """Stop a robot whose counts change although it should be at rest.
 
         The cause is a late duplicate of a start, another client, or a push.
         """

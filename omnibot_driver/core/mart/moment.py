@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The time at which a reply was true, with the uncertainty that the network adds.
+"""The time at which the value in a reply was measured, with the uncertainty that the network adds.
 
 This module holds values only.
 """
@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""Uncertainty in s from which on a reply may answer an earlier question."""
+"""Time uncertainty in s from which on a reply is regarded as uncertain."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The time at which a reply was true.
+    """The time at which the value in a reply was measured.
 
-    ``at_s``: the most probable time; ``from_s``, ``until_s``: the earliest and the latest one.
-    ``doubtful``: whether the reply may answer another question.
+    ``at_s``: the most probable time; ``from_s``, ``until_s``: the earliest and the latest possible
+    time; ``doubtful``: whether the reply may answer another query than the last one.
     """
 
     at_s: float
@@ -27,10 +27,10 @@ class Moment:
 
     @property
     def spread_s(self) -> float:
-        """Width of the interval that contains the time, in s."""
+        """Time from the earliest to the latest possible measurement, in s."""
         return self.until_s - self.from_s
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether the reply may be of an earlier time, or answer another question."""
+        """Whether the measurement may be old, or the reply may answer another query."""
         return self.doubtful or self.spread_s >= UNCERTAIN_S

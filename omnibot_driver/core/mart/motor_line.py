@@ -2,10 +2,10 @@
 
 """The speed of two motors as a learned straight line over their command units.
 
-A motor without a regulator needs some units before it turns, so its speed is not in proportion to
-them. A gain that was learned while driving would make a slow turn on the spot too slow. Speeds are
-given in nominal units: those that an ideal motor would need for the speed. This module knows no
-wheels and no time.
+A motor without a regulator needs some units before it turns, so its speed is not proportional to
+its units. A gain that was learned while driving would make a slow turn on the spot too slow. Speeds
+are given in nominal units: the units that an ideal motor would need for the speed. This module
+knows neither wheels nor time.
 """
 
 from typing import Final
@@ -18,7 +18,7 @@ SLOPE_SD, OFFSET_SD = 0.3, 4.0
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 """Standard deviations of the change of slope and offset (units) between two measurements."""
 NOISE, NOISE_PART = 0.3, 0.02
-"""Standard deviation of a measured speed: in nominal units, plus a part of the commanded units."""
+"""Standard deviation of a measured speed: nominal units, plus a part of the commanded units."""
 
 
 class MotorLine:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Controlled moves towards a goal, one after another, and the evaluation of a finished one.
+"""Controlled moves towards a goal, one after another, and the evaluation of finished moves.
 
 This module knows goals and moves; it does not know when a move may be sent. Time is an argument.
 """
@@ -43,7 +43,7 @@ class Moves(Asking):
         return request
 
     def _moved(self, reply: Ok | Fail, now: float) -> None:
-        """Note that a controlled move has ended, by its own reply."""
+        """Evaluate the reply that ends a controlled move."""
         motion = self.motion
         if motion is Motion.STRAIGHT:
             self.odometry.finish_straight()
@@ -61,9 +61,9 @@ class Moves(Asking):
                 self.imu.lost()
 
     def _doubt_a_copy(self, now: float) -> None:
-        """Add uncertainty if a duplicate of the last controlled move may have run after it.
+        """Add uncertainty if the server may have run the last controlled move twice.
 
-        The encoder count then begins anew, and covers the duplicate alone.
+        The encoder count then begins anew, and covers the second run alone.
         """
         move, self._last_move = self._last_move, None
         if move is None or not self.conversation.disturbed(now):

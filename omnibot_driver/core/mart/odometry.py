@@ -19,15 +19,15 @@ LONGEST_PREDICTION_S: Final = 0.5
 SLOWING_S: Final = 0.12
 """Time constant in s with which a robot that is being stopped slows down."""
 ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
-"""Standard deviations of the acceleration of a robot since its last count."""
+"""Standard deviations of the acceleration since the last count, in m/s² and rad/s²."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
-"""Standard deviations by which a robot may be faster than its last counts show."""
+"""Standard deviations of the error of speeds from the last counts, in m/s and rad/s."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
-"""Standard deviations of the speed of a robot that starts, before its speed is counted."""
+"""Standard deviations of speed and turn rate before they are measured after a start."""
 BLIND_RADPS: Final = 1.5
 """Standard deviation of the turn rate of a robot during a controlled move, in rad/s."""
 FRESH_S: Final = 0.2
-"""Age in s up to which a heading shows how the robot turns now."""
+"""Age in s up to which the last heading shows the present turn rate."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03
 
 
@@ -63,7 +63,10 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """Return the errors since the last count, and those of the uncertain time of that count."""
+        """Return the errors of the motion since the last count, and of that count's uncertain time.
+
+        ``ahead_s``: time since the last count; ``blind_since_s``: as in ``told``.
+        """
         if blind_since_s is not None:
             blind_s = max(0.0, now - blind_since_s)
             return anywhere(BLIND_MPS * blind_s, min(math.pi, BLIND_RADPS * blind_s))

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The decision which command to send to the server next.
+"""The choice of the next command to send to the server.
 
-One decision at a time: stop a motion that must not continue, else act on what is wanted, else send
-a query. This module knows states, commands and measurements; it does not know who commands. Time is
+In this order: stop a motion that must not continue, else carry out the wanted command, else send a
+query. This module knows states, commands and measurements; it does not know who commands. Time is
 an argument.
 """
 
@@ -29,21 +29,21 @@ from omnibot_driver.core.mart.words import Form, Kind, Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 STOPS_S: Final = 1.0
-"""Usual longest time in s until a stop is answered."""
+"""Time in s within which a stop is usually answered."""
 COPY_S: Final = 0.25
-"""Time in s after a controlled move within which the encoder answers, unless a duplicate runs."""
+"""Time in s after a controlled move; if ENC stays unanswered longer, a duplicate may be running."""
 BLIND_PART: Final = 0.15
-"""Largest unanswered change of the motors, as a part of the units, while the heading is unknown.
+"""Largest unanswered change of motor units while the heading is unknown, as a part of the units.
 
-A larger one stops the robot.
+A larger unanswered change stops the robot.
 """
 
 
 class Pilot(Measuring):
-    """The pilot of one server."""
+    """The pilot of one server: decides which request is sent, and evaluates the replies."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace what was wanted by ``wanted``."""
+        """Replace the wanted command by ``wanted``; a new command cancels the present job."""
         if wanted is not None:
             self.jobs.cancel("a command arrived meanwhile; call again when none is active")
         if wanted is not self._wanted:
@@ -58,7 +58,7 @@ class Pilot(Measuring):
 
     @property
     def stop_words(self) -> tuple[Word, ...]:
-        """The commands that stop the present motion, for a caller that receives no replies."""
+        """The commands that stop the present motion."""
         if self.state in (State.LOST, State.ASKING):
             return LAST_HALTS[self.motion] or LAST_HALTS[Motion.UNKNOWN]
         if self.motion is Motion.NONE:
@@ -68,20 +68,20 @@ class Pilot(Measuring):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server cannot answer now, as expected."""
+        """Return whether the server is expected to be silent now, as it is busy."""
         if self._stopping is not None:
             return self.greeted and now < self._stopping.began_s + STOPS_S
         return self.state in (State.MOVING, State.SERVING, State.CHECKING, State.STARTING)
 
     @property
     def ready(self) -> bool:
-        """Whether the server has given its name and answered the first stop."""
+        """Whether the server has given its name, answered the first stop, and is not lost."""
         return self.greeted and not self.health.stranger and self.state is not State.LOST
 
     def fell_silent(self) -> None:
-        """Begin a new connection after a long silence, unless the server may be busy.
+        """Begin a new connection after a long silence, unless a motion or a job is in progress.
 
-        The server may have been restarted.
+        The server may have been restarted during the silence.
         """
         if self.state in (State.STILL, State.UNKNOWN):
             self.connect()
@@ -146,7 +146,9 @@ class Pilot(Measuring):
 
     @property
     def _copy_stop_s(self) -> float:
-        """The time to stop a late duplicate of a controlled move that seems to block the port.
+        """The time at which to stop a suspected duplicate of a controlled move; else infinite.
+
+        The duplicate runs after the move and blocks the command port, so ENC is not answered.
 
         SL and SS would hang a server that drives by RM or B, but the last motion was neither.
         """

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The schedule of queries while no other request is pending, by the state of motion.
+"""The schedule of queries by the state of motion; they are sent while no request is pending.
 
-Encoder and heading are the most frequent, and alternate. A sonar takes 55 ms, so it is queried only
-while the robot is at rest. This module knows queries and states; time is an argument.
+The queries for encoder and heading are the most frequent, and alternate. A sonar takes 55 ms, so it
+is queried only while the robot is at rest. This module knows queries and states; time is an
+argument.
 """
 
 import math
@@ -31,12 +32,15 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.REVERSING: DRIVING,
     State.TURNING: TURNING,
 }
-"""Period in s of each query by state, the most urgent first. In other states the port is busy."""
+"""Period in s of each query by state, the most urgent query first.
+
+States that are not listed have no queries, as the command port is busy.
+"""
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
 """The two sonars, and the least time in s between their queries.
 
-Both report the same value where nothing is near, so a duplicate of one reply could be taken for the
-other's.
+Both sonars report the same value where nothing is near, so a duplicate of one sonar's reply could
+be taken for the reply of the other.
 """
 
 
@@ -53,14 +57,14 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, in the order in which they become a full period late.
 
-        Thus each gets its turn where an exchange takes longer than a period.
+        Thus each query gets its turn even if an exchange takes longer than a period.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]
         return sorted(late, key=lambda word: self._at(word, state) + periods[word])
 
     def asked(self, word: Word, now: float) -> None:
-        """Note that the query was sent."""
+        """Note that the query was sent; a sonar's query also delays the other sonar's."""
         self._asked_s[word] = now
         if word in SONARS:
             for each in SONARS:
@@ -72,7 +76,7 @@ class Polls:
         self._asked_s.pop(word, None)
 
     def wake_at(self, state: State) -> float:
-        """Return the time of the next query."""
+        """Return the time at which the next query is due in this state; infinite if none is."""
         return min((self._at(word, state) for word in PERIODS.get(state, {})), default=math.inf)
 
     def _at(self, word: Word, state: State) -> float:

@@ -35,9 +35,10 @@ class DockedReading:
 
 @dataclass(frozen=True, slots=True)
 class JobDone:
-    """The result of a job.
+    """The result of a job, which is a request to the controller besides motion.
 
-    ``name``, ``content``: name and bytes of the file, if one was requested.
+    ``token``: what the caller gave to recognize the job by; ``name``, ``content``: name and bytes
+    of the file, if a file was requested.
     """
 
     token: object

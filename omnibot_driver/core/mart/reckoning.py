@@ -3,8 +3,8 @@
 """The pose at the last count, from the distance of the right wheel and the relative heading.
 
 The server reports the heading while RM drives. A turn on the spot is measured by the wheel until
-the reply to SM reports it. Nothing is known of a controlled move before its end. This module knows
-counts, degrees and metres; it knows no commands. Time is an argument.
+the reply to SM reports the angle. A controlled move is not measured before its end. This module
+knows counts, degrees and metres; it knows no commands. Time is an argument.
 """
 
 import math
@@ -22,29 +22,32 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 WINDOW_S, SPREADS = 0.35, 4
-"""Window in s over which speeds are averages, or multiple of a reply's uncertainty if longer."""
+"""Averaging time of speeds: the larger of WINDOW_S (s) and SPREADS times a reply's spread."""
 LEAST_S: Final = 0.05
 TOLD_RAD, TOLD_PART = 0.05, 0.3
 """Largest difference of a reported turn from the wheel's: in rad, plus a part of the turn.
 
-A reported turn that differs by more is the answer to another question.
+A number that differs by more is regarded as the answer to another query.
 """
 BEGIN_RADPS: Final = 0.03
-"""Turn rate in rad/s of unequal motors with equal units, before the first heading of RM."""
+"""Standard deviation in rad/s of the turn rate before the first heading of RM.
+
+The two motors differ although their units are equal.
+"""
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations of the motion, in m and rad, if its end was not received."""
+"""Standard deviations of the end of a motion during which the connection was lost, in m and rad."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 
 
 class Reckoning:
-    """Dead reckoning by count and heading.
+    """Dead reckoning by the encoder count and the heading.
 
     ``pose``: pose at the last count; ``stands``: whether the robot was stopped;
-    ``left_over_right``: ratio of the wheels' speeds as commanded, used where the heading is
-    unknown, else None; ``bend``: standard deviation of that ratio.
+    ``left_over_right``: commanded ratio of left to right wheel speed if the heading is unknown,
+    else None; ``bend``: standard deviation of that ratio.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -76,7 +79,7 @@ class Reckoning:
         self._settings = self.doubt.settings = settings
 
     def reset(self) -> None:
-        """Begin a new frame at the present pose."""
+        """Begin a new odometry frame at the present pose."""
         self.pose = Pose()
         self.doubt.reset()
 
@@ -90,7 +93,7 @@ class Reckoning:
         self.forget_speeds()
 
     def begin(self, motion: Motion, now: float) -> None:
-        """Note that a motion has begun, and with it the count."""
+        """Note that a motion was started; its count begins at zero."""
         self.motion, self.stands = motion, False
         self._began_s, self._stood_s = now, math.inf
         self.slowing_since_s = None
@@ -116,11 +119,11 @@ class Reckoning:
             self.slowing_since_s = now
 
     def stand(self, now: float) -> None:
-        """Note that the robot was stopped; its roll-out is not counted yet."""
+        """Note that the robot was stopped; its roll-out is not measured yet."""
         self.stands, self._stood_s = True, now
 
     def rest(self) -> None:
-        """Note that the motion is over and its roll-out is counted."""
+        """Note that the motion is over and its roll-out is measured."""
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:
@@ -134,7 +137,7 @@ class Reckoning:
         self.forget_speeds()
 
     def turned(self, degrees: float, when: Moment) -> bool:
-        """Take a relative angle in degrees; return whether it is believed and has changed."""
+        """Process a reported heading in degrees; return whether it is plausible and has changed."""
         if when.from_s < self._began_s:
             return False
         known = self.heading.is_known
@@ -145,17 +148,18 @@ class Reckoning:
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add the error of a change of the wheels' speed ratio whose time is uncertain.
+        """Add the error due to the uncertain time of a change of the wheels' speed ratio.
 
-        ``part``: the change; ``late_s``: the interval in s in which it takes effect.
+        ``part``: the change of the ratio; ``late_s``: the interval in s in which it takes effect.
         """
         turn_rad = part * abs(self.speeds[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
 
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
-        """Return the displacement since the last count of the right wheel.
+        """Process a count of the right wheel; return the displacement since the last count.
 
-        It is None for a count that is not believed, or that may be of an earlier motion.
+        Returns None if the count is implausible or may be of an earlier motion, and
+        NOTHING_MEASURED if the displacement is unknown, as at the first count.
         """
         if when.from_s < self._began_s:
             return None
@@ -185,12 +189,15 @@ class Reckoning:
 
     @property
     def maybe(self) -> tuple[float, float]:
-        """What a motion that may not have begun would have done, in m and rad."""
+        """Distance of the right wheel in m and turn in rad by a motion that may not have begun.
+
+        Both are zero if it is certain whether the motion has begun.
+        """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Return the turn in rad that moves the wheel by ``wheel_m``; zero unless on the spot."""
+        """Return the turn on the spot, in rad, that moves the wheel by ``wheel_m``; else zero."""
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property
@@ -232,7 +239,7 @@ class Reckoning:
         return wrong_rad
 
     def spin_told(self, degrees: float) -> None:
-        """Take the turn on the spot that the server reports, in degrees of the board's sign."""
+        """Correct the heading by a reported turn on the spot, in degrees with the board's sign."""
         self.told_rad = math.radians(degrees) * self._settings.heading_sign
         self._correct_yaw(self.told_rad - self.spun_rad)
 
@@ -242,9 +249,9 @@ class Reckoning:
         self._yaw_rad += wrong_rad
 
     def _finish_turn(self) -> None:
-        """End a turn on the spot that is counted.
+        """End a turn on the spot after its last count.
 
-        The reported angle is dropped if it may be another number.
+        A reported angle that differs too much from the wheel's turn is discarded.
         """
         told_rad = self.told_rad
         wrong_rad = 0.0 if told_rad is None else self.spun_rad - told_rad
@@ -255,7 +262,7 @@ class Reckoning:
         self.told_rad = None
 
     def finish_straight(self) -> None:
-        """End a straight controlled move, in which the server held the heading as far as it can."""
+        """End a straight controlled move: add the error with which the server holds the heading."""
         self.doubt.end_straight()
 
     def _move(self, way_m: float, turn_rad: float, seconds: float, wheel_m: float) -> None:
@@ -296,7 +303,7 @@ class Reckoning:
 
     @property
     def speed_changes(self) -> tuple[float, float]:
-        """Speeds between the last two counts minus the mean speeds, in m/s and rad/s."""
+        """Speeds between the last two counts minus ``speeds``, in m/s and rad/s."""
         if len(self._track) < 2:
             return 0.0, 0.0
         (then_s, then_m, then_rad), (at_s, way_m, yaw_rad) = self._track[-2], self._track[-1]
@@ -309,5 +316,5 @@ class Reckoning:
         return max(WINDOW_S, SPREADS * self.spread_s)
 
     def forget_speeds(self) -> None:
-        """Forget the counts for the speeds, as the next ones belong to another motion."""
+        """Forget the counts that give the speeds, as the next counts belong to another motion."""
         self._track.clear()

@@ -15,22 +15,23 @@ from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
-"""Turn acceleration and rate up to which an uncertain heading is believed."""
+"""Largest turn acceleration (rad/s²) and rate (rad/s) with which a heading is plausible."""
 OLD_RAD: Final = 0.01
-"""A first heading of RM that is this near to the last one before it is regarded as old, in rad."""
+"""Difference to the last heading before RM below which a heading is from before RM, in rad."""
 AHEAD_S: Final = 0.3
 """Longest prediction of the heading to the time of a count, in s."""
 ODD_TIMES: Final = 3
-"""Number of unlikely headings in a row after which they are believed."""
+"""Number of implausible headings in a row of which the last is accepted."""
 SPREADS: Final = 4
-"""Multiple of a reply's uncertainty over which the turn rate is averaged."""
+"""Averaging time of the turn rate, as a multiple of a reply's time uncertainty."""
 
 
 class RelativeHeading:
     """The relative heading within a motion.
 
-    ``told_s``: time of the last reply; ``from_s``: its earliest possible time, unless it answers
-    another question; ``changed_s``: time of the last change; ``rate_radps``: turn rate in rad/s.
+    ``told_s``: time of the last accepted heading; ``from_s``: earliest possible time of the last
+    heading that certainly answers RMRA; ``changed_s``: time of the last change of heading;
+    ``rate_radps``: turn rate in rad/s.
     """
 
     def __init__(self) -> None:
@@ -48,11 +49,11 @@ class RelativeHeading:
         return self._angle_rad is not None
 
     def forget(self) -> None:
-        """Forget the heading, as the next one may be relative to another zero."""
+        """Forget the heading, as the next reported heading may have another zero."""
         self._angle_rad = None
 
     def begin(self, now: float, *, anew: bool) -> None:
-        """Note that a motion has begun. ``anew``: its heading begins at zero."""
+        """Note that a motion was started; ``anew``: whether it resets the heading to zero."""
         if anew:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
         self._turned_rad = 0.0
@@ -60,9 +61,9 @@ class RelativeHeading:
         self.changed_s = now
 
     def tell(self, angle_rad: float, when: Moment, stood_s: float) -> bool:
-        """Take a heading; return whether it is believed and has changed.
+        """Process a reported heading; return whether it is plausible and has changed.
 
-        ``stood_s``: time since which the robot is at rest, infinite while it is driven.
+        ``stood_s``: time at which the robot was stopped, infinite while it is driven.
         """
         before_rad, before_s, at_s = self._angle_rad, self.told_s, when.at_s
         if before_rad is None:

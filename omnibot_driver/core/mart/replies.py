@@ -2,7 +2,7 @@
 
 """The parser of the MART controller's datagrams; no input makes it raise.
 
-This module knows the forms of replies; it does not know what was asked.
+This module knows the forms of replies; it does not know the requests.
 """
 
 import re
@@ -25,26 +25,26 @@ _FORMS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Ok:
-    """A reply that begins with ``ok``; ``text`` is what follows it."""
+    """A reply that begins with ``ok``; ``text`` is the text after ``ok``."""
 
     form: Form
     text: str = ""
 
     @property
     def number(self) -> float:
-        """The value of an INTEGER or a DECIMAL."""
+        """The value of a reply of form INTEGER or DECIMAL."""
         return float(self.text)
 
     @property
     def file(self) -> tuple[str, int]:
-        """The name of a FILE and its size in bytes."""
+        """The file name and its size in bytes in a reply of form FILE."""
         name, _, size = self.text.rpartition(" ")
         return name, int(size)
 
 
 @dataclass(frozen=True, slots=True)
 class Fail:
-    """``fail`` and the reason that follows it, which may be empty."""
+    """A reply that begins with ``fail``; ``reason`` is the text after ``fail``, maybe empty."""
 
     reason: str
 
@@ -60,7 +60,7 @@ Reply = Ok | Fail | Other
 
 
 class MartDecoder:
-    """The decoder of replies. Each datagram is complete, so nothing is held.
+    """The decoder of replies. Each datagram is complete, so no data is kept between calls.
 
     ``foreign``: number of datagrams that are not replies.
     """
@@ -69,7 +69,7 @@ class MartDecoder:
         self.foreign = 0
 
     def feed(self, data: bytes, now: float) -> list[Reply]:
-        """Parse one datagram; return an empty list for an empty one."""
+        """Return the reply in one datagram as a list; empty for an empty datagram."""
         if not data:
             return []
         reply = parse(data)
@@ -77,12 +77,12 @@ class MartDecoder:
         return [reply]
 
     def flush(self, now: float) -> list[Reply]:
-        """Return nothing, as no data is held."""
+        """Return an empty list, as no data is kept between calls."""
         return []
 
 
 def parse(data: bytes) -> Reply:
-    """Parse one datagram."""
+    """Return the reply in one datagram; ``Other`` if it is not a reply."""
     if len(data) > LONGEST_REPLY or not data.isascii():
         return Other(data)
     head, _, rest = data.rstrip(b" \0\r\n").decode("ascii").partition(" ")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a MART controller does not report: sizes, scales and the network. Values only."""
+"""Settings that a MART controller does not report: sizes, scales, network. Values only."""
 
 from dataclasses import dataclass
 from typing import Literal

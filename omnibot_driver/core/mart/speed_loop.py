@@ -4,7 +4,7 @@
 
 The controller takes changes of its units and applies them without a regulator, so the effect of a
 unit depends on voltage, motor and floor. Each side has a gain that is learned from windows of
-steady driving. The heading is held by the integral of the turn's error. This module knows units,
+steady driving. The heading is held by the integral of the turn rate error. This module knows units,
 m/s and rad; it knows no commands. Time is an argument.
 """
 
@@ -17,16 +17,19 @@ from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_UNITS: Final = 127
 MOST_CHANGE: Final = 15
-"""Largest change in units in one exchange, as a command that arrives twice acts twice."""
+"""Largest change in units by one command, as a duplicated command acts twice."""
 MOST_BACKWARD: Final = 5
-"""Largest change in units of B on a slow network, where a duplicate may remain unnoticed."""
+"""Largest change in units while reversing on a slow network, where duplicates are unnoticed."""
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s: pause in learning after a large change, and shortest window of learning."""
 LARGE_UNITS: Final = 3
 LEARNED: Final = 0.7
-"""Part of a window's result that is taken over at once."""
+"""Part of the difference to a window's gain by which the learned gain is corrected."""
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""Factors in which slow exchanges make the window longer, and the part taken over smaller."""
+"""Effect of the exchange duration: it lengthens the window and reduces LEARNED.
+
+The window grows by LEARN_TRIPS durations; LEARNED is divided by 1 + LESS_PER_S * duration in s.
+"""
 LOWEST_GAIN, HIGHEST_GAIN = 0.4, 2.5
 SLOWEST_MPS: Final = 0.03
 """Slowest speed of a wheel at which its gain can be learned, in m/s."""
@@ -34,14 +37,14 @@ SLOWEST_TURN_RADPS: Final = 0.05
 """Slowest turn on the spot from which anything is learned, in rad/s."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""Time in s that a change of the turn rate takes; the lag within it is not corrected."""
+"""Time in s after a change of the turn rate for which the heading error is not summed."""
 NEW_RADPS: Final = 0.03
 UNEQUAL: Final = 0.04
-"""Standard deviation of the ratio of two motors, where a turn is known from the command alone."""
+"""Standard deviation of the ratio of the two motors' speeds at equal units."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
-"""Largest learned difference of the two motors that is believed."""
+"""Largest relative difference of the two motors' gains that is used for predictions."""
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Variances per squared change of the units: if it may come twice, and if it is not answered.
+"""Variances per squared change of units: if it may arrive twice, and if it is not answered.
 
 A change may come twice where an exchange takes longer than SLOW_TRIP_S (s). The variances are
 larger than is probable, as a wrong guess stays for the complete motion.
@@ -53,7 +56,7 @@ LONGEST_STEP_S: Final = 0.2
 class _Side:
     """One motor.
 
-    ``units``: as commanded; ``gain``: measured speed divided by the nominal one;
+    ``units``: commanded units; ``gain``: measured speed divided by the nominal one;
     ``window_units_s``, ``window_m``: units and distance summed over the present window.
     """
 
@@ -63,14 +66,14 @@ class _Side:
     window_m: float = 0.0
 
     def learn(self, per_unit_mps: float, part: float) -> None:
-        """Correct the gain by this part of the difference that the window shows."""
+        """Correct the gain by this part of its difference from the gain measured in the window."""
         nominal_m = self.window_units_s * per_unit_mps
         if nominal_m > 0.0 and self.window_m > 0.0:
             seen = min(HIGHEST_GAIN, max(LOWEST_GAIN, self.window_m / nominal_m))
             self.gain += part * (seen - self.gain)
 
     def wanted_units(self, speed_mps: float, per_unit_mps: float) -> int:
-        """Return the units for this speed, by the gain."""
+        """Return the units that this speed needs with the learned gain."""
         return round(min(MOST_UNITS, max(0.0, speed_mps / (per_unit_mps * self.gain))))
 
 
@@ -104,14 +107,14 @@ class SpeedLoop:
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which both sides begin, for a speed along the motion.
 
-        They suit the slower side.
+        The units suit the slower side.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower = min(right_mps, left_mps, key=abs)
         return max(4, min(60, self._right.wanted_units(max(slower, 0.0), self._per_unit_mps)))
 
     def spin_units(self, rate_radps: float) -> int:
-        """Return the units for a turn on the spot."""
+        """Return the motor units for a turn on the spot at this rate."""
         rim_mps = abs(rate_radps) * self.settings.track_m / 2
         return max(2, min(MOST_UNITS, round(self._line.units(rim_mps / self._per_unit_mps))))
 
@@ -123,7 +126,7 @@ class SpeedLoop:
 
     @property
     def left_over_right(self) -> float:
-        """Ratio of the wheels' speeds, by the units and the balance of both motors."""
+        """Ratio of left to right wheel speed, from the units and ``balance``."""
         right = self._right.units
         return self._left.units * self.balance / right if right else 1.0
 
@@ -134,17 +137,17 @@ class SpeedLoop:
 
     @property
     def balance(self) -> float:
-        """Ratio of the left motor's gain to the right one's, within believable limits.
+        """Ratio of the left motor's gain to the right motor's gain, limited to 1 ± MOST_UNEQUAL.
 
-        What was learned while a change of the units was lost or came twice includes that change.
+        A change of units that was lost or duplicated while learning falsifies the gains.
         """
         ratio = self._left.gain / self._right.gain
         return min(1.0 + MOST_UNEQUAL, max(1.0 - MOST_UNEQUAL, ratio))
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
-        """Return the speeds of right and left in m/s.
+        """Return the speeds of the right and left wheel, in m/s.
 
-        Neither is negative: the inner wheel stands still at the least.
+        Neither is negative: in a tight turn the inner wheel stands still.
         """
         half = rate_radps * self.settings.track_m / 2
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
@@ -161,7 +164,7 @@ class SpeedLoop:
         """Learn from the measured motion, and hold the heading.
 
         ``turned_rad``: turn since the last call; ``right_only``: only the right wheel was measured,
-        so the left motor's gain is taken to change as the right one's.
+        so the left motor's gain is changed by the same factor as the right motor's.
         """
         seconds = min(max(0.0, now - self._measured_s), LONGEST_STEP_S)
         self._measured_s = now
@@ -197,7 +200,7 @@ class SpeedLoop:
             self._line.learn(units, speed_mps / self._per_unit_mps, 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
-        """Return the changes of right and left in units, positive along the motion, or None.
+        """Return the changes of right and left in units, positive along the motion; None if zero.
 
         ``speed_mps`` is along the motion and not negative; ``rate_radps`` is positive to the left.
         """
@@ -219,7 +222,7 @@ class SpeedLoop:
     def changed(self, right: int, left: int, now: float) -> None:
         """Note that a change was sent.
 
-        It is regarded as obeyed until a measurement shows otherwise.
+        The motors are assumed to obey the change.
         """
         self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
         self._unsure += (COPIED if self._is_slow else 0.0) * self.part**2
@@ -229,7 +232,7 @@ class SpeedLoop:
             self._clear(now + SETTLE_S)
 
     def missed(self) -> None:
-        """Add uncertainty, as the last change was not answered: it was obeyed, or not."""
+        """Add uncertainty, as the last change was not answered and may not have arrived."""
         self._unsure += MISSED * self.part**2
 
     @property
@@ -251,5 +254,5 @@ class SpeedLoop:
 
 
 def turn_is_on_the_spot(speed_mps: float, rate_radps: float, track_m: float) -> bool:
-    """Return whether the motion is nearer to a turn on the spot than to one about a wheel."""
+    """Return whether a turn on the spot is nearer to the motion than a turn about one wheel."""
     return abs(speed_mps) < 0.5 * abs(rate_radps) * track_m / 2 or math.isclose(speed_mps, 0.0)

@@ -2,8 +2,8 @@
 
 """The start and adjustment of motions: a fresh proof of the IMU, then the start command.
 
-This module knows what is wanted and the commands that start; it does not know when a motion must
-end. Time is an argument.
+This module knows the wanted motion and the start commands; it does not know when a motion must end.
+Time is an argument.
 """
 
 from typing import Final
@@ -27,16 +27,16 @@ from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""Time in s after which an unchanged heading is made to change, and the units for it.
+"""Time in s after which a constant heading is made to change, and the motor units used for that.
 
-The robot may just be driving straight, or the IMU may be dead.
+The change shows whether the robot drives straight or the IMU is dead.
 """
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Duration of the slowest controlled moves, in s per inch and degree, with a margin."""
+"""Longest duration of controlled moves: s per inch (straight), s per degree (turn)."""
 SLOW_UNITS: Final = 20
-"""Motor units of B SLOW, R SLOW and L SLOW."""
+"""Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 
 
 class Starts(Moves):
@@ -50,7 +50,7 @@ class Starts(Moves):
         return NO_PACKETS
 
     def _adjust(self, now: float) -> Packets:
-        """Change the motors' units once, if the measured speed requires it."""
+        """Return the command that corrects the motors' units by the measured speed, if needed."""
         if self.state is State.DRIVING and not self.odometry.heading.is_known:
             self._polls.press(words.RMRA)
             return NO_PACKETS
@@ -124,7 +124,10 @@ class Starts(Moves):
         return word.request("CUSTOM")
 
     def _prepare_spin(self, start: Request, now: float) -> Packets:
-        """Set the speed of R and L by SSP, which must come before the check of the IMU."""
+        """Return the command that sets the speed of R and L (SSP), if that speed is not set yet.
+
+        SSP must be sent before the check of the IMU.
+        """
         if start.word not in (words.R, words.L) or self._spin_is_fixed:
             return NO_PACKETS
         _, twist = self._wish(now)
@@ -146,7 +149,7 @@ class Starts(Moves):
         )
 
     def _check(self, now: float) -> Packets:
-        """Check the IMU, as soon as the reply cannot be mistaken for a late one."""
+        """Return the check of the IMU, once no late reply can be mistaken for the check's reply."""
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
             return NO_PACKETS
@@ -202,7 +205,7 @@ class Starts(Moves):
         return self.conversation.ask(start, now, takes_s=_longest_s(start))
 
     def _learn(self, turned_rad: float, now: float) -> None:
-        """Learn the effect of the motors' units from the last measurement."""
+        """Learn from the last measurement how fast the motors turn per unit."""
         speed, rate = self.odometry.speeds
         blind = self.odometry.left_over_right is not None
         self.loop.trip_s = self.conversation.trip_s
@@ -210,7 +213,7 @@ class Starts(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Predict the turn from the motors' units and gains where RMRA does not report it."""
+        """Pass the ratio of wheel speeds to the odometry if RMRA does not report the turn."""
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
             self.odometry.left_over_right = self.loop.left_over_right
@@ -252,10 +255,10 @@ class Starts(Moves):
         self._halt(now, f"{word.text} failed ({reply.reason or 'no reason given'}): {why}")
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Return whether the failure text of RM may belong to the last B, as on some servers.
+        """Return whether the failure text of RM may not be about this RM.
 
-        So an obstacle is believed only if the front sonar sees one, or if RM has failed by one
-        twice in a row.
+        On some servers the text belongs to the last B. So a reported obstacle is believed only if
+        the front sonar sees an obstacle too, or if RM has reported an obstacle twice in a row.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False
@@ -283,7 +286,7 @@ class Starts(Moves):
 
 
 def _longest_s(start: Request) -> float:
-    """Return how long the server may take to answer a start, in s."""
+    """Return how long the server may take to answer the start command, in s."""
     if start.word.kind is not Kind.MOVE:
         return start.word.takes_s
     asked = float(start.data.split()[-1])

@@ -98,7 +98,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
 }
 """The commands that are allowed in each state.
 
-Those in NEEDS_IMU also require that the IMU was proved just before (by RESET or CHECK).
+The commands in NEEDS_IMU also require that RESET or CHECK has just shown a living IMU.
 """
 
 HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
@@ -110,7 +110,7 @@ HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SRM, SM),
 }
-"""The commands that stop each motion. Any other command has no effect, or hangs the server."""
+"""The commands that stop each motion. Other stop commands have no effect or hang the server."""
 
 LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.NONE: (),
@@ -133,7 +133,7 @@ STARTS: Final[Mapping[Word, Motion]] = {
     MCR: Motion.TURN,
     MCL: Motion.TURN,
 }
-"""The motion that each command begins."""
+"""The motion that each start command begins."""
 
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a living IMU.
@@ -145,8 +145,8 @@ notice the dead IMU, but some servers turn the robot for half a second first.
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
 """Commands that do harm if a duplicate of them arrives late, when another motion has begun.
 
-So after one of these, no motion begins and no check for one is made until a duplicate can no longer
-come.
+So after one of these commands, the driver starts no other motion, and checks no IMU for a start,
+until a duplicate can no longer come.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {
@@ -157,7 +157,7 @@ WHILE: Final[Mapping[Motion, State]] = {
     Motion.STRAIGHT: State.MOVING,
     Motion.TURN: State.MOVING,
 }
-"""The state of each motion once it has begun."""
+"""The state of the robot once the server has begun each motion."""
 
 
 def may_say(state: State, word: Word, motion: Motion) -> bool:

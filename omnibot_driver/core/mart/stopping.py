@@ -2,12 +2,12 @@
 
 """The stop of one motion: the commands to send until the server has acknowledged it.
 
-The stop never waits: the right command is sent at once, even if another request is pending, and
-again until it is answered. A start may still be on its way, and be overtaken. So a reply is
-accepted only if it must answer a stop that was sent when no duplicate of the start could come any
-more, and a bare ``ok`` only if the start is not still owed one; repeating the stop brings a clearer
-reply. The stop port comes last and alone: right after SM or SRM it would race with them, and hang a
-port. This module knows commands, replies and times; it does not know why the robot is stopped.
+The stop command is sent at once, even if another request is pending, and repeated until it is
+answered. The stop may overtake a start that is still on its way. So a reply is accepted only if it
+must answer a stop that was sent when no duplicate of the start could come any more. A bare ``ok``
+is accepted only if it cannot be the reply to the start; else the stop is repeated. The stop port is
+the last resort, and is not used right after SM or SRM, as the race could hang a port. This module
+knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
@@ -27,17 +27,17 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""The forms of a reply when the server has stopped the motion."""
+"""The forms of the reply ``ok`` of a server that has stopped each motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s after the first stop of a controlled move within which the move ends."""
+"""Time in s after the first stop of a controlled move by which the move should have ended."""
 
 
 class Stopping:
     """The stop of one motion.
 
     ``began_s``: time of the first stop; ``started_s``: time at which the start was sent; ``owed``:
-    number of expected replies to other requests that look alike; ``move``: the controlled move
-    whose own reply ends it.
+    number of other requests whose reply is still to come and looks like a reply to the stop;
+    ``move``: the controlled move to stop, or None; the reply to the move itself ends the stop.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Stopping:
         self.motion, self.move = motion, move
         self.began_s = now
         self.result: Ok | Fail | None = None
-        """The reply of the motion itself, or None."""
+        """The reply that shows how the motion ended, or None."""
         self.began: bool | None = None
         """Whether the motion had begun; None if the replies do not show it."""
         self.wake_at = now
@@ -90,7 +90,7 @@ class Stopping:
         return HALTS[self.motion]
 
     def asks_name(self, now: float) -> bool:
-        """Return whether to ask for the server's name too, since the reply to a move may be lost.
+        """Return whether to ask for the server's name too, as the move's reply may be lost.
 
         A server that gives its name has finished the move.
         """
@@ -98,11 +98,11 @@ class Stopping:
 
     @property
     def failed(self) -> bool:
-        """Whether neither port has brought an answer."""
+        """Whether the stops on both ports have remained unanswered."""
         return self.last_port >= STOP_PORT_TIMES
 
     def hear(self, reply: Reply, now: float) -> bool:
-        """Return whether this reply ends the motion."""
+        """Evaluate a reply; return whether it proves that the motion has ended."""
         if self.move is not None:
             return self._hear_move(reply, self.move, now)
         if self.last_port:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The reasons to stop a motion, and the stop itself. Whatever is uncertain is stopped.
+"""The reasons to stop a motion, and the stop itself. An uncertain motion is stopped too.
 
-This module knows what is wanted, what is measured, and the commands that stop; it does not know how
-a motion begins. Time is an argument.
+This module knows the wanted command, measurements and the stop commands; it does not know how a
+motion begins. Time is an argument.
 """
 
 import math
@@ -28,20 +28,20 @@ from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 BLIND_S, TRIPS = 0.8, 3
-"""Time in s, plus a number of exchanges, after which driving without measurements is stopped."""
+"""Longest drive without measurements: a time in s, plus a number of exchange durations."""
 FROZEN_S: Final = 0.5
-"""Time in s, plus two exchanges, after which a constant heading while driving shows a dead IMU."""
+"""Time in s, plus two exchange durations, after which a constant heading shows a dead IMU."""
 NO_START_S: Final = 1.5
-"""Time in s within which a driven wheel turns."""
+"""Time in s after the start within which the wheel must turn."""
 SPIN_RATIO: Final = 0.35
 """Part by which the commanded turn rate must change to restart a turn on the spot.
 
-The rate of such a turn cannot be changed.
+The turn must be restarted because the server cannot change its rate.
 """
 SPIN_RAD, SPIN_PART = 0.15, 0.4
-"""Largest error of the turn that the reply to a stop reports: in rad, plus a part of the turn.
+"""Largest difference of a turn reported by a stop from the expected turn: rad, plus a part.
 
-The counted and commanded turn is the reference.
+The expected turn comes from the encoder count and the commanded rate.
 """
 LOST_REPEAT_S: Final = 1.0
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
@@ -69,7 +69,7 @@ class Stops(Ground, ABC):
         return order if isinstance(order, Drive | GoTo) else None
 
     def _wish(self, now: float) -> tuple[Motion, BodyTwist]:
-        """Return the wanted motion and its twist."""
+        """Return the motion that the present command requires, and its twist."""
         order = self._order(now)
         if not isinstance(order, Drive):
             return Motion.NONE, STANDING
@@ -86,7 +86,7 @@ class Stops(Ground, ABC):
         return motion, BodyTwist(speed, 0.0, rate)
 
     def _agrees(self, now: float) -> bool:
-        """Return whether the present motion is the wanted one."""
+        """Return whether the present motion fits the present command, or job."""
         motion, twist = self._wish(now)
         if self.motion in (Motion.STRAIGHT, Motion.TURN):
             return self._move is not None or self.jobs.moving or self._rescue
@@ -107,7 +107,7 @@ class Stops(Ground, ABC):
     def _why_stop(self, now: float) -> str:
         """Return why the present motion must not continue: a sentence, "wanted", or empty.
 
-        "wanted" means that another motion is wanted.
+        "wanted" means that another motion is wanted; an empty text, that the motion may continue.
         """
         if self.state not in (State.STARTING, State.MOVING, *ROLLING):
             return ""
@@ -139,12 +139,12 @@ class Stops(Ground, ABC):
 
     @property
     def _frozen_s(self) -> float:
-        """Time in s for which the headings in this motion have been constant."""
+        """Time in s for which the reported heading in this motion has been constant."""
         odometry = self.odometry
         return odometry.heading.told_s - max(odometry.heading.changed_s, self._begun_s)
 
     def _halt(self, now: float, why: str = "") -> None:
-        """Begin to stop the motion that is, or may be, in progress; ``why`` is reported."""
+        """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user."""
         if why:
             self._notice(f"{why}; robot stopped", halt=True)
             self._custom_units = None  # a restarted server has forgotten it
@@ -183,7 +183,7 @@ class Stops(Ground, ABC):
         return packets
 
     def _stopped(self, now: float) -> None:
-        """Note that the server has answered the stop."""
+        """End the stop, as the server has answered it, and evaluate its result."""
         stopping, self._stopping = self._stopping, None
         self._moved_by = None  # it was cut short
         self.conversation.settle(now)
@@ -208,9 +208,9 @@ class Stops(Ground, ABC):
         self._rest(now)
 
     def _may_be_count(self, reply: Reply, now: float) -> bool:
-        """Return whether a number that comes while a turn on the spot is stopped is not its answer.
+        """Return whether a number cannot be the angle that the stop of a turn on the spot reports.
 
-        It is a late encoder count, if the robot cannot have turned by this angle.
+        The number is then a late reply to a query, such as an encoder count.
         """
         stopping = self._stopping
         assert stopping is not None
@@ -241,9 +241,9 @@ class Stops(Ground, ABC):
             self.loop.spun(self._spin_units, steady_radps)
 
     def _lose(self, now: float, why: str = "") -> None:
-        """Regard the server as lost: it does not answer or begin motions.
+        """Regard the server as lost, and report that once.
 
-        It may be moving the robot.
+        A lost server does not answer stops, and may be moving the robot. Motion is refused.
         """
         self._stopping = None
         self.state = State.LOST
@@ -271,14 +271,14 @@ class Stops(Ground, ABC):
         """Begin to find out what moves, after the stop port was used for an unknown motion."""
 
     def _obstacle(self, reply: Fail, motion: Motion) -> str:
-        """Return the meaning of a failure within a motion, and block an obstacle's direction."""
+        """Return why a motion failed, as text; refuse its direction if an obstacle is the cause."""
         if reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
             return f"the controller reports an obstacle ({reply.reason})"
         return f"the controller has ended the motion ({reply.reason or 'no reason given'})"
 
     def _failed(self, motion: Motion, reply: Fail, now: float) -> None:
-        """Report how a motion ended, by the failure that its stop returned."""
+        """Report the failure with which the server has ended a motion."""
         if reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
         elif reply.reason == words.IMU_LOST:

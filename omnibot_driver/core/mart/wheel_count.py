@@ -1,11 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The distance rolled by the right wheel, from a count that begins anew with each motion.
+"""The distance rolled by the right wheel, from an encoder count that restarts with each motion.
 
-A reply may answer an earlier question, or be another number than the count. So an implausible count
-is left out. If it comes again and again it is accepted; an impossibly large step then adds no
-distance. This module knows counts and times; it knows no metres per count but the argument. Time is
-an argument.
+A reply may answer an earlier query, or be another number than the count. So an implausible count is
+discarded. An implausible count that comes several times is accepted; an impossibly large step then
+adds no distance. This module knows counts and times; time and metres per count are arguments.
 """
 
 import math
@@ -15,9 +14,9 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Largest error of a doubtful count against the expected one: in m, plus m/s times the time."""
+"""Largest believed error of a count that may answer another query, in m, plus m/s times time."""
 MOST_M, MOST_MPS = 0.3, 2.0
-"""Largest distance of a wheel between two counts: in m, plus m/s times the time between.
+"""Largest distance of a wheel between two counts, in m, plus m/s times the time between them.
 
 A larger difference shows that one of the counts is false.
 """
@@ -25,15 +24,15 @@ STRAY_COUNTS: Final = 3
 """Largest change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""Number of counts equal to the one before the start that show that the start was lost."""
+"""Number of counts equal to the last one before a start that show that the start was lost."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
     """The distance between two counts.
 
-    ``wheel_m``: distance in m; ``seconds``: time between the counts. ``lost``: the robot has also
-    moved by an unknown amount between; ``unsure``: the distance may be zero instead.
+    ``wheel_m``: distance in m; ``seconds``: time between the counts. ``lost``: whether the
+    robot has also moved by an unknown amount; ``unsure``: whether the distance may be zero instead.
     """
 
     wheel_m: float
@@ -45,10 +44,10 @@ class Step:
 class WheelCount:
     """The count of the right wheel's encoder.
 
-    ``last``: last count, or None before the first; ``told_s``: its time; ``from_s``: its earliest
-    possible time; ``certain``: whether it cannot be the answer to another question. ``maybe``: the
-    count of a motion that was not acknowledged and whose count equals the one before its start, so
-    it has begun or not; else 0.
+    ``last``: last accepted count, or None before the first; ``told_s``: time of that count;
+    ``from_s``: earliest possible time of that count; ``certain``: whether the last reply cannot be
+    the answer to another query. ``maybe``: the present count if it equals the last count before an
+    unacknowledged start, so that it does not show whether the motion has begun; else 0.
     """
 
     def __init__(self) -> None:
@@ -57,14 +56,14 @@ class WheelCount:
         self.certain = False
         self.maybe = 0
         self.may_begin_anew = False
-        """Whether the next count may begin at zero, as after a motion or the check of the IMU."""
+        """Whether the server may have reset the count to zero since the last reply."""
         self._raw: int | None = None
         self._before: int | None = None
         self._begins = self._confirmed = self._unseen = False
         self._same = self._odd = 0
 
     def begin(self) -> None:
-        """Note that a motion was started; the count begins at zero if the start has arrived."""
+        """Note that a start was sent; the count begins at zero if the start has arrived."""
         self._before, self.last = self.last, 0
         self.may_begin_anew = self._begins = True
         self.certain = self._confirmed = False
@@ -75,7 +74,10 @@ class WheelCount:
         self._confirmed = True
 
     def refused(self) -> None:
-        """Note that the motion did not begin, by the reply to its stop: the count continues."""
+        """Note that the motion did not begin, so the count continues from its last value.
+
+        Ignored if the server has acknowledged the motion.
+        """
         if not self._confirmed:
             self.last, self._begins = self._before, False
 
@@ -84,7 +86,7 @@ class WheelCount:
         self.may_begin_anew = self._unseen = True
 
     def rest(self) -> None:
-        """Note that the motion is over."""
+        """Note that the motion is over: the next step is measured from the last count received."""
         self.last, self._begins = self._raw, False
         self.maybe = 0
 
@@ -98,10 +100,10 @@ class WheelCount:
         *,
         rests: bool,
     ) -> Step | None:
-        """Take a count; return the step since the last one, or None if it is not believed.
+        """Process a count; return the step since the last count, or None for an implausible count.
 
-        ``expected_mps``: expected speed of the wheel; ``stood_s``: time since which the robot is at
-        rest, infinite while it is driven; ``rests``: whether no motion was started since.
+        ``expected_mps``: expected speed of the wheel; ``stood_s``: time at which the robot was
+        stopped, infinite while it is driven; ``rests``: whether the last motion is over.
         """
         before, before_s = self.last, self.told_s
         self.certain = count == before or not when.doubtful
@@ -137,7 +139,7 @@ class WheelCount:
         return Step(wheel_m, seconds, lost, unsure)
 
     def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
-        """Discard an implausible count, but accept it if it has come too often to be chance."""
+        """Discard an implausible count and return None; accept the third, returning ``step``."""
         self._odd += 1
         if self._odd < ODD_TIMES:
             return None
@@ -145,7 +147,7 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether the count has decreased in this motion: an older or another number."""
+        """Return whether the count goes back within this motion, as only a wrong reply does."""
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:
             return False

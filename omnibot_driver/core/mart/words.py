@@ -14,11 +14,11 @@ from typing import Final
 COMMAND, STOP = 0, 1
 """The channels: the command port P, and the stop port P+1, which never answers."""
 LONGEST_REQUEST: Final = 49
-"""Longest request in bytes. An empty datagram shuts the server down."""
+"""Longest request in bytes. The shortest is 1: an empty datagram shuts the server down."""
 
 
 class Form(Enum):
-    """What follows ``ok`` in a reply."""
+    """The kind of text that follows ``ok`` in a successful reply, each with an example."""
 
     NOTHING = "ok"
     NAME = "ok BBB"
@@ -59,7 +59,10 @@ class Word:
     fails: frozenset[str] = field(default_factory=frozenset)
 
     def request(self, *arguments: object) -> "Request":
-        """Return the request with these arguments. Raises ValueError if it is too long."""
+        """Return a request of this command with these arguments.
+
+        Raises ValueError if the request is too long.
+        """
         data = " ".join([self.text, *map(str, arguments)]).encode("ascii")
         if not 0 < len(data) <= LONGEST_REQUEST:
             raise ValueError(f"a request has 1 to {LONGEST_REQUEST} bytes, not {len(data)}")
@@ -68,7 +71,7 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One datagram to be sent, and its command."""
+    """A datagram to send to the server, and the command that it contains."""
 
     word: Word
     data: bytes
@@ -123,12 +126,13 @@ NO_IMU: Final = "could not init"
 RESET = _word("RST IMU", Kind.CHECK, _OK, 0.3, {NO_IMU, CONFLICT, UNSUPPORTED}, least_s=0.09)
 """The check of the IMU without a motion.
 
-If it fails, the server closes the IMU, so the driver repeats the check before it believes it.
+If the check fails, the server closes the IMU. So the driver repeats a failed check before it
+regards the IMU as dead.
 """
 CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
-"""The check of the IMU for servers without RST, sent with 0 degrees.
+"""The check of the IMU for servers without RST IMU: a turn by 0 degrees.
 
-Some servers start the motors on it.
+Some servers start the motors on this command.
 """
 SSP = _word("SSP", Kind.SERVICE, _OK, 0.05, {"command missing parameter", UNSUPPORTED})
 

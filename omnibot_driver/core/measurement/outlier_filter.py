@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outlier filter: rejects readings that a robot cannot have made, without any missing byte.
+"""The outlier filter: rejects readings that a robot cannot have made, from complete frames too.
 
 Two things are impossible: a displacement faster than the robot can go, and a leap of a single
 reading, away from all before it and back again with the next. A leap that lasts, or is followed by
@@ -12,8 +12,8 @@ leap is impossible only if it has the size of a bit: a changed bit moves a word 
 half of it, a quarter, and so on, and by nothing in between.
 
 Of a board's own odometry, only readings that are not finite are rejected. A rejected displacement
-is treated like one that the line has lost. This module knows readings and the robot's limits; it
-knows no bytes and no clock.
+is treated like a displacement that was lost on the line. This module knows readings and the robot's
+limits; it does not know bytes or a clock.
 """
 
 from collections.abc import Iterator, Sequence
@@ -40,16 +40,16 @@ OUT_OF_PROPORTION: Final = 3.0
 CALMING: Final = 0.95
 """Factor by which each reading reduces the largest recent step: 20 of them leave a third."""
 STILL: Final = 0.08
-"""Part of a leap by which the sensor's other words may move during it.
+"""Part of a leap by which the sensor's other values may change during the leap.
 
-By the same part all words may differ when the leap is over.
+After the leap, all values may differ by the same part from those before the leap.
 """
 END_OF_SCALE: Final = 0.99996
 """Part of full scale that is just below the largest positive word."""
 MOST_HELD: Final = 10
-"""Number of poses held after a leaping displacement before the next one is given up."""
+"""Number of readings, a leaping displacement and poses after it, that are held at most."""
 BACK: Final = 0.25
-"""Part of a leap of the motion that may be left when the leap is over."""
+"""Part of a leap of the motion that may remain when the leap is over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +83,7 @@ class OutlierFilter:
 
     ``limits`` may be replaced at any time; ``tick_s``: time between two ImuReadings in s.
     ``corrected``: displacements are steps of an estimate that leaps when it is corrected; an
-    impossible step is then passed on as not measured.
+    impossible step is then passed on with ``measured`` False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -122,7 +122,7 @@ class OutlierFilter:
         return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
-        """Return the readings that waited, as no later one can contradict them."""
+        """Return the readings that waited, as a later reading cannot contradict them any more."""
         released = [*self._held_imu, *self._held_motion]
         self._held_imu, self._held_motion = [], []
         self._imu_leaps.forget()
@@ -193,9 +193,9 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; a pose gets the rejected displacements before it as losses.
+        """Return the reading; a pose gets the count of rejected displacements before it as losses.
 
-        A pose includes them.
+        The pose includes the motion of these displacements.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -203,7 +203,7 @@ class OutlierFilter:
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """Return this displacement with the losses of the rejected ones added."""
+        """Return this displacement with the rejected displacements before it counted as losses."""
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,
@@ -218,8 +218,8 @@ class OutlierFilter:
 class _Spikes:
     """Finds single leaps in a series of values, each in units of a step that is always allowed.
 
-    ``left``: part of a leap that may remain when it is over; ``knocked``: number of first values
-    that a knock may move for one reading; it never moves the others.
+    ``left``: part of a leap that may remain when the leap is over; ``knocked``: how many of the
+    values, from the first, a knock may move for one reading. A knock does not move the others.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -269,9 +269,9 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether a step has the size of a bit, as far as the variation of values shows it.
+        """Return whether a step has the size of a bit, within the recent variation of the values.
 
-        A value at the end of the scale was moved by a knock.
+        A value at the end of the scale was moved by a knock, not by the topmost bit.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -3,8 +3,8 @@
 """The measurement pipeline: readings are stamped, checked, integrated, corrected and counted.
 
 It combines the board's clock, the outlier filter, odometry and the IMU. It does not know commands
-or modes. IMU readings are measured with the read that brings them (``hear``), so that they need not
-wait for the measurements from other readings (``flush``).
+or modes. IMU readings are processed at once by ``hear``; other readings wait for ``flush``. So IMU
+readings do not wait for the measurements from other readings.
 """
 
 from collections.abc import Sequence
@@ -83,13 +83,13 @@ class MeasurementPipeline:
         return self._clock.skew_ppm
 
     def restart(self) -> None:
-        """Forget the clock of the stream so far, as the board begins another stream."""
+        """Forget the state of the clock, as the board begins a new stream of readings."""
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
         """Return the IMU estimates that are certain with these readings, which arrived at ``now``.
 
-        Other readings wait for ``flush``, and so do IMU readings behind them, to keep the order.
+        Other readings wait for ``flush``, as do IMU readings that came after them, to keep order.
         Most reads of a board with an IMU bring one IMU reading and nothing else: that is measured
         without the lists that more readings need.
         """

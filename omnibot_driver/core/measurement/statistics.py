@@ -21,7 +21,7 @@ from omnibot_driver.core.readings import (
 class StreamStatistics:
     """Counts and sums since the driver began.
 
-    They only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
+    All values only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
     """
 
     imu: int = 0
@@ -33,11 +33,11 @@ class StreamStatistics:
     gaps: int = 0
     """Number of stretches of lost displacements."""
     last_gap: int = 0
-    """Number of displacements lost in the last such stretch."""
+    """Number of displacements lost in the last stretch of lost displacements."""
     reads: int = 0
-    """Number of reads that ended with a sample."""
+    """Number of reads whose last reading was an IMU sample or a displacement."""
     delay_s: float = 0.0
-    """Sum over these reads of the age of the newest sample in s; the least possible age is 0."""
+    """Sum over ``reads`` of the age of the newest sample in s; the least possible age is 0."""
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0

@@ -3,8 +3,9 @@
 """The envelope: the velocities that a robot may have under its recent set-points.
 
 A robot follows its set-points late and smoothly, so its velocity is in the convex hull of the
-recent ones and of rest: it may always be slower. Around that hull is a margin for scales, wheels
-and noise. Pure geometry, in the board's own axes, without time.
+recent set-points and rest. Rest is included because a robot may always be slower than commanded.
+Around that hull is a margin for scales, wheels and noise. The module is pure geometry, in the
+board's own axes, and does not know time.
 """
 
 import math
@@ -15,28 +16,29 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 
 STRETCH: Final = 1.2
-"""Factor of a set-point that may be reached: scales are set by hand, controllers overshoot."""
+"""Allowed ratio of speed to set-point: scales are set by hand, and controllers overshoot."""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """Noise in m/s and rad/s that is always allowed.
 
-It covers encoder counts, rounding, and a slope to which a slow controller yields.
+This covers encoder counts, rounding, and a slope on which a slow controller lets the robot roll.
 """
 SIDEWAYS: Final = 0.1
 """Part of a speed, or of a yaw rate, that is allowed in any direction.
 
-The heading is uncertain, and wheels differ. Independent of the noise, so the squares are added.
+The heading is uncertain, and wheels differ. This error is independent of the noise, so the squares
+of both are added.
 """
 OVERSHOOT: Final = 0.15
 """Part of a change of set-point by which a robot may overshoot, in any direction.
 
-Only where the set-point that it leaves is not rest.
+This is allowed only if the robot leaves a set-point other than rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""Yaw rate per speed, and the reverse, that is allowed for wheels that differ by some per cent."""
+"""Yaw rate per speed, and speed per yaw rate, allowed for wheels that differ by some per cent."""
 CHANGING_RADPS_PER_MPS: Final = 0.4
-"""Yaw rate per change of speed that is allowed for wheels that do not speed up alike."""
+"""Yaw rate per change of speed that is allowed for wheels that accelerate differently."""
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 """Factor that makes a yaw rate comparable to a velocity."""
@@ -77,9 +79,9 @@ def outside(
 
 
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
-    """Return whether ``motion`` lies between two successive set-points, and so surely inside.
+    """Return whether ``motion`` lies between two successive set-points, and so in the envelope.
 
-    That is true for nearly all motion, and quick to compute.
+    This check is quick, and true for nearly all motion.
     """
     x, y, yaw = motion.vx_mps, motion.vy_mps, YAW_MPS_PER_RADPS * motion.yaw_rate_radps
     last = setpoints[0]
@@ -109,7 +111,7 @@ def dot(one: BodyTwist, other: BodyTwist) -> float:
 
 
 def _outside_hull(motion: BodyTwist, explained: Sequence[Velocity]) -> float:
-    """Return the distance in m/s from the hull of rest and the stretched set-points, or <= 0."""
+    """Return the distance in m/s from the hull of rest and stretched set-points; inside, <= 0."""
     furthest_mps = -math.inf
     for x, y in _DIRECTIONS:
         reached_mps = max([x * vx + y * vy for vx, vy, _ in explained])

@@ -2,8 +2,9 @@
 
 """The following error: how far a robot moves outside its envelope without interruption.
 
-One displacement decides nothing, as it may be damaged, and a jerk is over before it adds up. This
-module knows velocities in the board's own axes, and times; it does not know what an error means.
+A single displacement does not exceed a limit, as its data may be damaged. A short jerk ends before
+its displacements add up to the limit. This module knows velocities in the board's own axes, and
+times; it does not know which fault an error shows.
 """
 
 from typing import Final
@@ -14,13 +15,13 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s; a robot slower than all set-points within it is held by something."""
+"""Time in s: a robot slower than all set-points of this time is held by something."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest part of the limits above that one displacement adds, or a long one.
+"""Largest part of the limits above that one displacement, or one long displacement, adds.
 
-So it takes three displacements in a row, or two long ones, to exceed a limit.
+So a limit is exceeded after three displacements in a row, or two long ones, at the earliest.
 """
 
 
@@ -28,7 +29,7 @@ class FollowingError:
     """The sum of a robot's motion outside its envelope.
 
     ``slack_mps``, ``slack_radps``: speeds outside the envelope that are not an error; ``outside``:
-    whether the last displacement was outside the envelope by more than them.
+    whether the last displacement was outside the envelope by more than these speeds.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:

@@ -32,7 +32,7 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time in s at rest after which a robot has obeyed: later motion has another cause."""
+"""Time in s at rest after which a robot has obeyed a stop; later motion has another cause."""
 STOPS_S: Final = 5.0
 """Time in s for which one Stop is repeated automatically while the robot moves."""
 
@@ -64,7 +64,7 @@ STOPPED: Final = frozenset(
         Fault.BEYOND_LIMITS,
     }
 )
-"""Faults of a robot that is driven, which must then be stopped."""
+"""Faults of a driven robot after which the robot must be stopped."""
 ADVICE: Final[Mapping[Fault, str]] = {
     Fault.WRONG_WAY: "check the wiring of the wheels",
     Fault.WRONG_TURN: "check the wiring of the wheels",
@@ -103,7 +103,7 @@ class MotionMonitor:
     def set_point(self, setpoint: CommandedTwist, now: float) -> None:
         """Note that ``setpoint`` is commanded from ``now`` on.
 
-        None stands for a goal, to which the board chooses its own path.
+        None means that the robot goes to a goal, on a path that the board chooses.
         """
         if setpoint is self._history.current:
             return
@@ -114,7 +114,7 @@ class MotionMonitor:
             self._has_stood = False
 
     def release(self) -> None:
-        """Note that the e-stop is released; the robot has not moved since."""
+        """Note a release of the e-stop, which may be why the robot does not move afterwards."""
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
@@ -140,8 +140,8 @@ class MotionMonitor:
     ) -> Fault | None:
         """Return the fault that a displacement shows, or None.
 
-        ``motion``: its mean twist during the ``seconds`` before ``stamp_s``. If the heading is
-        unknown, only the magnitude of the linear velocity is checked.
+        ``motion``: mean twist of the displacement, during the ``seconds`` before ``stamp_s``. If
+        the heading is unknown, only the magnitude of the linear velocity is checked.
         """
         self._refused_before = self._refused
         begun_s, current = stamp_s - seconds, self._history.current
@@ -162,13 +162,13 @@ class MotionMonitor:
         return self._blocked(motion, seconds, heading_known=heading_known)
 
     def _blame(self, fault: Fault, now: float) -> Fault:
-        """Return ``fault`` and judge nothing for now: rolling out is not another fault."""
+        """Return ``fault``, and suspend the checks, as rolling out is not another fault."""
         self._error.reset()
         self._history.add(None, now)
         return fault
 
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
-        """Return the fault by whether any of these velocities has about the measured direction.
+        """Return the fault: too fast if a set-point has the measured direction, else wrong way.
 
         ``explained``: velocities by the set-points. Linear directions may differ by 60°.
         """
@@ -183,10 +183,10 @@ class MotionMonitor:
         return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
 
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
-        """Return UNCOMMANDED when Stop is to be sent again to a robot that moves without a command.
+        """Return UNCOMMANDED if a robot moves without a command and Stop is to be sent, else None.
 
-        These times become rarer for a robot that was at rest after its last command, as it may be
-        pushed.
+        If the robot was at rest after its last command, a person may be pushing the robot. Then
+        the pauses between the Stops become longer.
         """
         if not self._error.outside:
             self._stood_s += seconds
@@ -204,7 +204,7 @@ class MotionMonitor:
         return Fault.UNCOMMANDED
 
     def _blocked(self, motion: BodyTwist, seconds: float, *, heading_known: bool) -> Fault | None:
-        """Return the fault of a driven robot that does not move; one that does move has obeyed."""
+        """Return the fault of a driven robot that has not moved for ``BLOCKED_S``, else None."""
         current = self._history.current
         assert current is not None
         wanted, turning = speed_of(current), current.yaw_rate_radps

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The history of set-points, and the velocities that they still explain.
+"""The history of set-points, and the velocities of the robot that they explain.
 
 A robot follows a set-point late, and leaves it smoothly. So a set-point that was replaced explains
 its full velocity for ``HELD_S``, and then less and less. This module knows velocities in the
@@ -23,14 +23,17 @@ Velocity = tuple[float, float, float]
 HELD_S: Final = 0.3
 """Time in s for which a replaced set-point explains its full velocity.
 
-It covers the line, a lost repetition, and a controller's dead time.
+This covers the delay of the line, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant in s of the decay afterwards; robots of up to 0.35 s stay within it."""
+"""Time constant in s of the decay after ``HELD_S``.
+
+Robots with a time constant of up to 0.35 s stay within the envelope.
+"""
 FADED_S: Final = 1.1
-"""Time in s after which a replaced set-point explains nothing: 2 % are left."""
+"""Time in s after which a replaced set-point is ignored: 2 % of its velocity are left."""
 UNKNOWN_S: Final = 0.8
-"""Time in s after which motion with an unknown cause has ended."""
+"""Time in s after a first known set-point until motion from unknown commands has ended."""
 HISTORY_S: Final = 3.0
 """Length of the history in s; a computer that reads displacements later has stalled."""
 
@@ -63,7 +66,7 @@ class SetpointHistory:
             self._entries.popleft()
 
     def known(self, at_s: float) -> bool:
-        """Return whether set-points explain the robot's motion at this time."""
+        """Return whether all set-points that may affect the motion at ``at_s`` are known."""
         return at_s >= self._known_from_s
 
     def since(self, start_s: float) -> list[BodyTwist]:
@@ -82,7 +85,7 @@ class SetpointHistory:
     def explained(self, at_s: float) -> list[Velocity]:
         """Return the velocities that the robot may have at ``at_s``, by its set-points.
 
-        The first one is that of the current set-point.
+        The velocity of the current set-point comes first.
         """
         found: list[Velocity] = []
         age_s = 0.0

@@ -19,15 +19,15 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 MOST_M: Final = 0.6
 """Largest distance in m that is made up for: what the integrators hold at full effort."""
 LONG_S: Final = 0.06
-"""Length in s of a long displacement.
+"""Duration in s from which a displacement is regarded as long.
 
-One alone does not prove a hold: the robot may have turned round within it.
+A single long displacement does not prove that the robot is held, as the robot may have reversed.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """Time constants in s with which the wind-up is forgotten, in motion and at rest.
 
-A robot whose set-point is rest may still be held while it is at rest: then nothing unwinds.
+A robot whose set-point is rest may still be held, and then its wind-up does not decrease.
 """
 HELD_PART: Final = 0.7
 """Part of its set-points that a robot does not reach while something holds it."""
@@ -35,7 +35,7 @@ BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
 """Speeds in m/s and rad/s against the set-point above which a robot is not regarded as held.
 
-Such motion explains nothing.
+Such motion does not add to the wind-up.
 """
 LEVER_M: Final = 0.15
 """Approximate distance in m of the wheels from the centre: converts a turn to rim motion."""
@@ -47,15 +47,16 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m lost in a first long displacement, until the next one; else 0.
+        """Distance in m lost in a first long displacement, until the next displacement; else 0.
 
         None: the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract motion outside the envelope from the wind-up; return whether that explains it.
+        """Subtract motion outside the envelope from the wind-up; return whether it was larger.
 
-        ``way_mps``, ``turn_radps``: speeds outside the envelope, for ``seconds``.
+        If the wind-up was larger, it explains that motion. ``way_mps``, ``turn_radps``: speeds
+        outside the envelope, for ``seconds``.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -76,9 +77,10 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add what a held robot loses by motion inside the envelope; if not held, forget gradually.
+        """Add the distance that a held robot loses; if not held, forget the wind-up gradually.
 
-        ``newest``: the set-points that the robot may not have reached yet, the current one first.
+        ``motion``: motion inside the envelope. ``newest``: the set-points that the robot may not
+        have reached yet, the current one first.
         """
         current, lost_mps = newest[0], 0.0
         if current is AT_REST and not self.way_m:

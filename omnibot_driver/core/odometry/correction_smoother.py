@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The published pose: it approaches the corrected pose, no faster than the robot could move.
+"""The published pose, which approaches the corrected pose no faster than the robot could move.
 
-Knows poses and speeds; not how the corrections are found.
+This module knows poses and speeds; it does not know how the corrections are found.
 """
 
 from typing import Final
@@ -16,8 +16,8 @@ SPREAD_S: Final = 0.2
 class CorrectionSmoother:
     """The published ``pose``, which follows the best known pose, ``target``.
 
-    Each step leaves some room: the motion that was possible in its time, minus the robot's own.
-    Corrections of ``pose`` are limited to this room.
+    Corrections of ``pose`` are limited to the room of each step: the largest motion that was
+    possible in its time, minus the robot's own motion.
     """
 
     def __init__(self) -> None:
@@ -27,16 +27,16 @@ class CorrectionSmoother:
 
     @property
     def wrong(self) -> Pose:
-        """Known error of ``pose``, to be added to it."""
+        """Known error of ``pose``: ``target`` minus ``pose``."""
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """Correct the target by a displacement in its own axes, spread over ``spread_s``."""
+        """Correct ``target`` by a displacement in its axes; ``pose`` follows in ``spread_s``."""
         self.target = self.target.moved(chord)
         self._settling_s = spread_s
 
     def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move both poses by a displacement of the robot in its own axes.
+        """Move ``pose`` and ``target`` by a displacement in the robot's own axes.
 
         ``room_m``, ``room_rad``: the most that the robot can have moved in this step.
         """
@@ -47,14 +47,14 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move both poses, but ``pose`` by no more than the room; it catches up later."""
+        """Move ``target`` by a displacement, and ``pose`` by as much of it as the room allows."""
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
         self.move(chord.times(linear, linear, angular), room_m, room_rad)
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Move ``pose`` towards the target by the share of ``seconds``, as far as there is room."""
+        """Move ``pose`` by the part of its correction due in ``seconds``, within the room."""
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0
         self._settling_s = max(0.0, self._settling_s - seconds)

@@ -28,11 +28,11 @@ INITIAL_VARIANCE: Final = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
-    """The growth of the uncertainty. Each wheel has errors of its own, which move the body.
+    """How fast the uncertainty grows. Each wheel has errors of its own, which move the body.
 
     * ``wheel_drift``: standard deviation, in m, of a random walk after 1 m of motion at the rim.
     * ``wheel_scale``: standard deviation of the relative size error of one wheel.
-    * ``wheel_slip``: mean part of the distance that slip takes from all wheels alike.
+    * ``wheel_slip``: mean fraction of the distance that is lost to slip, equal for all wheels.
     * ``wheels``: their geometry, at a wheel radius of 1 m.
     * ``unheard_mps2``, ``unheard_radps2``: assumed accelerations of a robot during a gap, in m/s²
       and rad/s².
@@ -125,9 +125,10 @@ class Uncertainty:
         """Error of the pose in m, m and rad, per relative size error of each wheel."""
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
-        """Move the body along this tangent from this heading, and add the errors of its wheels.
+        """Move the body along a tangent (twist x time), and add the errors of its wheels.
 
-        Computed with plain numbers: Pose objects would cost a third of an odometry message.
+        ``heading_rad``: heading before the move. Computed with plain numbers: Pose objects would
+        take a third of the time of an odometry message.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return
@@ -171,15 +172,15 @@ class Uncertainty:
         )
 
     def settle(self) -> None:
-        """Close all gaps, as their motion is known now."""
+        """Remove the uncertainty of all gaps, as the motion in them is known now."""
         self.gap = NOTHING
 
     def give_up(self) -> None:
-        """Close all gaps, as their motion will remain unknown."""
+        """Keep the uncertainty of all gaps for good, as the motion in them stays unknown."""
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
-        """Return the covariance of a pose that also has the known error ``open_error``."""
+        """Return the covariance of a pose that also deviates by the known ``open_error``."""
         noise, levers = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
         slip = noise.wheel_slip * noise.wheel_slip
@@ -193,7 +194,7 @@ class Uncertainty:
 
 @cache
 def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
-    """Return the motion of the body for one metre at the rim of each wheel alone."""
+    """Return, for each wheel, the body's motion while only that wheel rolls, by one metre."""
     count = len(wheels.joints)
     rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
     return tuple(

@@ -31,7 +31,7 @@ motion."""
 POSE_DUE_S: Final = 0.24
 """Board time within which a pose arrives, unless it is lost too, in s."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Largest standard deviation of a well-known heading, from open gaps."""
+"""Largest standard deviation in rad, from open gaps, of a heading that counts as known."""
 UNKNOWN_S: Final = 0.5
 """Time in which a robot rolls to a halt, in s: duration of the motion that may be unreported in a
 gap of unknown length."""
@@ -58,11 +58,11 @@ class OdometrySettings:
 
 @value(frozen=True, slots=True)
 class OdometryEstimate:
-    """The odometry at ``stamp_s``: pose and covariance in its frame, twist in the body's.
+    """The odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in body axes.
 
     * ``twist``: None if the duration of the displacement is unknown.
-    * ``rolled``: all motion by the wheels since the driver began, as one tangent in the board's
-      axes.
+    * ``rolled``: all motion by the wheels since the driver began, as one tangent (sum of twist x
+      time) in the board's axes.
     * ``rolling``: rate of ``rolled``; None if unknown.
     * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s²; None to use
       those of the parameters.
@@ -114,7 +114,7 @@ class Odometry:
         )
 
     def reset(self) -> list[OdometryEstimate]:
-        """Begin the odometry frame at the robot's present pose; return the estimates still due."""
+        """Begin the odometry frame at the robot's pose; return the estimates that still waited."""
         self.alignments += 1
         due = []
         if self._board is not None:
@@ -170,9 +170,10 @@ class Odometry:
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:
-        """Return a pose of the odometry frame in the board's frame, by the shorter turn from here.
+        """Return ``place``, a pose in the odometry frame, as a pose in the board's frame.
 
-        None if unknown: no pose of the board shows yet how the frames lie.
+        The turn from the robot's heading to ``place`` is the shorter one. None if no pose of the
+        board shows yet where the odometry frame lies in the board's frame.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -187,7 +188,7 @@ class Odometry:
 
     @property
     def _settles(self) -> bool:
-        """Whether a pose may reveal lost motion."""
+        """Whether the board's poses can reveal lost motion: they are used, and one was accepted."""
         return self._settings.use_board_pose and self._belief.proved is not None
 
     # The board's frame
@@ -195,7 +196,8 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether a pose shows that the board's frame has changed, or is the first one.
 
-        After a suspected restart, a single pose decides if it fits either zero or the past motion.
+        After a suspected restart, a single pose decides if it fits the motion since the restart, or
+        the motion since the last pose before it.
         """
         if self._board is None:
             return confirmed
@@ -233,7 +235,7 @@ class Odometry:
         return estimates
 
     def _assume(self) -> None:
-        """Assume the last pose as no two poses agree, or heading 0 without any pose."""
+        """Assume that the last pose is right though unconfirmed, or heading 0 without any pose."""
         if self._belief.doubted is not None:
             self._begin_at(self._backlog.before(self._belief.doubted))
         else:
@@ -246,9 +248,10 @@ class Odometry:
         self._board, self._restarted, self._belief.doubted = board, None, None
 
     def _judge(self, told: Pose, confirmed: bool) -> None:
-        """Apply a pose that is reachable and as expected, or that confirms the one before.
+        """Accept a pose that is reachable and expected, or that confirms the last unexpected one.
 
-        A confirmed pose that is out of reach changes the frame instead of the odometry.
+        A confirmed pose that is out of reach changes the place of the frame instead of the
+        odometry. Any other pose waits for the next one to confirm it.
         """
         assert self._board is not None
         way = self._board.way_to(told)
@@ -308,7 +311,7 @@ class Odometry:
         self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
-        """Bridge displacements that are missing before a pose; the motion after them is unknown."""
+        """Assume that the last motion continued over ``lost`` displacements before a pose."""
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
             self._track.miss((lost + 1) * period_s)

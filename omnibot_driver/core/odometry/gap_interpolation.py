@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Gap interpolation: assumes motion in a gap like that on both sides of it.
+"""Interpolation of the motion in a gap, from the motion before and after the gap.
 
-Knows displacements and headings; not where the robot is, nor how the result is used.
+This module knows displacements and headings; it does not know where the robot is, nor how the
+result is used.
 """
 
 import math
@@ -18,9 +19,10 @@ NO_WAY: Final = Pose()
 
 
 class GapInterpolation:
-    """The motion on both sides of a gap.
+    """Estimates the motion of lost displacements from the displacements before and after them.
 
-    ``last``: newest tangent in the board's body axes, with its duration in s; None if unknown.
+    ``last``: newest tangent (twist x time) in the board's body axes, with its duration in s; None
+    if unknown.
     """
 
     def __init__(self) -> None:
@@ -31,8 +33,9 @@ class GapInterpolation:
     ) -> tuple[Pose, Pose]:
         """Return the tangents of the lost displacements and of this one, in the board's body axes.
 
-        ``heading_rad``: heading of the board before all of them. If it is None, the board has never
-        reported a pose, and displacements are taken to be in body axes.
+        A tangent is twist x time. ``heading_rad``: heading of the board before the lost
+        displacements. If it is None, the board has never reported a pose, and displacements are
+        taken to be in body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

@@ -2,7 +2,8 @@
 
 """Displacements that wait for a pose of the board, and their sum in the board's frame.
 
-Knows how a displacement moves a pose; not why one waits, nor how the result is used.
+This module knows how a displacement moves a pose; it does not know why one waits, nor how the
+result is used.
 """
 
 import math
@@ -31,19 +32,19 @@ class PendingDisplacements:
         return waiting
 
     def forget_losses(self) -> None:
-        """Forget the losses before the first displacement, as they are known by other means."""
+        """Set the losses before the first displacement to 0, as their motion is known now."""
         if self._waiting:
             reading, stamp_s = self._waiting[0]
             self._waiting[0] = replace(reading, lost=0), stamp_s
 
     @property
     def lost(self) -> int:
-        """Number of displacements that are missing before the first."""
+        """Number of displacements that are missing before the first waiting one."""
         return self._waiting[0][0].lost if self._waiting else 0
 
     @property
     def lost_s(self) -> float:
-        """Board time of the displacements that are missing before the first, in s."""
+        """Board time of the displacements that are missing before the first waiting one, in s."""
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
     @property
@@ -52,10 +53,10 @@ class PendingDisplacements:
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
-        """Return the time without a report before the first displacement, in s.
+        """Return the time without a report before the first waiting displacement, in s.
 
-        ``last_stamp_s``: stamp of the displacement before it; the start of the gap if the first one
-        does not give its duration.
+        ``last_stamp_s``: stamp of the last displacement before the gap. The time is measured from
+        this stamp if the first waiting displacement does not give its duration.
         """
         if not self._waiting:
             return 0.0
@@ -65,10 +66,10 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """Return the part of ``unheard_s`` that the stamps leave for a gap, in s.
+        """Return the part of ``unheard_s`` that fits between the stamps around the gap, in s.
 
-        This is at most the time since ``last_stamp_s`` minus the duration of the first
-        displacement.
+        This is at most the time from ``last_stamp_s`` to the stamp of the first displacement, minus
+        the duration of that displacement.
         """
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:
@@ -79,7 +80,7 @@ class PendingDisplacements:
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
     def before(self, board: Pose) -> Pose:
-        """Return the pose at which the displacements began if they end at ``board``."""
+        """Return the pose at which the waiting displacements began if they end at ``board``."""
         start = Pose(
             yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)
         )
@@ -90,12 +91,12 @@ class PendingDisplacements:
 
 
 def chord(reading: DisplacementReading) -> Pose:
-    """Return the displacement in its own frame."""
+    """Return the displacement of a reading as a Pose, in the frame of the reading."""
     return Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
 
 
 def advanced(board: Pose, reading: DisplacementReading) -> Pose:
-    """Return the pose in the board's frame after this displacement."""
+    """Return the pose ``board``, in the board's frame, after a displacement."""
     if reading.frame == "earth":
         return Pose(
             board.x_m + reading.dx_m, board.y_m + reading.dy_m, board.yaw_rad + reading.dyaw_rad

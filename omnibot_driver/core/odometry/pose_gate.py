@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The gate for the board's poses: accepts one that is finite, reachable and as expected.
+"""The gate for the board's poses: accepts a pose that is finite, reachable and as expected.
 
-An unexpected pose must be confirmed by the next one. Knows poses, speeds and what open gaps
-explain; not what an accepted pose changes.
+An unexpected pose must be confirmed by the next one. This module knows poses, speeds and what open
+gaps explain; it does not know what an accepted pose changes.
 """
 
 import math
@@ -16,7 +16,10 @@ from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
-"""Deviations, on top of what open gaps explain, above which the next pose must confirm a pose."""
+"""Deviations in m and rad above which the next pose must confirm a pose.
+
+They are allowed in addition to what open gaps explain.
+"""
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5
@@ -24,10 +27,11 @@ FARTHEST_RAD: Final = 1e5
 
 
 class PoseGate:
-    """The state of the gate.
+    """Decides which poses of the board are accepted.
 
     * ``proved``: the last accepted pose; None before the first, and after it has become invalid.
-    * ``doubted``: the last unexpected pose, moved along with the robot since.
+    * ``doubted``: the last unexpected pose, which the next pose must confirm, moved along with the
+      robot since; None without one.
     """
 
     def __init__(self) -> None:
@@ -38,40 +42,44 @@ class PoseGate:
         self._unproved_s = 0.0
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Move the doubted pose along with a reported motion."""
+        """Move the unconfirmed pose ``doubted`` along with a reported motion of the robot."""
         if self.doubted is not None:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Move the doubted pose along with an assumed motion, in the board's axes."""
+        """Move the unconfirmed pose ``doubted`` along with an assumed motion, in its own axes."""
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)
 
     def passed(self, seconds: float) -> None:
-        """Note that this much time of the board has passed, in s."""
+        """Note that ``seconds`` of the board's time have passed."""
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
-        """Return whether the pose is finite and within reach of any robot; count it if not."""
+        """Return whether a pose is finite and below the limits; if not, count it as refused."""
         possible = told.finite and told.way_m < FARTHEST_M and abs(told.yaw_rad) < FARTHEST_RAD
         self.refused += not possible
         return possible
 
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether the pose confirms the doubted pose; otherwise reject the doubted pose."""
+        """Return whether a pose confirms ``doubted``, the last unexpected pose.
+
+        If it does not, ``doubted`` is refused.
+        """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)
         self.refused += doubted is not None and not confirmed
         return confirmed
 
     def believe(self, board: Pose) -> None:
-        """Accept this pose of the board."""
+        """Note that this pose of the board was accepted."""
         self.proved, self.doubted, self._unproved_s = board, None, 0.0
 
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
-        """Return whether the pose can be reached from the last accepted one, at these speeds.
+        """Return whether the robot can have reached a pose since the last accepted one.
 
-        ``seconds``: time in addition to that noted by ``passed``.
+        ``mps``, ``radps``: largest speeds in m/s and rad/s; ``seconds``: time in addition to that
+        noted by ``passed``.
         """
         if self.proved is None:
             return False
@@ -84,7 +92,10 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """Return whether rounding and open gaps explain this deviation."""
+    """Return whether rounding and open gaps explain that a pose deviates by ``way``.
+
+    ``gap``: covariance of the motion in open gaps.
+    """
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS
     return way.way_m <= BELIEVED_M + metres and abs(way.yaw_rad) <= BELIEVED_TURN_RAD + turn

@@ -2,9 +2,9 @@
 
 """The robot's motion in the odometry frame: best pose, published pose and uncertainty.
 
-Composes the follower and the uncertainty. Inputs are tangents in the board's body axes, by the
-wheel sizes that the board assumes; outputs are in REP-103's axes and of true size. Knows times; not
-which of the board's reports to believe.
+``PoseTracker`` combines a CorrectionSmoother and an Uncertainty. Inputs are tangents (twist x time)
+in the board's body axes, for the wheel sizes that the board assumes; outputs are in REP-103's axes
+and of true size. This module knows times; it does not know which of the board's reports to believe.
 """
 
 from typing import Final
@@ -34,7 +34,7 @@ class PoseTracker:
     def configure(
         self, noise: OdometryNoise, *, scale: tuple[float, float], fastest: tuple[float, float]
     ) -> None:
-        """Use new settings.
+        """Use new settings from the next motion on.
 
         ``scale``: true distance and turn, divided by those that the board reports; ``fastest``:
         speeds that the robot cannot exceed, in m/s and rad/s.
@@ -51,7 +51,7 @@ class PoseTracker:
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
-        """Return the twist of a motion in this time: in REP-103's axes, and in the board's."""
+        """Return the twist of a motion that took ``seconds``, in REP-103's and the board's axes."""
         rolling = _times(tangent, self._size).over(seconds)
         if self._signed_size == self._size:
             return rolling, rolling
@@ -76,15 +76,15 @@ class PoseTracker:
         move(chord, self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
 
     def miss(self, duration_s: float) -> None:
-        """Add a gap in the reports."""
+        """Add the uncertainty of a gap in the reports, which lasted ``duration_s``."""
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add the motion of a gap at once, before the gap has any other effect."""
+        """Add the motion of a gap, which is known now, without spreading it over time."""
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:
-        """Correct the pose; the motion of all gaps is known then."""
+        """Correct the pose by ``tangent``, over some time; remove the uncertainty of all gaps."""
         if self.uncertainty.gap != NOTHING:  # otherwise it corrects only rounding
             self.rolled += _times(tangent, self._size)
         self.follower.correct(roll(_times(tangent, self._signed_size)))

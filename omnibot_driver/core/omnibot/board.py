@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot board as a ``core.board.Board``: its bytes as readings, requests as its bytes.
+"""The OmniBot as a ``core.board.Board``: decodes its bytes into readings, encodes requests.
 
 Source: the board's manual ver. 0.3. ``translation`` describes the data from the board,
 ``command_encoder`` the commands to it.
@@ -104,7 +104,7 @@ class OmniBot:
         self._nothing_begun = SampleBoundary(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
 
     def connect(self) -> None:
-        """Begin a new connection, and keep only the counters."""
+        """Begin a new connection: forget everything but the settings and the counters."""
         self._decoder = FrameDecoder(
             self._settings.pose_byte_order,
             ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g],
@@ -124,9 +124,10 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended among the samples; None while that is uncertain.
+        """Where the last read ended in the stream of IMU samples; None while that is uncertain.
 
-        It is found from the IMU frame in hand, complete or begun, and the bytes after it.
+        The bytes held after the last decoded frame show this: whether they begin or complete an IMU
+        frame, and how many bytes follow.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -165,11 +166,11 @@ class OmniBot:
 
     @property
     def advice(self) -> str | None:
-        """A sentence on a setting that the board's data contradicts; None without one."""
+        """A sentence on a setting that the board's data contradicts; None if all settings fit."""
         return self._translation.suspicion.advice
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Return the readings that these bytes complete, in the order of the line."""
+        """Return the readings that these bytes complete, in the order sent; ``now``: time in s."""
         pieces, line = self._pieces, (self._decoder, self._translation)
         single = take_pieces(pieces, data, now, *line) if pieces else take_single(data, now, *line)
         if single:
@@ -192,7 +193,7 @@ class OmniBot:
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings that the held bytes still prove, after the line was closed."""
+        """Return the last readings after the line was closed, from the bytes still held."""
         readings = self._decode_pieces()
         found = self._decoder.flush(now)
         return readings + self._translation.readings(found, self._decoder.skipped, now)
@@ -202,7 +203,7 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
-        """Do nothing: the board switches nothing but the wheels, and they are stopped."""
+        """Do nothing after a stall: the board drives only the wheels, which are stopped then."""
 
     def due(self, now: float) -> Packets:
         """Return no packets, because the board sends without polling."""
@@ -213,10 +214,10 @@ class OmniBot:
         return []
 
     def reset_odometry(self) -> None:
-        """Do nothing: the board does not have such a request."""
+        """Do nothing: the board does not have a command that resets only its odometry."""
 
     def leave(self) -> None:
-        """Do nothing: ``due`` never returns packets that could be left out."""
+        """Do nothing when the driver ends: ``due`` never returns packets to leave out then."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Return the stream that encodes commands and repeats their frames."""
@@ -234,7 +235,7 @@ class OmniBot:
     def pause(self) -> Packets:
         """Return Stop and the letter P.
 
-        P toggles, so RequestRefused is raised unless the board is known to run.
+        P would start a paused board, so RequestRefused is raised unless the board is known to run.
         """
         self._translation.apply(Happening.SENT_PAUSE)
         return packed(transmission(frames.encode(frames.STOP), frames.TOGGLE_PAUSE))
@@ -254,7 +255,7 @@ class OmniBot:
         return self._encoder.stop()
 
     def emergency_stop(self) -> Packets:
-        """Return the manual's E-stop."""
+        """Return the packets of the emergency stop, as the board's manual defines it."""
         return self._encoder.emergency_stop()
 
     def switch_off(self) -> Packets:
@@ -262,5 +263,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the packets for Stop and for the emergency stop, which never change."""
+        """Return what a guard process sends if this one fails: Stop, and E-stop with Stop."""
         return LAST_WORDS

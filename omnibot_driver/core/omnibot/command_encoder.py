@@ -38,7 +38,8 @@ EMERGENCY_STOP_PACKETS: Final = packed(EMERGENCY_STOP)
 class CommandEncoder:
     """Encodes orders as packets, with the scales of ``settings``.
 
-    ``settings`` may be replaced at any time; ``saturated`` counts commands that did not fit.
+    ``settings`` may be replaced at any time. ``saturated`` counts the commands that were slowed
+    down because a value exceeded 16 bits.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -47,7 +48,7 @@ class CommandEncoder:
 
     @property
     def settings(self) -> OmniBotSettings:
-        """The settings, of which the scales and radii are used."""
+        """The board's settings; the encoder uses their scales and radii."""
         return self._settings
 
     @settings.setter
@@ -56,7 +57,10 @@ class CommandEncoder:
         self._last: tuple[Order, Packets] | None = None
 
     def encode(self, order: Order) -> Packets:
-        """Return the packets of an order that is within the limits. Raises CommandRefused."""
+        """Return the packets of an order that is within the speed limits.
+
+        Raises CommandRefused if the order is a goal pose that cannot be sent.
+        """
         if self._last is not None and self._last[0] is order:
             return self._last[1]
         if isinstance(order, Drive):
@@ -76,7 +80,7 @@ class CommandEncoder:
         return STOP_PACKETS
 
     def emergency_stop(self) -> Packets:
-        """Return the manual's E-stop."""
+        """Return the packets of the emergency stop, as the board's manual defines it."""
         return EMERGENCY_STOP_PACKETS
 
     def velocity(self, twist: BodyTwist) -> bytes:
@@ -89,14 +93,14 @@ class CommandEncoder:
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Encode wheel rates in rad/s for independent wheel drive.
 
-        The unit on the wire is that of a rim speed: ``linear_scale`` LSB per m/s.
+        On the line, each rate is the speed of the wheel's rim, in ``linear_scale`` LSB per m/s.
         """
         unit = self._settings.linear_scale * self._settings.wheel_radius_m
         a, b, c = rates_radps
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the twist that the last command frame means, by its mode and words."""
+        """Return the twist that the last command frame in ``packets`` commands."""
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])
         linear = settings.linear_scale
@@ -108,9 +112,10 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Encode a goal for positional control; the origin is a goal too, and not replaced by Stop.
+        """Encode a goal for positional control. A goal at the origin is not replaced by Stop.
 
-        Raises CommandRefused if a coordinate does not fit, or if its bytes could act as a letter.
+        Raises CommandRefused if a coordinate exceeds 16 bits, or if its high byte is S, P or R: if
+        bytes are lost, the board could obey this byte as a letter.
         """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)

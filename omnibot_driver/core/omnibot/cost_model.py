@@ -26,80 +26,83 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 # Damage by the line.
 ONE_BYTE: Final = 5.5
-"""A frame that lost or gained one byte: one frame in 250, or one byte in three thousand."""
+"""Cost of a frame that lost or gained one byte, as about one frame in 250 does."""
 TWO_BYTES: Final = 8.5
-"""A frame that lost or gained two bytes: rarer, but both faults come in bad times."""
+"""Cost of a frame that lost or gained two bytes; less than twice one byte, as losses cluster."""
 BROKEN_OFF: Final = 9.0
-"""A frame whose last three or more bytes are missing: a burst was lost."""
+"""Cost of a frame whose last three or more bytes are missing because a burst was lost."""
 HEADER_BYTE: Final = 7.5
-"""A frame that lost half of its header: two of the 9 to 15 places where it may lose a byte."""
+"""Cost of a frame that lost one of its two header bytes, out of 9 to 15 bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Added for a frame that gained bytes, if a header is where it would end without them."""
+"""Extra cost of a frame that gained bytes, if a header is where the frame should have ended."""
 BAD_RUN: Final = 6.0
-"""Beginning of a run of unexplained bytes (a bad run): a burst was lost, or noise."""
+"""Cost of beginning a run of unexplained bytes (a bad run): a burst was lost, or noise."""
 BAD_TAIL: Final = 2.5
-"""Added if a bad run begins after a complete frame and without a header, as bursts seldom do."""
+"""Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
 UNKNOWN_START: Final = 1.0
-"""A start out of step, within a frame: most silences are between frames."""
+"""Cost if the first bytes are the rest of a frame: most silences end between frames."""
 BAD_BYTE: Final = 0.35
-"""Each byte of a bad run; 14 of them cost more than a frame of odd content."""
+"""Cost of each byte of a bad run; with ``BAD_RUN``, 14 of them exceed any true IMU frame."""
 BAD_HEADER: Final = 0.5
-"""A header within a bad run: few arise by chance, some from a gyro at rest."""
+"""Cost of a header within a bad run: few arise by chance, some from a gyro at rest."""
 GAP: Final = 5.0
-"""A frame within which the line was idle, though the board sends frames without a pause."""
+"""Cost of a pause of the line within a frame; the board sends a frame without a pause."""
 BAD_TEXT: Final = 4.0
-"""A complete text within a bad run: nine fixed letters are not a coincidence."""
+"""Cost of a complete text within a bad run: nine fixed letters are not a coincidence."""
 KNOWN_GAP: Final = 11.0
-"""A frame within which the line was idle, on a line that so far paused only between frames.
+"""Cost of a pause within a frame, on a line that so far paused only between frames.
 
 Too high to accept the frame; low enough to allow for a pause that misleads.
 """
 CUT_SHORT: Final = 6.0
-"""A frame within which the line was closed."""
+"""Cost of a frame that is incomplete because the line was closed."""
 ENDS_IN_NOISE: Final = 2.0
-"""A line that falls silent within a bad run, though it normally does so after a frame."""
+"""Cost of a line that falls silent within a bad run, though it normally does so after a frame."""
 
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""Cost by the number of IMU words that are far from those of the frame before.
+"""Cost of an IMU frame, by the number of words that differ much from the frame before.
 
 One such word makes a frame odd; a shock moves several.
 """
 AFTERSHOCK: Final = 1.5
 """Cost of an odd IMU frame after another odd one, because a shock rings."""
 WEIGHTLESS: Final = 2.5
-"""An accelerometer norm below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
+"""Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
-"""A norm below 0.5 g, with an IMU header among the accelerations.
+"""Cost of an acceleration below 0.5 g, one word of which has the bytes of an IMU header.
 
-In a run of IMU frames a gyro that reads -6 makes a second, shifted run, which has gyro words in the
-place of the accelerometer's.
+A gyro word of -6 has these bytes. In a run of IMU frames, such words are the headers of a second,
+shifted run of false frames, in which gyro words are in the place of accelerations.
 """
 JUMP: Final = 2.5
-"""A counter that is not the next one: a frame before it was lost."""
+"""Cost of a counter that is not the next one: a frame before this one was lost."""
 IMPOSSIBLE: Final = 2.0
-"""A movement that a robot of this kind cannot make."""
+"""Cost of a movement that a robot of this kind cannot make."""
 OFF_BEAT: Final = 1.0
-"""A number of IMU frames per delta, or of deltas per pose, that differs from the schedule's.
+"""Cost of an unexpected number of IMU frames per delta, or of deltas per pose.
 
-With deltas at 25 Hz these are four and five.
+With deltas at 25 Hz, four IMU frames per delta and five deltas per pose are expected.
 """
 
 CONTRADICTED: Final = 1.5
-"""A pose whose turn since the pose before differs from the sum of the deltas between them."""
+"""Cost of a pose whose turn since the last pose differs from the sum of the deltas between."""
 
 IMU_HEADER_WORD: Final = -6
-"""FF FA, read as a signed word."""
+"""The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""Largest rounding error of a sum of deltas in 0.1 mrad, and what each delta adds: 4 for five."""
+"""Largest rounding error of a sum of deltas in 0.1 mrad: a constant, and an addend per delta.
+
+Five deltas have an error of 4 at most.
+"""
 FASTEST: Final = 1e5
 """Largest possible speed in 0.1 mm/s or 0.1 mrad/s: 10 m/s or 10 rad/s."""
 FARTHEST_POSE: Final = 1e7
-"""Limit of a pose in mm or mrad: 10 km, or 1600 turns.
+"""Limit of the coordinates of a pose in mm or mrad: 10 km, or 1600 turns.
 
-Beyond it, other bytes were misread as a pose.
+A greater value was misread from other bytes.
 """
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
@@ -108,7 +111,7 @@ DELTAS_MISSED: Final = 2
 
 
 class Context(NamedTuple):
-    """The context of a frame: what came before it. None means unknown."""
+    """What is known before a frame, from the frames before it. None means unknown."""
 
     imu: ImuFrame | None = None
     seq: int | None = None
@@ -118,12 +121,12 @@ class Context(NamedTuple):
     deltas: int = 0
     """Number of deltas since the last pose."""
     shaken: bool = False
-    """Whether the last IMU frame leapt, or its norm was out of range."""
+    """Whether the last IMU frame differed much from the one before, or its norm was unusual."""
     turned: int | None = None
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
-        """Return the context after an unknown loss."""
+        """Return the part of the context that stays valid after unknown frames were lost."""
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 
@@ -131,7 +134,10 @@ NOTHING_KNOWN: Final = Context()
 
 
 class Expectation:
-    """Judges content by the frames before it, and learns how much the sensor's words scatter."""
+    """Judges the content of a frame by the frames before it.
+
+    Learns from accepted frames how much the words of the IMU scatter.
+    """
 
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
         self.imus_per_delta = schedule.imus_per_delta
@@ -234,7 +240,7 @@ class Expectation:
         self.calm = lightest, heaviest, ceil(self._accel_limit), ceil(self._gyro_limit)
 
     def more_is_due(self, frame: Frame, before: Context) -> bool:
-        """Return whether the board may send another frame in the same tick, without a pause."""
+        """Return whether the board may send another frame after ``frame``, in the same tick."""
         if isinstance(frame, ImuFrame):
             if before.seq is not None:
                 return before.imus >= self.imus_per_delta - 1
@@ -246,7 +252,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the last byte of this frame may belong to the next header.
 
-    It hardly does in an IMU frame whose last word is that of the frame before, except for FF.
+    False for bytes that a header does not contain. Also False for an IMU frame whose last word
+    equals that of the IMU frame before, unless the last byte is FF.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -5,17 +5,17 @@
 The protocol has no checksum and its header words are the commonest readings of a gyro at rest, so a
 header alone proves nothing. A frame is accepted because of the bytes around it, in two ways:
 
-* *In step* (the byte before it ended an accepted frame) a frame is returned with its last byte
-  unless evidence speaks against it. The evidence: what follows in hand does not begin like a frame,
-  its content is a spike, the line was idle within it, or its last byte may belong to the next
-  header.
-* *Uncertain* bytes are interpreted in all possible ways, which compete (``trellis``) by the cost of
-  all the evidence (``cost_model``). A frame of the cheapest interpretation is returned when every
-  interpretation without it costs clearly more; where two are close, nothing is returned. Uncertain
-  bytes wait until ``DOUBT_BYTES`` are held, at most.
+* *In step* means that the frame begins right after an accepted one. The frame is then returned as
+  soon as its last byte arrives, unless evidence speaks against it: the bytes after it do not begin
+  like a frame, its content is a spike, the line was idle within it, or its last byte may belong to
+  the next header.
+* *Uncertain* bytes are interpreted in all possible ways (``trellis``). Each interpretation has a
+  cost, which sums up the evidence against it (``cost_model``). A frame of the cheapest
+  interpretation is returned when every interpretation without this frame costs clearly more.
+  Otherwise the bytes wait for more evidence, until ``DOUBT_BYTES`` are held at most.
 
-This module reads no clock and never raises on input. It holds less than ``DOUBT_BYTES`` between
-calls, and looks at each byte a bounded number of times.
+This module reads no clock and never raises on input. It holds fewer than ``DOUBT_BYTES`` bytes
+between calls, and looks at each byte a bounded number of times.
 """
 
 import math
@@ -42,18 +42,19 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""Cost of its content from which a frame waits for the bytes that follow it."""
+"""Cost of a frame's content from which the frame waits for the bytes that follow it."""
 DOUBT_BYTES: Final = 170
 """Number of uncertain bytes that force a decision: 100 ms of the nominal stream."""
 SHORTEST_RUN: Final = DELTA_LENGTH
-"""Least number of bytes in which the fast path finds a frame; adapters deliver small pieces."""
+"""Least number of bytes for which the fast path is tried: the length of the shortest frame."""
 CALM_S: Final = 10.0
 """Time in s without damage after which a line is regarded as one that loses few bytes.
 
-On such a line a frame need not wait until its last byte is certain to be its own.
+On such a line, less evidence is needed that the last byte of a frame is not part of the next
+header.
 """
 FRAMES_TO_SETTLE: Final = 3
-"""Number of certain frames after an uncertain one that end the wait for more evidence."""
+"""Number of certain frames that must follow an uncertain one before that one is discarded."""
 
 
 @dataclass(slots=True)
@@ -63,15 +64,15 @@ class DecoderStatistics:
     frames: int = 0
     discarded_bytes: int = 0
     faults: int = 0
-    """How often the bytes after an accepted frame were not a frame."""
+    """How often an accepted frame was followed by bytes that are not a frame."""
 
 
 class FrameDecoder:
     """Finds the frames in the bytes of a line, whatever chunks the bytes arrive in.
 
-    ``single_imu`` decodes some frames without this class, and updates its state: ``context`` (the
-    frames before the next one), ``expectation`` (what the content of the next one may be),
-    ``pauses`` (where the line was idle) and ``last_arrival_s``.
+    ``single_imu`` decodes some frames without this class, and updates the state of this class:
+    ``context`` (what the frames so far show), ``expectation`` (which content the next frame may
+    have), ``pauses`` (where the line was idle) and ``last_arrival_s``.
     """
 
     def __init__(
@@ -83,9 +84,9 @@ class FrameDecoder:
     ) -> None:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
-        """Number of bytes before each frame of the last call that were not a frame."""
+        """For each frame of the last call, the number of discarded bytes right before it."""
         self.at_rest = False
-        """Whether all bytes so far are decoded, and pauses are where they should be."""
+        """Whether all bytes so far are decoded, and the line usually pauses between frames."""
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self.expectation = Expectation(accel_counts_per_g, schedule)
@@ -96,7 +97,7 @@ class FrameDecoder:
         self.last_arrival_s = self._damaged_at_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
-        """Return the frames that these bytes complete, in the order of the line.
+        """Return the frames that these bytes complete, in the order in which they were sent.
 
         ``now``: arrival time of ``data`` in s, of any steady clock.
         """
@@ -118,7 +119,7 @@ class FrameDecoder:
         return found
 
     def flush(self, now: float) -> list[Frame]:
-        """Return the frames that the held bytes still prove, as the line was closed or silent."""
+        """Return the last frames from the held bytes, after the line was closed or fell silent."""
         self.last_arrival_s = now
         found: list[Frame] = []
         self.skipped = []
@@ -139,7 +140,7 @@ class FrameDecoder:
 
     @property
     def fresh(self) -> bool:
-        """Whether the last call brought bytes of the last accepted frame."""
+        """Whether some bytes of the last accepted frame arrived with the last call of ``feed``."""
         return len(self._held) < self._arrived
 
     def _close(self, found: list[Frame]) -> None:
@@ -175,7 +176,7 @@ class FrameDecoder:
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
-        """Accept frames in step until one is uncertain; return whether none was."""
+        """Accept consecutive frames until one is uncertain; return False if one is uncertain."""
         held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
@@ -217,10 +218,10 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether the last byte in hand may be the first of another frame, by arrival times.
+        """Return whether, by arrival times, the last byte held may be the first of another frame.
 
-        ``start``, ``length``: of the frame in hand; ``due``: whether another one may follow at
-        once.
+        ``start``, ``length``: position and length in bytes of the last frame held; ``due``: whether
+        the board may send another frame right after it.
         """
         pauses, calm = self.pauses, self.calm
         if self._arrived >= length:  # in one read: what is sent at once begins after a pause
@@ -230,11 +231,11 @@ class FrameDecoder:
 
     @property
     def calm(self) -> bool:
-        """Whether no damage was seen for longer than ``CALM_S``."""
+        """Whether the decoder has not discarded any bytes for longer than ``CALM_S``."""
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of a run except the last two, which are uncertain; return False."""
+        """Accept the frames of ``walk`` except the last two, which are uncertain; return False."""
         believed = len(walk.frames) - 2
         if believed > 0:
             self._take(walk, believed, walk.known_after(believed, self.expectation), found)
@@ -262,7 +263,7 @@ class FrameDecoder:
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
-        """Accept certain frames, discard what stays uncertain; return whether either happened."""
+        """Accept certain frames, discard uncertain bytes; return whether it did either."""
         state = self.context, self.expectation, self.pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0
@@ -286,9 +287,10 @@ class FrameDecoder:
     def _settled(
         self, pieces: list[Segment], size: int, until: int, closed: bool
     ) -> Iterator[tuple[Segment, bool]]:
-        """Yield the first pieces that later bytes cannot change, each with whether to accept it.
+        """Yield the pieces up to the first undecided one, each with whether to accept it.
 
-        A piece that ends before or at ``until`` has waited long enough, and is yielded too.
+        A piece is decided if later bytes cannot change the result, or if it ends at or before the
+        position ``until``, because it has waited long enough.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

@@ -2,9 +2,9 @@
 
 """The fast path for frames that no evidence speaks against, and for shocks that continue.
 
-It accepts what the decoder's own loop would accept by the evidence from ``weigh``, and nothing
-else: a test compares the two. Frames with any other cost are left to that loop. An IMU frame that
-comes by itself has an even faster path (``single_imu``).
+It accepts only frames that the decoder's own loop would accept too, by their cost from ``weigh``: a
+test compares the two. All other frames are left to that loop. A single IMU frame in a read has an
+even faster path (``single_imu``).
 """
 
 import struct
@@ -49,15 +49,15 @@ UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
 )
 
 LEARN_EVERY: Final = 8
-"""Number of frames per lesson; more lessons would teach the expectation nothing new."""
+"""The expectation learns from one frame in this number; more would teach it nothing new."""
 
 
 class Walk:
     """Consecutive frames, from the first byte held on, that no evidence speaks against.
 
     ``ends``: the end of each frame; ``lessons``: frames from which the expectation is to learn, as
-    the frame's number, the frame and the IMU frame before it; ``known``: a number of frames and the
-    context after them (as fields of a Context), every few frames.
+    the frame's number, the frame and the IMU frame before it; ``known``: the context (as fields of
+    a Context) after some numbers of frames, each with that number.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -91,9 +91,10 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Return whether frames follow at ``at``: then odd content before it is a shock, not damage.
+    """Return whether a frame follows at position ``at``.
 
-    One complete frame must follow, and the bytes after it must not contradict a second one.
+    If so, odd content before ``at`` is a shock, not damage. The frame must be complete, and the
+    bytes after it must not contradict another frame. At the end of ``held``, return ``closed``.
     """
     if at == len(held):
         return closed
@@ -112,9 +113,10 @@ def take_run(
     order: ByteOrder,
     walk: Walk,
 ) -> tuple[int, Context]:
-    """Add the calm frames at ``at`` to ``walk``; return their end, and the context there.
+    """Add frames from ``at`` on to ``walk``, while they are as expected; return end and context.
 
-    The last frame in hand is left out if its last byte may belong to the next header.
+    The context is that after the added frames. The last frame held is left out if its last byte may
+    belong to the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

@@ -2,10 +2,11 @@
 
 """The order in which a running board sends frames, and what it reveals about lost frames.
 
-In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta (with deltas at
-10 Hz every tenth, and every second); in IMU-only mode only IMU frames are sent. So the number of
-bytes between two frames shows which frames they were, even if a few of the bytes are missing. This
-is soft knowledge: SEQ and arrival times correct it.
+In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta. With deltas at
+10 Hz, a delta follows every tenth IMU frame, and a pose every second delta. In IMU-only mode only
+IMU frames are sent. So the number of discarded bytes between two frames shows which frames were
+lost, even if a few of their bytes are missing. This result is uncertain: the counters (SEQ) and
+arrival times correct it.
 """
 
 from functools import cache
@@ -22,7 +23,8 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: the position of a board that was at position ``at`` and then sent ``kind``.
+    ``after[kind][at]``: position in the sequence after a frame of ``kind``, if it was ``at``
+    before.
     """
 
     def __init__(self, *kinds: Kind) -> None:
@@ -57,11 +59,11 @@ class FrameSchedule:
         self._imus = self._lost = 0
 
     def hear(self, kind: Kind, skipped: int) -> int:
-        """Return how many IMU frames were lost before this frame.
+        """Note a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: number of bytes right before it that were not a frame. IMU frames lost before a
-        pose are returned with the next frame. The count ends with a delta, because its SEQ reports
-        losses.
+        ``skipped``: number of bytes right before the frame that were not a frame. IMU frames lost
+        before a pose are returned with the frame after the pose. A delta ends a count of IMU
+        frames, because its SEQ reports losses.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:
@@ -80,7 +82,7 @@ class FrameSchedule:
         return lost
 
     def hear_imus(self, count: int) -> None:
-        """Note that ``count`` IMU frames arrived with nothing between them."""
+        """Note that ``count`` IMU frames were received in a row, without other frames or losses."""
         self._imus += count
         if self._imus >= self._imus_alone:
             self._cycle, self._next = IMU_ONLY, 0

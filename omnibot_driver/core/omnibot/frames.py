@@ -22,7 +22,7 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""Values of a frame's last byte that may be the first or second byte of the next header."""
+"""Values of a frame's last byte that may belong to the next header, if the frame lost bytes."""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")
@@ -114,7 +114,7 @@ def command(mode: int, a: int, b: int, c: int) -> bytes:
 
 
 def last_command(data: bytes) -> tuple[int, int, int, int]:
-    """Return mode and words of the command frame that ``data`` ends with; zeros without one."""
+    """Return mode and words of the command frame at the end of ``data``; zeros if there is none."""
     header, mode, a, b, c = _COMMAND.unpack(data[-_COMMAND.size :].rjust(_COMMAND.size, b"\0"))
     return (mode, a, b, c) if header == COMMAND_HEADER else (0, 0, 0, 0)
 
@@ -140,9 +140,9 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
 
 
 def measure(data: bytes | bytearray, at: int) -> int:
-    """Return the length in bytes of the frame that the board may have sent at ``at``.
+    """Return the length in bytes of the frame that begins at position ``at``.
 
-    INCOMPLETE while more bytes may complete it, NO_FRAME when a frame cannot begin like this.
+    INCOMPLETE if more bytes may complete a frame, NO_FRAME if a frame cannot begin like this.
     """
     if data[at] == _TEXT_BEGIN:
         return _measure_paused(data, at)
@@ -155,12 +155,12 @@ def measure(data: bytes | bytearray, at: int) -> int:
 
 
 def length_begun(data: bytes | bytearray, at: int) -> int:
-    """Return the length in bytes of the frame that begins with this header, or NO_FRAME."""
+    """Return the length in bytes of a frame whose header is at position ``at``, or NO_FRAME."""
     return _LENGTH_BY_TYPE.get(data[at + 1], NO_FRAME)
 
 
 def is_text(data: bytes | bytearray, at: int) -> bool:
-    """Return whether a text, and not a frame with a header, may begin here."""
+    """Return whether the byte at ``at`` begins a «Paused» text instead of a header."""
     return data[at] == _TEXT_BEGIN
 
 
@@ -175,7 +175,7 @@ def _measure_paused(data: bytes | bytearray, at: int) -> int:
 
 
 def decode_measured(data: bytes | bytearray, pose_byte_order: ByteOrder = "big") -> Frame:
-    """Decode one frame from exactly as many bytes as ``measure`` returned."""
+    """Decode ``data``, which ``measure`` has found to be exactly one frame."""
     if data[0] == _TEXT_BEGIN:
         return PausedFrame(int(data[len(_PAUSED_WORD) :]))
     if data[1] == IMU_HEADER[1]:
@@ -187,7 +187,7 @@ def decode_measured(data: bytes | bytearray, pose_byte_order: ByteOrder = "big")
 
 
 def decode(data: bytes, pose_byte_order: ByteOrder = "big") -> Frame | CommandFrame:
-    """Return the one frame that these bytes are. Raises FrameError unless they are exactly one."""
+    """Decode one frame or command. Raises FrameError unless ``data`` is exactly one."""
     if data and measure(data, 0) == len(data):
         return decode_measured(data, pose_byte_order)
     if data[:2] == COMMAND_HEADER and len(data) == _COMMAND.size:

@@ -3,10 +3,10 @@
 """The pauses in which the line was idle, and how far they can be trusted.
 
 A board sends the frames of a tick at once, so a pause of its line is between frames. An adapter
-that collects bytes causes pauses anywhere, and so does a reader that is scheduled late
-(``late_reads``). Only frames can show whether the line or the adapter paused: this module counts
-how often pauses were in the expected places. It knows positions and times; it does not know what a
-frame contains, nor which frames are accepted (``decoder``).
+that collects bytes, or a reader that is scheduled late (``late_reads``), causes pauses anywhere.
+Only frames can show whether the line or the adapter paused: this module counts how often pauses
+were in the expected places. It knows positions and times; it does not know what a frame contains,
+nor which frames are accepted (``decoder``).
 """
 
 from bisect import bisect_right
@@ -34,21 +34,24 @@ An adapter that collects bytes for longer shows pauses of its own.
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
 TICK_BYTES: Final = 14 + 9 + 15
-"""Most bytes that one tick can bring; more at once after a pause show a late reader."""
+"""Most bytes that the board sends in one tick; a read of more bytes after a pause was late."""
 PAUSES_TO_TRUST: Final = 16
-"""Number of pauses in the expected places after which pauses are attributed to the line."""
+"""Number of pauses between frames after which a pause is attributed to the line."""
 
 _FIRST: Final = attrgetter("first")
 
 
 class InterFrameGaps:
-    """The pauses within the bytes held, and what the pauses of this line normally show.
+    """The pauses within the bytes held, and where the pauses of this line normally are.
 
-    ``gaps``: pauses within the bytes held. ``sharp``: normally, the first byte after a pause begins
-    a frame; ``between``: normally, a frame begins somewhere in the read after a pause; ``certain``:
-    both have held often enough that one more pause changes nothing. ``at_pace``: the last bytes
-    came without a pause. ``collected``: the last read brought bytes of more than a tick, so it
-    ended anywhere in a tick, and hardly right after the first byte of a frame.
+    * ``gaps``: the pauses within the bytes held.
+    * ``sharp``: normally, the first byte after a pause begins a frame.
+    * ``between``: normally, a frame begins somewhere in the read after a pause.
+    * ``certain``: ``sharp`` and ``between`` were confirmed often enough that one more pause changes
+      nothing.
+    * ``at_pace``: the bytes of the last read came without a pause before them.
+    * ``collected``: the last read brought the bytes of more than a tick. So it may have ended
+      anywhere in a tick, and hardly right after the first byte of a frame.
 
     ``byte_s``: time in s that the line takes for a byte.
     """
@@ -61,14 +64,14 @@ class InterFrameGaps:
         self.doubt()
 
     def doubt(self) -> None:
-        """Stop trusting the pauses so far, which may have been misleading."""
+        """Stop trusting pauses as signs of an idle line: those so far may have misled."""
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
-        """Note that ``arrived`` bytes were read at ``now``, ``pause_s`` after the read before.
+        """Note that ``arrived`` bytes were read at ``now``, ``pause_s`` after the last read, in s.
 
-        ``place``: position of the first of them among the bytes held.
+        ``place``: position of the first of these bytes among the bytes held.
         """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
@@ -89,7 +92,7 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Note that the bytes after this pause are complete frames."""
+        """Note that ``arrived`` bytes, read after a pause of ``pause_s``, are complete frames."""
         if self.stands_out(pause_s, arrived):
             self._trust(sharp=True, between=True)
 
@@ -98,9 +101,10 @@ class InterFrameGaps:
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
-        """Learn whether the pauses are between frames, and thus the line's and not the adapter's.
+        """Learn from accepted frames whether the pauses of this line are between frames.
 
-        ``ends``: the ends of the accepted frames among the bytes held.
+        If so, the line causes the pauses, and not the adapter. ``ends``: the ends of the accepted
+        frames among the bytes held.
         """
         start = 0
         for end in ends:
@@ -111,7 +115,7 @@ class InterFrameGaps:
             start = end
 
     def against(self, data: bytes | bytearray, start: int, end: int) -> float:
-        """Return the cost of the pauses within these bytes, if they are taken for a frame."""
+        """Return the cost of the pauses within ``data[start:end]``, if these bytes are a frame."""
         return sum(
             gap.price
             for gap in self._within(start, end)
@@ -119,16 +123,16 @@ class InterFrameGaps:
         )
 
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
-        """Return whether later bytes may still explain the pause within this frame."""
+        """Return whether more bytes are needed to explain a pause within ``data[start:end]``."""
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
 
     def silent_within(self, start: int, end: int) -> bool:
-        """Return whether a pause of at least ``IDLE_S`` was within these bytes."""
+        """Return whether a pause of at least ``IDLE_S`` was between ``start`` and ``end``."""
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether the bytes at ``start`` followed a pause, less than half a tick ago."""
+        """Return whether a pause ended at ``start``, less than half a tick before the last read."""
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
                 came = next(read.now for read in self._reads if read.end > start)
@@ -149,11 +153,11 @@ class InterFrameGaps:
         self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
 
     def clear(self) -> None:
-        """Forget all pauses, because times prove nothing about the bytes held."""
+        """Forget all pauses among the bytes held, and the times of the reads since."""
         self.gaps, self._reads = [], []
 
     def _within(self, start: int, end: int) -> Iterator[Gap]:
-        """Yield the pauses between the first and the last of these bytes."""
+        """Yield the pauses that lie entirely between the positions ``start`` and ``end``."""
         gaps = self.gaps
         for number in range(bisect_right(gaps, start, key=_FIRST), len(gaps)):
             if gaps[number].first >= end:

@@ -4,9 +4,9 @@
 
 A read does not return when bytes arrive. It returns when the reader is scheduled, with the bytes
 that the adapter has delivered by then. So a pause between two reads proves little about the line.
-The board's clock proves more: the board sends an IMU frame in every tick. If bytes were lost in a
-pause within a frame, that frame and all that follow stay late by whole ticks. A late reader catches
-up.
+The board's clock proves more, because the board sends an IMU frame in every tick. If bytes were
+lost in a pause within a frame, that frame and all later ones stay late by whole ticks. If only the
+reader was late, later frames are on time again.
 
 This module knows lengths, ticks and times; it does not know what a frame contains, nor which frame
 is accepted.
@@ -32,23 +32,29 @@ from omnibot_driver.core.omnibot.schedule import TICK_S
 IDLE_S: Final = 0.1
 """Pause in s that exceeds what any adapter causes (16 ms), and is ten of the board's ticks."""
 HALF_TICK_S: Final = TICK_S / 2
-"""Delay in s below which a frame has not missed its tick."""
+"""Delay in s below which a frame still counts as sent in its own tick."""
 GAP_S: Final = 4e-3
-"""Pause in s that never occurs within a frame as the board sends it."""
+"""Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Tolerance in s for delays by whole ticks, which lost bytes cause."""
+"""Largest deviation in s from whole ticks of a delay that lost bytes may have caused."""
 INTO_TICK_S: Final = 1e-3
-"""Delay in s of a frame that follows the IMU frame in its tick; the tolerance is as large."""
+"""Approximate delay in s of a delta or pose in its tick, because an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
-"""Limit in s of the differences between a punctual reader's delays, even with a USB adapter."""
+"""Largest difference in s between the delays of two punctual reads, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Largest deviation in s of bytes that arrive at the pace of the line."""
+"""Largest deviation in s from the pace of the line at which bytes still count as on pace."""
 FEW_BYTES: Final = 2
-"""Number of bytes that are too few to measure the pace."""
+"""Largest number of bytes that is too small to measure the pace at which they arrive."""
 TICKS_TO_PROVE: Final = 2
-"""Number of further ticks, read one by one and equally late, that prove lost bytes."""
+"""Number of ticks after a first late one that prove lost bytes.
+
+They must be read one by one, and be as late as the first one.
+"""
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Number of bytes after a frame with a pause in it at which its cause is decided."""
+"""Number of bytes after a frame with a pause in it by which the cause is decided.
+
+Without proof of an idle line by then, the reader is taken to have been late.
+"""
 
 
 class Cause(Enum):
@@ -60,7 +66,7 @@ class Cause(Enum):
 
 
 class Read(NamedTuple):
-    """A read: at ``now`` in s, the held bytes before position ``end`` had been read."""
+    """A read at ``now`` in s; ``end``: position in the held bytes after its last byte."""
 
     end: int
     now: float
@@ -70,10 +76,10 @@ _END: Final = attrgetter("end")
 
 
 class Gap(NamedTuple):
-    """A pause right before a byte whose position is at least ``first`` and less than ``before``.
+    """A pause between two reads, before a byte at a position from ``first`` to ``before`` - 1.
 
-    There the line was idle, or the reader was late. ``price``: cost of a frame around the pause if
-    the line was idle; ``pause_s``: time in s since the read before it.
+    During the pause the line was idle, or the reader was late. ``price``: cost of assuming a frame
+    across the pause, if the line was idle; ``pause_s``: time in s between the two reads.
     """
 
     first: int
@@ -85,18 +91,22 @@ class Gap(NamedTuple):
 def cause(
     gap: Gap, reads: list[Read], data: bytes | bytearray, start: int, end: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause between ``start`` and ``end``, if these bytes are a frame.
+    """Return the cause of ``gap``, a pause within ``data[start:end]``, if these bytes are a frame.
 
-    ``reads``: all reads since the pause, from the one that ended it. The reader was late
+    ``reads``: all reads since the pause, from the one that ended it; ``byte_s``: time in s that the
+    line takes for a byte. The reader was late
 
-    * if anything that follows is on time again. If all of it came at the pace of the line, the
-      reader may have been prompt and the frame may begin in the middle of another: then the next
-      frame decides;
-    * if bytes came faster than the line can send them, because they had waited;
-    * if the frame is a text or a text follows it, because a paused board is not due to send frames.
+    * if any later bytes are on time again. But if all bytes so far came at the pace of the line,
+      the reader may have been prompt, and ``start`` may be in the middle of another frame: then the
+      next frame decides;
+    * if bytes came faster than the line can send them, because they had waited to be read;
+    * if the frame is a text or a text follows it, because a paused board does not send frames in
+      ticks;
+    * if nothing has proved an idle line after ``MOST_BYTES``.
 
-    The line was idle if a text begins at the pause, if the bytes after the frame do not begin one,
-    or if ticks that were read one by one are equally late.
+    The line was idle if a text begins at the pause, if the bytes after the frame do not begin
+    another frame, or if ticks that were read one by one are equally late. UNDECIDED means that more
+    bytes are needed.
     """
     if is_text(data, start):
         return Cause.LATE_READER
@@ -152,10 +162,11 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of the pause, decided by the frame that begins at ``start``.
+    """Return the cause of a pause by the frame after it, which begins at ``start``.
 
-    The line was idle if that frame is split by a pause too, whole ticks after the first one. The
-    reader was late if it is in one piece. ``first``: the read that ended the first pause.
+    The line was idle if that frame has a pause too, which ended whole ticks after the first pause.
+    The reader was late if that frame has another pause or none. ``first``: the read that ended the
+    first pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

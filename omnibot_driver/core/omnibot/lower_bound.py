@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A lower bound for the cost of the remaining bytes, by their headers alone.
+"""A lower bound for the cost of interpreting the remaining bytes, found from headers alone.
 
-From a header, frames without damage lead to a place where none begins. Each damage leads on by at
-most ``REACH`` bytes and costs at least ``DAMAGE``; a bad run costs more per byte. So the least
-number of damages up to the end of a stretch is known before any content is weighed. This module
-knows the shapes of frames and the lowest prices; ``trellis`` knows what is searched.
+Undamaged frames follow one another from a header up to a place where no frame begins. From there, a
+damaged frame covers at most ``REACH`` bytes and costs at least ``DAMAGE``; a run of unexplained
+bytes (a bad run) costs more per byte. So the least number of damaged frames up to the end of a
+stretch is known before any content is judged. This module knows the shapes of frames and the lowest
+prices; ``trellis`` knows what is searched.
 """
 
 import re
@@ -16,17 +17,18 @@ from omnibot_driver.core.omnibot.frames import INCOMPLETE, NO_FRAME, measure
 
 DAMAGE: Final = ONE_BYTE
 REACH: Final = 15 + 2
-"""Length in bytes of the longest frame with two bytes added."""
+"""Most bytes that one damaged frame covers: the longest frame, with two bytes added."""
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""Costs of the last bytes of a bad run, where they are less than another damage."""
+"""Costs of the last bytes of a run of unexplained bytes, as far as they are below ``DAMAGE``."""
 
 
 def least_costs(data: bytes) -> list[float]:
-    """Return, for each node of the trellis, the least cost from there to the end of ``data``.
+    """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    It holds while more bytes may follow. Along an edge it falls by at most the edge's price.
+    The result is valid while more bytes may follow. Along an edge of the graph, the least cost
+    decreases by at most the price of the edge.
     """
     size = len(data)
     ends = _undamaged(data)
@@ -53,9 +55,9 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return the end of the chain of complete frames that begins at each place.
+    """Return, for each place where a frame may begin, the end of the chain of frames from there.
 
-    Keys are places of first bytes, the last one first.
+    All frames of a chain are undamaged. Keys are positions in ``data``, in descending order.
     """
     size = len(data)
     ends: dict[int, int] = {}

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Checks for settings that contradict the board's data: reported to the user, never changed.
+"""Checks for settings that the board's data contradicts. The user is advised to change them.
 
-They find poses that make sense only in the other byte order, deltas that lead to the next pose only
-in the other frame, and deltas that come at another rate. This module knows what the data means
-under each setting; it does not know how the user is informed.
+The checks find poses that make sense only in the other byte order, deltas whose sum leads to the
+next pose only in the other frame (earth or body), and deltas at another rate than set. This module
+knows what the data means under each setting; it does not know how the user is informed.
 """
 
 import math
@@ -18,22 +18,30 @@ from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL,
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
-"""Number of poses against a setting, without one in its favour, that prove it wrong: 2 s."""
+"""Number of poses that prove a setting wrong: they contradict it, and none confirms it.
+
+The board sends this number of poses in 2 s.
+"""
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""Limits of a coordinate in mm or mrad that is not 0; beyond them, bytes were misread."""
+"""Limits of the size of a coordinate in mm or mrad, unless the coordinate is 0.
+
+A value outside the limits was misread from bytes in another order.
+"""
 POSE_PERIODS: Final = 2
-"""Longest time between two poses that are compared, one lost pose between them included."""
+"""Longest time between two poses that are compared, in periods of the poses; one may be lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""Least distance in m from the pose, and its least ratio to the distance with the other frame.
+"""Limits above which a pose contradicts the set frame of the deltas.
 
-Beyond both, a pose speaks against the frame of the deltas.
+The deltas since the last pose are added to that pose, in the set frame and in the other frame.
+``CLEARLY_M`` limits the distance in m between the new pose and the sum in the set frame. ``TIMES``
+limits the ratio of this distance to the distance in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Least number, and least duration in s, of deltas in a row at an unexpected rate."""
+"""Least number, and least duration in s, of deltas in a row that prove another rate than set."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
@@ -41,9 +49,9 @@ _OTHER_FRAME: Final[dict[str, Literal["earth", "body"]]] = {"earth": "body", "bo
 
 
 class MisconfigurationChecks:
-    """Compares readings with the settings that were used to read them.
+    """Checks whether readings contradict the settings with which they were decoded.
 
-    ``advice``: a sentence for the user; None without a contradiction.
+    ``advice``: a sentence for the user; None until a setting is contradicted.
     """
 
     def __init__(self, schedule: Schedule = USUAL) -> None:
@@ -57,7 +65,10 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Check the frame of a delta; ``reading``: the delta as the settings interpret it."""
+        """Store a delta, so that the next pose can check the frame of the deltas.
+
+        ``reading``: the delta as the settings interpret it.
+        """
         self._moved.append(reading)
         unbroken = not (reading.lost or reading.restarted or reading.duration_s is None)
         if not unbroken or len(self._moved) > self._most_deltas:
@@ -66,10 +77,10 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """Check the rate of deltas, with a delta that arrived at ``now`` in s.
+        """Check the rate of the deltas, with a delta that arrived at ``now`` in s.
 
-        ``imus``: number of IMU frames since the delta before it, of which some may be lost. They
-        show the period; arrival times confirm it.
+        ``imus``: number of IMU frames received since the delta before. This number shows the
+        period. Some IMU frames may be lost, so arrival times must confirm the period.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:
@@ -91,7 +102,10 @@ class MisconfigurationChecks:
             )
 
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
-        """Check byte order and frame with a pose; ``reading``: as the settings interpret it."""
+        """Check the byte order of the poses, and the frame of the deltas, with a new pose.
+
+        ``order``: the set byte order; ``reading``: the pose as the settings interpret it.
+        """
         values = (frame.x, frame.y, frame.theta)
         makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))
         if makes_sense != swapped:

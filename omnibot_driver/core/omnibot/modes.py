@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's modes as a table: what S, P, R and the board's data do in each of them.
+"""The board's modes as a table: how the letters S, P and R and the board's data change the mode.
 
 Source: the manual's "Operation State Machine" and "System state command". The board does not report
 its mode, so the driver infers it from the data that it *receives*. A letter that was sent proves
-nothing: the board may have missed it. After R the mode is unknown. P toggles, so it is allowed only
-where the outcome is known.
+nothing: the board may have missed it. After R the mode is unknown. P toggles between paused and
+running, so P is allowed only while the board is known to run.
 """
 
 from enum import Enum
@@ -40,7 +40,7 @@ TRANSITIONS: Final[dict[Happening, dict[Mode, Mode]]] = {
     Happening.SENT_PAUSE: {_N: _N, _I: _I},
     Happening.SENT_RESET: {_U: _U, _P: _U, _N: _U, _I: _U},
 }
-"""Mode after an event, by the event and the mode before; an event without an entry is refused."""
+"""Mode after an event, by event and mode before; if an entry is missing, the event is refused."""
 
 
 class ModeTracker:
@@ -65,7 +65,7 @@ class ModeTracker:
         self.imus_to_come = self._imus_alone
 
     def hear(self, frame: Frame) -> None:
-        """Apply what this frame shows about the mode."""
+        """Update the mode by what a received frame shows."""
         if isinstance(frame, ImuFrame):
             self.hear_imus(1)
         elif isinstance(frame, PausedFrame):
@@ -76,7 +76,7 @@ class ModeTracker:
             self.apply(Happening.HEARD_MOTION)
 
     def hear_imus(self, count: int) -> None:
-        """Apply ``count`` IMU frames in a row, at most ``imus_to_come``."""
+        """Update the mode by ``count`` IMU frames in a row, at most ``imus_to_come``."""
         self.imus_to_come -= count
         if not self.imus_to_come:
             self.apply(Happening.HEARD_IMU_ALONE)

@@ -5,9 +5,9 @@
 The frames are the manual's. This module decides which bytes precede them, and which of two
 neighbouring values a word takes. It knows bytes; it does not know what is commanded, nor when.
 
-The argument. A control frame has no checksum, and the board's parser is unknown. The worst one
-counts seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that parser
-takes the missing one from whatever comes next.
+The reasons: a control frame has no checksum, and the board's parser is unknown. The worst possible
+parser counts seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that
+parser completes the frame with the next byte that is sent.
 
 1. *Zeros precede everything.* A zero is neither a letter nor a header, and seven of them end any
    frame that was begun. So a Stop, an emergency stop or a letter that was cut is completed by
@@ -17,14 +17,14 @@ takes the missing one from whatever comes next.
    more bytes of its payload could swallow the header behind them, and that frame commands motion as
    well.
 2. *Nothing follows a motion frame.* A motion frame that was cut has no effect until the next
-   transmission. There the zeros complete it, and the frame behind them replaces it 12 bytes (1.0 ms
-   at 115200 baud) later. Zeros right behind a motion frame would complete it at once, and it would
-   be in force until the next repetition; even a parser that discards a cut frame after a pause
-   would then accept it.
-3. *A payload is harmless by itself.* If its own header is lost, a parser looks for letters and
-   headers in the payload. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never
-   follows ``FF``: the word takes the nearest value without them. It is one LSB away, unless the
-   high byte is the letter.
+   transmission. Its zeros complete the cut frame, and the next frame replaces that one 12 bytes
+   (1.0 ms at 115200 baud) later. Zeros right behind a motion frame would complete a cut one at
+   once, which would then be in force until the next repetition; even a parser that discards a cut
+   frame after a pause would then accept it.
+3. *A payload without its header is harmless.* If the header is lost, a parser looks for letters
+   and headers in the payload. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never
+   follows ``FF``: each word takes the nearest value for which this holds. That value is one LSB
+   away, unless the high byte of the word is a letter.
 4. *What is lost is sent again*: everything here is repeated, or confirmed by the board's data.
 
 What remains: an added or changed byte within a frame can make it another valid frame, until the
@@ -48,7 +48,7 @@ MAX_WORD: Final = 32767
 ZEROS: Final = bytes(8)
 """Zeros before a frame or letter: seven end a begun frame, one may be lost; three wake a board."""
 ZEROS_BEFORE_MOTION: Final = bytes(4)
-"""Zeros before a motion frame; few, so that it soon replaces one that lost a byte."""
+"""Zeros before a motion frame: few, so that the frame soon replaces a damaged one before it."""
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET
 _HARMFUL: Final = re.compile(b"[%s]|%s" % (_LETTERS, re.escape(COMMAND_HEADER))).search
@@ -62,7 +62,10 @@ def transmission(*parts: bytes) -> bytes:
 
 
 def harmless(counts: tuple[float, float, float]) -> Words:
-    """Return the nearest words, up to ``MAX_WORD``, whose bytes hold neither letter nor header."""
+    """Return the words nearest to ``counts`` whose bytes contain neither a letter nor a header.
+
+    Letters are S, P and R. The words are ``MAX_WORD`` at most, of either sign.
+    """
     a, b, c = counts
     words = nearest(a, b, c)
     if not _HARMFUL(_WORDS(*words)):
@@ -73,7 +76,7 @@ def harmless(counts: tuple[float, float, float]) -> Words:
 
 
 def nearest(a: float, b: float, c: float) -> Words:
-    """Return the nearest integers; halves are rounded away from zero, alike for both signs."""
+    """Return the nearest integers; halves are rounded away from zero."""
     return (
         int(a + 0.5 if a > 0.0 else a - 0.5),
         int(b + 0.5 if b > 0.0 else b - 0.5),
@@ -82,12 +85,15 @@ def nearest(a: float, b: float, c: float) -> Words:
 
 
 def begins_with_a_letter(word: int) -> bool:
-    """Return whether the high byte is a letter, which neighbouring values do not avoid."""
+    """Return whether the high byte of ``word`` is S, P or R.
+
+    Neighbouring values have the same high byte, so they do not avoid the letter.
+    """
     return word >> 8 & 0xFF in _LETTERS
 
 
 def _harmless_word(count: float, word: int, follows: int) -> int:
-    """Return the harmless word that is nearest to ``count``.
+    """Return the word nearest to ``count`` whose bytes contain neither a letter nor a header.
 
     ``word``: the nearest integer to ``count``; ``follows``: the byte after the word.
     """

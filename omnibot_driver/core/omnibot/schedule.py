@@ -12,16 +12,16 @@ from typing import Final
 from omnibot_driver.core.board import RateName
 
 TICK_S: Final = 0.01
-"""Period of the board's control loop in s; the board sends an IMU frame in each."""
+"""Period of the board's control loop in s; the board sends one IMU frame in each period."""
 POSE_PERIOD_S: Final = 0.2
 DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
-"""Possible periods of the deltas in s: whole ticks, and a whole number of periods per pose."""
+"""Possible periods of the deltas in s: multiples of a tick that divide the period of the poses."""
 DELTAS_MISSING: Final = 6
 """Number of missing deltas after which the board is in IMU-only mode."""
 FEWEST_ALONE: Final = 25
 """Least number of IMU frames without a delta that show IMU-only mode.
 
-It holds even if the board sends deltas less often than the setting says.
+This number is enough even if the board sends deltas less often than the setting says.
 """
 
 _IMU_BYTES_PER_S: Final = 1400

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's counters: the number of missing deltas, and whether counting began anew.
+"""The counters of the board's deltas and poses: missing deltas, and whether the board restarted.
 
-SEQ is one byte and wraps every 10.24 s at 25 Hz; arrival times show how often it wrapped. A pose
-comes with every fifth delta (every second one at 10 Hz) and has a counter of its own, so it can
-reveal losses before the next delta does. This module does not know what a frame contains.
+SEQ, the counter of the deltas, is one byte and wraps every 10.24 s at 25 Hz; arrival times show how
+often it wrapped. A pose comes with every fifth delta (every second one at 10 Hz) and has a counter
+of its own, so a pose can reveal losses before the next delta does. This module does not know what a
+frame contains.
 """
 
 from typing import Final
@@ -15,24 +16,24 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Largest difference in s between arrival time and the board's count without a restart.
+"""Largest difference in s between the elapsed time and the deltas' count, without a restart.
 
-If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, times are 0.24 s wrong. The
-limit is twice as much.
+If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, arrival times are wrong by
+0.24 s. The limit is about twice this error.
 """
 EARLY_S: Final = 0.2
-"""Time in s by which a count from zero may be ahead of the time since the last delta.
+"""Time in s by which a count from zero may exceed the time since the last delta.
 
-That delta may have been reported late. A restart takes longer.
+The last delta may have been read late. A restart of the board takes longer than this.
 """
 
 
 @value(frozen=True, slots=True)
 class Step:
-    """The step to a new count of a delta or a pose.
+    """What the counter of a new delta or pose shows, compared with the counter before.
 
-    ``lost``: number of missing deltas that were not reported before; ``duration_s``: time that the
-    delta covers in s, None where it is unknown; ``restarted``: the counter seems to begin anew,
+    ``lost``: number of missing deltas that were not reported before; ``duration_s``: time in s that
+    the delta covers, None if unknown; ``restarted``: the counter seems to have restarted from zero,
     which only the board's pose can prove.
     """
 
@@ -54,29 +55,29 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Whether the expected number of deltas per pose was seen; only then can one be missing."""
+        """Whether a pose once followed the expected number of deltas; only then it shows losses."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
-        """The last count if it was ahead of the time, else None.
+        """The last delta's count if it was too high for the elapsed time, else None.
 
-        The time is trusted until the next delta continues that count: a bit may be flipped, or the
-        frame may be false.
+        Until the next delta continues that count, the elapsed time is trusted instead: a bit may be
+        flipped, or the frame may be false.
         """
         self._left: tuple[int, float, int] | None = None
-        """The count before a supposed restart, its time in s, and the first count after it."""
+        """Before a supposed restart: the last count and its time in s; then the first new count."""
 
     def pause(self) -> None:
-        """Note a pause: the next count continues the old one, or restarts."""
+        """Note that the board paused: its next count continues the old one, or restarts."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:
-        """Begin a new connection."""
+        """Begin a new connection: the board may have restarted in the meantime."""
         self._reconnected, self._pose = True, None
 
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
-        """Return the step to a delta with this count, which arrived at ``now`` in s.
+        """Return what the counter of a delta that arrived at ``now`` in s shows about losses.
 
-        ``imus``: number of IMU frames since the delta before it.
+        ``count``: the counter; ``imus``: number of IMU frames since the delta before.
         """
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose
@@ -114,7 +115,10 @@ class Sequence:
         return Step(lost, period_s)
 
     def pose(self, count: int, now: float) -> Step:
-        """Return the step to a pose with this count: the missing deltas that the pose includes."""
+        """Return what the counter of a pose that arrived at ``now`` in s shows about losses.
+
+        ``lost`` of the result: number of missing deltas whose motion the pose includes.
+        """
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
         if before is None or self._delta is None:
@@ -134,7 +138,7 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a supposed restart if this count continues the one before it."""
+        """Withdraw a supposed restart if ``count`` continues the count from before the restart."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The settings that only the user of an OmniBot board knows, as its data does not show them."""
+"""The settings of an OmniBot board that only its user knows, as its data does not show them."""
 
 from dataclasses import dataclass, field
 from typing import Literal

@@ -1,14 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The fast path for the most frequent read: one IMU frame by itself, from bytes to reading.
+"""The fast path for the most frequent read: exactly one IMU frame, from bytes to reading.
 
-It replaces decoder and translation for a read in which neither has anything to decide. Its results,
-and the state that it leaves, are theirs: a test compares the two paths. It accepts only a calm IMU
-frame at the time when one is due.
+This path replaces the decoder and the translation for such a read. Its readings, and the state
+afterwards, are the same as theirs: a test compares the two paths. An IMU frame is accepted only
+when one is due, and only if its values are calm: the acceleration is plausible, and all words are
+close to those of the frame before.
 
-An adapter may deliver the frame in pieces. They are kept until the last one arrives, and are then
-decoded as one frame. If anything but the rest of this frame follows, the decoder gets each piece
-with its own arrival time.
+An adapter may deliver the frame in pieces. The pieces are kept until the last one arrives, and are
+then decoded as one frame. If the bytes that follow are not the rest of this frame, the decoder gets
+each piece with the arrival time of that piece.
 """
 
 import struct
@@ -34,9 +35,10 @@ Piece = tuple[bytes, float]
 def is_begun(
     pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
 ) -> bool:
-    """Return whether ``data``, after the pieces, continues but does not complete a due IMU frame.
+    """Return whether the pieces and ``data`` together are a due IMU frame that is still incomplete.
 
-    False if ``GAP_S`` or more has passed since the first piece, because such a pause is evidence.
+    False if ``GAP_S`` or more has passed since the first piece: the decoder must judge such a
+    pause.
     """
     if pieces:
         data = joined(pieces) + data
@@ -51,7 +53,7 @@ def is_begun(
 
 
 def joined(pieces: list[Piece]) -> bytes:
-    """Return the bytes of all pieces."""
+    """Return the bytes of all pieces, joined in their order."""
     return b"".join([piece for piece, _ in pieces])
 
 
@@ -60,8 +62,8 @@ def take_pieces(
 ) -> ImuReading | None:
     """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
 
-    None, with nothing changed, in the cases of ``take_single``, and if the last byte may belong to
-    the next header: another frame may follow at once, or bytes were lost lately.
+    Return None and change nothing if the first piece is ``GAP_S`` old, if ``take_single`` rejects
+    the frame, or if the last byte may belong to the next header because bytes were lost.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
@@ -87,13 +89,14 @@ def take_single(
     *,
     first: int = IMU_LENGTH,
 ) -> ImuReading | None:
-    """Return the reading of these bytes if they are one calm IMU frame and one was due.
+    """Return the reading of ``data`` if it is one calm IMU frame that was due.
 
-    None, with nothing changed, in all other cases. A calm frame differs little from the one before
-    it. Its last byte is taken as its own: it arrived as a whole, or ``take_pieces`` has checked
-    that.
+    Return None and change nothing in all other cases. A calm frame differs little from the IMU
+    frame before it. The last byte is assumed to belong to this frame and not to the next header:
+    either all bytes came in one read, or ``take_pieces`` has checked the last byte.
 
-    ``now``: arrival time of its first bytes in s; ``first``: number of bytes that arrived then.
+    ``now``: arrival time of the first bytes in s; ``first``: number of bytes that arrived at
+    ``now``.
     """
     pause_s = now - decoder.last_arrival_s
     if (

@@ -62,14 +62,15 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """Number of such frames that are left, and their number at the start."""
+        """Number of IMU frames that ``single_imu`` may still take, and its initial value."""
         self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
         """Return the readings of the frames that one read brought.
 
-        ``skipped``: for each frame, the number of bytes before it that were not a frame. The bytes
-        of one read did not arrive all at once, so each frame is given an arrival time of its own.
+        ``skipped``: for each frame, the number of bytes before it that were not a frame; ``now``:
+        time of the read in s. The bytes of one read did not arrive all at once, so the arrival time
+        of each frame is estimated.
         """
         self._catch_up()
         before_s, self.heard_s = self.heard_s, now
@@ -85,7 +86,7 @@ class Translation:
         return readings
 
     def apply(self, happening: Happening) -> None:
-        """Apply an event to the mode. Raises RequestRefused, and then the mode does not change."""
+        """Apply an event to the mode. Raises RequestRefused if it is not allowed in the mode."""
         self._catch_up()
         self.modes.apply(happening)
 
@@ -152,7 +153,7 @@ class Translation:
         return displacement
 
     def _rolled(self, counts: Words) -> Vector3:
-        """Return the displacement (m, m, rad) by wheel counts (manual, "Odometry equation")."""
+        """Return the displacement (m, m, rad) from wheel counts (manual, "Odometry equation")."""
         settings = self.settings
         a, b, c = (count * math.tau / settings.counts_per_revolution for count in counts)
         wheels = OmniKinematics(settings.wheel_radius_m, settings.base_radius_m)

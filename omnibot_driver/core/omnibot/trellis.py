@@ -1,18 +1,20 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The search among all interpretations of a stretch of bytes: the cheapest, and what is sure.
+"""The search for the cheapest interpretation of a stretch of bytes, and for its sure frames.
 
-Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run. Edges
-are complete frames, damaged ones, and bad bytes. A shortest path is the best interpretation. A
-frame on it is sure if every path that interprets its first byte in another way costs more by at
-least ``SURE``. This module knows the shapes that a line gives to frames; prices are in
-``cost_model``. Work and memory are proportional to the length of the stretch.
+The search is for a shortest path in a graph. Each place between two bytes has two nodes: one as a
+boundary of frames, one within a run of unexplained bytes (a bad run). Edges are complete frames,
+damaged frames and unexplained bytes, with prices from ``cost_model``. A shortest path is the best
+interpretation. A frame on it is sure if every path that interprets the first byte of the frame in
+another way costs more by at least ``SURE``. This module knows how a line damages the shapes of
+frames. Work and memory are proportional to the length of the stretch.
 
-The context of a node (for the price of content) is that of the cheapest path to it.
+The price of content depends on the context: what the frames before show. The context of a node is
+that of the cheapest path to the node.
 
 Most edges are on no path that is nearly as cheap as the best. So the search omits edges whose total
-cost would exceed a limit even if the rest cost as little as it can (``lower_bound``), and raises
-the limit until nothing that matters exceeds it. The result is that of searching everything.
+cost would exceed a limit even if the remaining bytes cost as little as possible (``lower_bound``).
+The limit is raised until no omitted edge can change the result, which is that of a complete search.
 """
 
 from bisect import bisect_left
@@ -33,11 +35,14 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""Least extra cost of all alternatives to a sure frame: they are 30 times less likely."""
+"""Least extra cost of every alternative to a sure frame: each is 30 times less likely."""
 STEP: Final = 5.5
-"""First distance of the limit from the lower bound; it is doubled until a path is found."""
+"""First margin of the cost limit above the lower bound; increased until a path is found."""
 BEYOND: Final = 0.025
-"""Half the grid of the prices: no sum equals the limit, so rounding decides nothing."""
+"""Half the grid of the prices, added to the cost limit.
+
+So a sum of prices never equals the limit, and rounding errors decide nothing.
+"""
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
 _HEADERS: Final = tuple(bytes((0xFF, kind)) for kind in _LENGTHS)
@@ -71,9 +76,9 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 
 @value(frozen=True, slots=True)
 class Segment:
-    """A complete frame of the best interpretation.
+    """A complete frame of the best interpretation, with the contexts before and after it.
 
-    ``sure``: every other interpretation of its bytes costs clearly more.
+    ``sure``: every other interpretation of the frame's first byte costs clearly more.
     """
 
     start: int
@@ -131,7 +136,7 @@ class _Search:
         self._contexts: dict[int, Context]
 
     def run(self, in_step: bool, closed: bool) -> None:
-        """Find the best interpretation, and all that are nearly as cheap."""
+        """Find the best interpretation, and all others that cost at most ``SURE`` more."""
         self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
         step = STEP
         limit = self._least[1] + step + BEYOND
@@ -188,7 +193,7 @@ class _Search:
                 self._edge(node, self._end, price)
 
     def _undamaged(self, at: int, closed: bool) -> None:
-        """Add an edge for the complete frame or text that begins here."""
+        """Add an edge for the undamaged frame or text that begins with the byte at ``at``."""
         data, node = self._data, 2 * at + 1
         length = measure(data, at)
         if length == INCOMPLETE:
@@ -201,7 +206,7 @@ class _Search:
         self._edge(node, 2 * end + 1, price + self._idle_within(at, end), frame, after)
 
     def _damaged(self, at: int, closed: bool) -> None:
-        """Add edges for a frame that may have begun here before the line damaged it."""
+        """Add edges for each damaged frame that may begin with the byte at ``at``."""
         data, size, node = self._data, len(self._data), 2 * at + 1
         spare = self._limit - self._cost[node]
         first = data[at]
@@ -227,7 +232,7 @@ class _Search:
                 self._edge(node, 2 * end + 1, price + self._idle_within(at, end))
 
     def _open(self, at: int, price: float) -> None:
-        """Add an edge for a frame, complete or damaged, whose end has not arrived yet."""
+        """Add an edge for a frame from ``at``, damaged or not, whose end has not arrived yet."""
         self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
 
     def _idle_within(self, start: int, end: int) -> float:
@@ -251,7 +256,7 @@ class _Search:
         self._edges.append(edge)
 
     def _context(self, node: int) -> Context:
-        """Return the context on the cheapest path to this node; after damage it holds little."""
+        """Return the context on the cheapest path to ``node``; mostly unknown after damage."""
         found, damaged, at = self._contexts.get(node), False, node
         while found is None:
             edge = self._by[at]
@@ -264,7 +269,7 @@ class _Search:
         return found
 
     def pieces(self) -> list[Segment]:
-        """Return the frames of the best path, after pricing the best path through every edge."""
+        """Return the complete frames on the shortest path, each with whether it is sure."""
         cost = self._cost
         path: list[_Edge] = []
         edge = self._by[self._end]

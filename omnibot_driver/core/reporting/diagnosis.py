@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The diagnosis: verdicts from figures, each with what an operator should know and do.
+"""The diagnosis: a status for each part of the driver, with what an operator should do.
 
 Levels are those of diagnostic_msgs. ERROR: the robot cannot be used, or must not be. WARN: it can
 be used, but something should be checked. STALE: nothing can be concluded. This module knows figures
-and times; it does not know where they come from.
+and times; it does not know how they are obtained.
 """
 
 import math
@@ -20,20 +20,20 @@ from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
-"""Mean delay in s above which reads are late: half the period of a timer of 10 ms."""
+"""Mean delay in s above which reads are reported as late: half the period of a 10 ms timer."""
 LARGEST_SKEW_PPM: Final = 115.0
-"""Clock skew in ppm that two crystals do not exceed."""
+"""Largest difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0
-"""Time in s for which an arrival affects the skew.
+"""Time in s for which the arrival time of a reading affects the estimated clock skew.
 
-A skew that lasts less may come from a computer that was busy.
+A skew that lasts less may be due to a busy computer, so it is not reported.
 """
 
 BUSY_SHARE: Final = 0.1
-"""Share of the time waiting for the processor above which the computer is too busy."""
+"""Share of time that the reader waits for the processor, above which the computer is too busy."""
 
 PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
-"""Label of the published rate, which the board's settings give; its readings have another rate."""
+"""Label of the rate at which odometry is published, as opposed to the rate of its readings."""
 OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "IMU": ("IMU frames lost", "IMU readings refused"),
     "Odometry": ("Odometry frames lost", "Odometry readings refused"),
@@ -51,9 +51,9 @@ class Refusals:
 
 
 class Diagnosis:
-    """The judge of one board, called about once a second; it remembers the recent figures.
+    """The diagnosis of one board, made about once a second from recent figures.
 
-    ``to_check``: what to check on a board whose data is not understood.
+    ``to_check``: text that names what to check if no valid data comes from the board.
     """
 
     def __init__(self, to_check: str) -> None:
@@ -64,7 +64,7 @@ class Diagnosis:
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
     ) -> list[Status]:
-        """Return all verdicts; for one board always with the same names in the same order."""
+        """Return the diagnostic statuses; one board's always have the same names and order."""
         self._recent.remember(session, now)
         statuses = [
             self._link(link, now),

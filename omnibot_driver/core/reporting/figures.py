@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The figures of the link and the board at one moment: values only."""
+"""The figures for diagnostics of the link, the board and the commands: values only."""
 
 from dataclasses import dataclass
 
@@ -15,9 +15,9 @@ class LinkFigures:
     """The figures of the link to the board.
 
     ``trouble``: why the port is not open, in a sentence; empty while it is open; ``opened``: how
-    often it was opened; ``overruns``: how often the kernel has lost bytes since it was last opened;
-    ``waited_s``: how long the reader was ready to run but did not. The last two are None where they
-    are not counted.
+    often the port was opened; ``overruns``: how often the kernel has lost bytes since the port was
+    last opened; ``waited_s``: time in s that the reader has waited for the processor. ``overruns``
+    and ``waited_s`` are None where they are not counted.
     """
 
     port: str
@@ -33,10 +33,10 @@ class LinkFigures:
 class CommandFigures:
     """The figures of the commands.
 
-    ``source``: the topic that commands, or None; ``age_s``: age of its last command; ``monitored``:
-    whether a robot that does not move as commanded is stopped; ``trips``: how often the motion
-    monitor has stopped the robot; ``interlock``: the condition until which motion is refused, in a
-    sentence; empty while motion is allowed.
+    ``source``: the topic in control, or None; ``age_s``: age of its last command; ``monitored``:
+    whether the motion monitor stops a robot that does not move as commanded; ``trips``:
+    how often the motion monitor has stopped the robot; ``interlock``: the condition until which
+    motion is refused, in a sentence; empty while motion is allowed.
     """
 
     source: str | None = None
@@ -52,7 +52,7 @@ class CommandFigures:
 class ImuFigures:
     """The figures of the IMU.
 
-    ``gravity_mps2`` and ``noise_radps`` are of the last standstill, and None before the first;
+    ``gravity_mps2`` and ``noise_radps`` were measured at the last standstill; None before it;
     ``advice``: which parameter contradicts the measured gravity, in a sentence.
     """
 
@@ -66,8 +66,8 @@ class ImuFigures:
 class SessionFigures:
     """The figures of the board, its readings and its commands.
 
-    ``skew_ppm``: how much faster the board's clock runs than the host's; ``task``: a task that
-    takes the board long, and since when; empty without one.
+    ``skew_ppm``: how much faster the board's clock runs than the host's; ``task``: a long
+    task of the board and its start, as text; empty without such a task.
     """
 
     state: str

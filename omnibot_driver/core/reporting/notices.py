@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Notices about the stream, each with what to do: given once, or at a limited rate.
+"""Notices about lost data, unconfirmed stops and silence, each with a remedy.
 
-This module knows counts, times and texts; it does not know where they come from.
+A notice is given once, or at a limited rate. This module knows counts, times and texts only.
 """
 
 import math
@@ -12,7 +12,7 @@ from omnibot_driver.core.board import Mode
 from omnibot_driver.core.measurement.outlier_filter import Refused
 
 NEWS_S: Final = 10.0
-"""Shortest time in s between two notices of a counter."""
+"""Shortest time in s between two notices about the same counter."""
 HEADING_ASSUMED: Final = (
     "no valid pose from the board; the driver assumes that its heading was 0 at first"
 )
@@ -44,7 +44,7 @@ class ThrottledNotice:
         self._told_at = -math.inf
 
     def since_told(self, count: int, now: float) -> int:
-        """Return the growth since the last report; 0 if that was less than NEWS_S ago."""
+        """Return the growth since the last report; 0 if that report is less than NEWS_S old."""
         if count == self._told or now - self._told_at < NEWS_S:
             return 0
         new, self._told, self._told_at = count - self._told, count, now
@@ -52,7 +52,7 @@ class ThrottledNotice:
 
 
 class Notices:
-    """The notices that are due."""
+    """The choice of notices to give, by what was given before."""
 
     def __init__(self) -> None:
         self._lost, self._refused = ThrottledNotice(), ThrottledNotice()
@@ -61,9 +61,9 @@ class Notices:
         self._standing = ""
 
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
-        """Return notices of the losses and rejections since the last ones.
+        """Return notices of the losses and rejections since the last notices of them.
 
-        ``overruns``: number of overruns of the port.
+        ``lost``: lost odometry frames so far; ``overruns``: overruns of the serial port so far.
         """
         news = []
         if more := self._lost.since_told(lost, now):
@@ -84,16 +84,17 @@ class Notices:
         return news
 
     def once(self, sentence: str) -> list[str]:
-        """The notice as a list, empty if it was given before."""
+        """Return the sentence as a list; an empty list if it was given before."""
         if sentence in self._told:
             return []
         self._told.add(sentence)
         return [sentence]
 
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
-        """Return the notice that no standstill was seen while Stop was repeated for its full time.
+        """Return the notice that no standstill was measured although Stop was repeated long enough.
 
-        ``measured``: displacements came meanwhile; ``blind``: the board has no way to show it.
+        ``measured``: whether displacements came meanwhile; ``blind``: whether the board does not
+        measure its wheels after such a command.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)
@@ -113,7 +114,10 @@ class Notices:
 
 
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
-    """Return why no data was understood for this time in s, and what to do."""
+    """Return a sentence that no valid data came for ``silence_s``, with what to check.
+
+    ``bytes_came``: whether invalid bytes came; ``baudrate``: whether the port has a baud rate.
+    """
     if bytes_came:
         return (
             f"no valid data for {silence_s:g} s; check"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The recent figures on which the verdicts rest: those of the last ten seconds."""
+"""The figures of the last ten seconds, from which the diagnosis is made."""
 
 import math
 from collections import deque
@@ -10,11 +10,11 @@ from omnibot_driver.core.board import RateName
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 
 RECENT_S: Final = 10.0
-"""Time in s for which an event is shown."""
+"""Time in s for which figures are kept and an event is reported."""
 
 
 class RecentFigures:
-    """The recent figures of the present state; updated about once a second."""
+    """The figures since the session's state last changed, for at most RECENT_S."""
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, float]] = {}
@@ -22,7 +22,7 @@ class RecentFigures:
         self._waits: deque[tuple[float, float]] = deque()
 
     def remember(self, session: SessionFigures, now: float) -> None:
-        """Add the figures, and forget those of another state."""
+        """Add the figures; forget older figures if the session's state has changed."""
         if self._window and self._window[-1][1].state != session.state:
             self._window.clear()
         self._window.append((now, session))
@@ -30,7 +30,7 @@ class RecentFigures:
             self._window.popleft()
 
     def grew(self, name: str, count: int, now: float) -> bool:
-        """Return whether this count has grown recently."""
+        """Store the count of this name; return whether it has changed within RECENT_S."""
         before, at = self._counts.get(name, (count, -math.inf))
         if count != before:
             at = now
@@ -49,11 +49,11 @@ class RecentFigures:
 
     @property
     def span_s(self) -> float:
-        """Time in s from the first to the last figures of this state."""
+        """Time in s from the first to the last stored figures."""
         return self._window[-1][0] - self._window[0][0]
 
     def rates_hz(self) -> dict[RateName, float] | None:
-        """Return the rates of the readings in this state, in Hz, or None if it has just begun."""
+        """Return the recent rate of each kind of reading in Hz, or None in a new state."""
         if not self.span_s:
             return None
         old, new = self._window[0][1].tally, self._window[-1][1].tally
@@ -65,9 +65,9 @@ class RecentFigures:
         return {name: count / self.span_s for name, count in counts.items()}
 
     def delay_s(self) -> tuple[float, float] | None:
-        """Return mean and standard deviation of the reads' delay above the least one, in s.
+        """Return mean and standard deviation of the reads' delay above the smallest delay, in s.
 
-        It is None without recent reads.
+        Returns None without recent reads.
         """
         old, new = self._window[0][1].tally, self._window[-1][1].tally
         reads = new.reads - old.reads

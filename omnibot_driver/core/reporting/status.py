@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A verdict: a level, a sentence, and the figures behind it."""
+"""A diagnostic status: a level, a sentence, and the figures that it is based on."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """A diagnostic status: a verdict and its figures."""
+    """One diagnostic status: its name, level and message, and figures by label."""
 
     name: str
     level: Level

@@ -2,7 +2,7 @@
 
 """Arrival times as stamps, for boards whose readings carry no time and keep no regular tick.
 
-The class has the interface of the one in `device_clock.py`. It reads no clock.
+``ArrivalClock`` has the interface of ``DeviceClock``, and does not read a clock itself.
 """
 
 import math
@@ -12,13 +12,13 @@ from typing import Final
 from omnibot_driver.core.readings import ImuReading, Reading, SampleBoundary
 
 SMALLEST_STEP_S: Final = 1e-6
-"""Step in s between the stamps of two readings that came together."""
+"""Step in s between the stamps of two readings that one read brought."""
 
 
 class ArrivalClock:
     """Stamps readings with their arrival time, in increasing order.
 
-    A stamp is later than the arrival only if the stamp before it was not earlier than the arrival.
+    A stamp is later than its arrival time only if the stamp before it already reached that time.
     """
 
     skew_ppm = 0.0
@@ -32,7 +32,7 @@ class ArrivalClock:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the stamps of the readings in s, in their order, each later than the last."""
+        """Return the stamp of each reading in s, each later than the stamp before it."""
         stamps = []
         for left in range(len(readings) - 1, -1, -1):
             at_s = now - left * SMALLEST_STEP_S

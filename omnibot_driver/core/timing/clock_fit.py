@@ -35,25 +35,25 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept.
 
-An adapter's timer and the board's tick, within 100 ppm, beat against each other every 20 s.
+If an adapter's timer and the board's tick differ by 100 ppm, their phases recur every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
-"""Largest relative deviation of the board's crystal from the host's: 100 ppm, and a little."""
+"""Largest relative deviation of the board's crystal from the host's: 100 ppm, with a margin."""
 SUPPORT: Final = 0.75
-"""Part of the span of the points at which the line touches their hull.
+"""Place at which the line touches the hull of the points, as a fraction of their time span.
 
-Late enough to follow what was found out lately, early enough not to follow the last second's
-jitter.
+Late enough to follow recent points, early enough not to follow the jitter of the last second.
 """
 FEWEST_READS: Final = 12
-"""Least number of reads in a block that show which of them were late."""
+"""Least number of reads in a block that is enough to find out which of them were late."""
 LATE_PART: Final = 0.1
-"""Part of the reads that may be later than ``LATE_S``."""
+"""Fraction of the reads that may be late by more than ``LATE_S``, which is in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest part of a period between earliest and latest points whose middle is used.
+"""Largest distance of an earliest point below a latest one, as a fraction of a period.
 
-A 16 ms timer makes reads 2 ms apart, as seen from the tick.
+Points that are farther apart are not used together. Seen from the tick, the reads of an adapter
+with a 16 ms timer are 2 ms apart.
 """
 
 Point = tuple[int, float]
@@ -61,7 +61,7 @@ Point = tuple[int, float]
 
 
 class ClockFit:
-    """The line over the ticks from the first one seen on.
+    """The line that gives the time of each tick, from the first tick seen on.
 
     ``period_s``: the nominal period in s; ``slope_s``: the fitted one.
     """
@@ -82,7 +82,10 @@ class ClockFit:
         return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
 
     def see(self, latest: Point, *, cut: bool) -> None:
-        """Add a read whose newest tick, or (``cut``) a part of it, had arrived by ``latest``."""
+        """Add an upper bound: the newest tick of a read, and a time in s by which it had arrived.
+
+        ``cut``: the read ended within this tick's sample.
+        """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor
         if arrival < anchor_s + self.slope_s * (tick - anchor_tick):
@@ -95,7 +98,7 @@ class ClockFit:
             self._best, self._not_before, self._block_from = None, [], tick
 
     def not_before(self, earliest: Point) -> None:
-        """Add a read that had not brought the tick of this point by the time of this point."""
+        """Add a lower bound: a tick that a read did not bring, and the time of that read in s."""
         self._not_before.append(earliest)
 
     def _end_block(self, best: Point, cut: bool) -> None:
@@ -114,7 +117,7 @@ class ClockFit:
             self._lay_under()
 
     def _height(self, point: Point) -> float:
-        """Return the height in s of a point above the line of this slope through the origin."""
+        """Return the height in s of a point above the line with slope ``slope_s`` from (0, 0)."""
         return point[1] - self.slope_s * point[0]
 
     def _within_skew(self, slope_s: float) -> float:
@@ -122,7 +125,10 @@ class ClockFit:
         return min(max(slope_s, least), most)
 
     def _lay_between(self) -> bool:
-        """Lay the line amid all bounds; if they contradict, forget the earliest, return False."""
+        """Lay the line in the middle of all bounds and return True.
+
+        If the bounds contradict each other, forget the earliest points and return False.
+        """
         flattest, steepest = -math.inf, math.inf
         above = _hull([at for at, _ in self._latest])
         below = [(tick, -time) for tick, time in _hull([(t, -s) for t, s in self._earliest])]
@@ -143,7 +149,7 @@ class ClockFit:
         return True
 
     def _lay_under(self) -> None:
-        """Lay the line under the latest points, as high as it goes at ``SUPPORT`` of their span."""
+        """Lay the line along the lower hull of the latest points, at ``SUPPORT`` of their span."""
         cut = [at for at, was_cut in self._latest if was_cut]
         hull = _hull(cut or [at for at, _ in self._latest])
         middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])

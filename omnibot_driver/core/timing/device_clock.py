@@ -36,17 +36,18 @@ LARGEST_LOSS_TICKS: Final = 25
 If more are missing, everything known about the clock is forgotten.
 """
 BEAT_READS: Final = 12
-"""Number of reads of which at least one has little delay.
+"""Number of reads in a row of which at least one has little delay.
 
-The places at which a 16 ms adapter cuts the stream recur after five reads.
+With an adapter that delivers every 16 ms, the place in the stream where reads end recurs after five
+reads.
 """
 CALM: Final = 0.45
-"""Part of a period: two reads in a row this near the line are certain about their ticks.
+"""Largest distance of a read from the line, as a fraction of a period, at which its tick is sure.
 
-That needs less than half a period.
+Two reads in a row must be this near. The limit must be less than half a period.
 """
 LARGEST_RISE: Final = 0.02
-"""Largest part of a period that a stamp gains per tick to follow a line that has moved later."""
+"""Largest fraction of a period by which a stamp rises per tick, after the line moved later."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if even their arrivals leave no room."""
 
@@ -55,9 +56,9 @@ WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 
 
 class DeviceClock:
-    """Stamps readings by board time.
+    """Stamps readings with the times at which the board sampled them, estimated from arrivals.
 
-    ``period_s``: the nominal tick in s; one ImuReading comes in each.
+    ``period_s``: the nominal tick in s; the board sends one ImuReading in each tick.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -68,9 +69,9 @@ class DeviceClock:
         self.restart()
 
     def restart(self) -> None:
-        """Forget all ticks, because the board's next ones are unrelated to them.
+        """Forget all ticks, because the board's next ticks are unrelated to them.
 
-        Stamps still increase.
+        The stamps continue to increase.
         """
         self._stamped_tick: int | None = None
         self._displaced_tick: int | None = None
@@ -81,17 +82,20 @@ class DeviceClock:
         self._calm: ClockFit | None = None
         """The line if the last read was near it and cut no sample, else None."""
         self._single_reads = 0
-        """Number of last reads that brought one sample each, so none waited for another."""
+        """Number of reads in a row, up to the last one, that brought one sample each."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
-        Soon after a late tick come those that waited with it.
+        Ticks that are seen soon after a late tick had waited together with it.
         """
         self._awaited: Point | None = None
-        """The next tick, and a time in s by which it had not come, or at least was not read."""
+        """The tick after the newest, and a time in s by which no read had brought it."""
         self._cut_off: Point | None = None
-        """The lower bound by a cut sample; it holds if the read cut it and not a loss."""
+        """Lower bound for a tick whose sample the last read cut; None otherwise.
+
+        The bound holds if the rest of the sample arrives, and was not lost.
+        """
 
     @property
     def skew_ppm(self) -> float:
@@ -104,8 +108,9 @@ class DeviceClock:
     ) -> list[float]:
         """Return the sampling time in s of each of the readings that one read at ``now`` completed.
 
-        ``edge``: where the read ended. From tick to tick stamps increase, and none is later than
-        ``now``; a displacement has the stamp of its tick's ImuReading.
+        ``edge``: where the read ended among the samples, None if unknown. From tick to tick stamps
+        increase, and none is later than ``now``; a displacement has the stamp of its tick's
+        ImuReading.
         """
         ticks = self._count(readings)
         if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
@@ -137,10 +142,10 @@ class DeviceClock:
         return stamps
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of one reading that came alone and when due, else None.
+        """Return the stamp in s of one reading that came alone and when due, else None.
 
-        With None nothing is changed. Most reads of a board with an IMU are of this kind, and need
-        no count of what else they bring.
+        If the result is None, nothing has changed, and ``stamps`` must be called. Most reads of a
+        board with an IMU bring one reading when due; this method is faster for them.
         """
         if reading.lost:
             return None
@@ -152,7 +157,7 @@ class DeviceClock:
     def _due(
         self, tick: int, now: float, edge: SampleBoundary | None, readings: int
     ) -> float | None:
-        """Return the stamp of one new tick that came complete and when due; None otherwise."""
+        """Return the stamp in s of one new tick that came complete and when due, else None."""
         line = self._calm
         if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
             return None
@@ -168,7 +173,7 @@ class DeviceClock:
         return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """Return the ticks of the readings by the known losses; the displacements' counter wins."""
+        """Return the tick of each reading by known losses; the displacements' counter decides."""
         ticks: list[int] = []
         for reading in readings:
             if isinstance(reading, ImuReading):
@@ -182,7 +187,7 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """Return how many ticks the displacements' counter is ahead of the count."""
+        """Return how many ticks the displacements' counter is ahead of the counted ticks."""
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -190,7 +195,7 @@ class DeviceClock:
         return self._displaced_tick + passed - self._tick
 
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
-        """Compare the newest tick with its arrival; return by how many ticks the count was short.
+        """Compare the newest tick with its arrival; return how many ticks the count lacked.
 
         ``counted``: a displacements' counter has confirmed this tick.
         """
@@ -237,7 +242,10 @@ class DeviceClock:
         return short
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
-        """Add a tick. One that comes right after another had waited with it to be read."""
+        """Note a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
+
+        A tick right after another one replaces the other's delay: both had waited to be read.
+        """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
             self._single_reads = 0
@@ -249,10 +257,10 @@ class DeviceClock:
         self._seen_tick, self._seen_at = tick, now
 
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
-        """Stamp by the line's time, without jumps back, and forward only in small steps.
+        """Set the stamp of a tick by the line, without a step back and without a large step ahead.
 
-        ``latest_s``: upper limit of the stamp; ``room_s``: largest step that leaves as much to each
-        later stamp of this read.
+        ``latest_s``: upper limit of the stamp; ``room_s``: largest step in s that leaves equal room
+        for each later stamp of this read.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -34,7 +34,7 @@ class SimulatedBoard(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Connections of the board; a packet refers to one by its index."""
+        """Connections of the board; a packet refers to a connection by its index."""
 
     @property
     def tick_s(self) -> float:
@@ -48,7 +48,7 @@ class SimulatedBoard(Protocol):
         """
 
     def advance(self) -> list[Packet]:
-        """Advance by one tick; return what the board sends in it, in order."""
+        """Advance by one tick; return the packets that the board sends in this tick, in order."""
 
     def reboot(self) -> None:
         """Power-cycle the board; the robot keeps its true pose."""
@@ -68,7 +68,7 @@ class SimulatorModule(Protocol):
     TITLE: str
     """Name of the board, as in "A simulated ... board listens on"."""
     CHANNELS: tuple[Channel, ...]
-    """Channels of each of its boards."""
+    """Channels of each board of this kind."""
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
         """Add the board's own options; ``--seed`` and the line faults are common to all boards."""

@@ -30,7 +30,7 @@ _GOOD = NetworkFaults()
 class NetworkPath:
     """One direction of a network. Equal datagrams, times and seeds give equal faults.
 
-    lost, duplicated: numbers of datagrams so far.
+    lost, duplicated: numbers of datagrams that met this fault so far.
     """
 
     def __init__(self, faults: NetworkFaults, seed: str) -> None:

@@ -36,7 +36,7 @@ def load(module: str) -> SimulatorModule:
 
 
 def command(module: str) -> str:
-    """Return the command that runs this package; with ``--help`` it lists the options."""
+    """Return the shell command that runs this board; its ``--help`` lists the options."""
     board = module.rpartition(".")[2]
     return "simulator" if board == DEFAULT_BOARD else f"simulator --board {board}"
 

@@ -22,7 +22,7 @@ UNREAD_LIMIT = 4095
 """Number of unread bytes that a Linux terminal holds; bytes beyond it are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
-"""Longest delay that is caught up, in s; after a longer one, ticks are skipped."""
+"""Longest delay of the thread that is caught up, in s; after a longer one, ticks are skipped."""
 
 _JOIN_S = 5.0
 

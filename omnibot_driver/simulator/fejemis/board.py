@@ -61,13 +61,14 @@ class SimulatedFejemis:
         return self.vehicle.standing
 
     def half(self, name: str) -> DriveTeensy | FrontTeensy:
-        """Return the Teensy that is named ``drive`` or ``front``."""
+        """Return the Teensy named ``drive`` or ``front``."""
         return self.drive if name == "drive" else self.front
 
     def befall(self, half: str, what: str) -> None:
-        """Apply a fault to a half now: one of ``FAULTS``, or for ``front`` of ``SENSOR_FAULTS``.
+        """Apply the fault ``what`` to one Teensy now.
 
-        Raises KeyError for an unknown fault.
+        The fault is in ``FAULTS``, or for ``front`` also in ``SENSOR_FAULTS``. Raises KeyError for
+        an unknown fault.
         """
         allowed(half)[what](self.half(half))
 
@@ -76,7 +77,7 @@ class SimulatedFejemis:
         self._at_port[channel].receive(data)
 
     def advance(self) -> list[Packet]:
-        """Let one tick pass and return what was sent at each port in it."""
+        """Advance by one tick; return the bytes that each port sends in this tick."""
         self.tick += 1
         sent: list[bytes] = [b"", b""]
         for _ in range(STEPS_PER_TICK):

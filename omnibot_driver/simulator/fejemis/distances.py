@@ -2,8 +2,8 @@
 
 """The two distance sensors of the drive Teensy, which face a wall across the x axis.
 
-Time of flight measures always, the sonar only when it is triggered. Knows the pose of the robot
-alone.
+The time-of-flight sensor measures always, the sonar only when triggered. Knows only the robot's
+pose.
 """
 
 from math import cos
@@ -18,7 +18,7 @@ SONAR_FAR_M = 4.0
 class Distances:
     """The two distance sensors.
 
-    sonar_m: the last measurement of the sonar, 0 if it saw nothing.
+    sonar_m: the last measurement of the sonar, in m; 0 if the wall was out of range.
     """
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
@@ -26,13 +26,13 @@ class Distances:
         self.trigger()
 
     def trigger(self) -> None:
-        """Measure with the sonar."""
+        """Measure once with the sonar."""
         distance_m = max(0.0, self._wall_m())
         self.sonar_m = distance_m if distance_m < SONAR_FAR_M else 0.0
 
     @property
     def tof_m(self) -> float:
-        """Distance by time of flight, in m; the range of the sensor if it sees nothing."""
+        """Distance by time of flight, in m; the sensor's range if the wall is further away."""
         return min(TOF_FAR_M, max(0.0, self._wall_m()))
 
     def _wall_m(self) -> float:

@@ -26,7 +26,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     """The simulated drive Teensy.
 
     source: rcSource of the heartbeat, -1 while stopped. reference: v in m/s and w in rad/s of the
-    last ``rc``. told_angle_deg: angle of the front wheel by the last ``fwl``. off_at_s: when the
+    last ``rc``. told_angle_deg: angle of the front wheel in the last ``fwl``. off_at_s: when the
     power is cut, or None.
     """
 
@@ -54,7 +54,8 @@ class DriveTeensy(Teensy[DriveConfig]):
         )
 
     def boot(self) -> None:
-        """Clear reference, wheel speeds, pose and a requested power off; restart the sensors."""
+        """Reset reference, wheel speeds and pose, cancel a requested power-off, restart the
+        sensors."""
         self.off_at_s = None
         self.source = FREE
         self.reference = (0.0, 0.0)
@@ -67,7 +68,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.imu.boot()
 
     def started(self) -> None:
-        """Reset the pose, so that turns of the wheels during the boot are not counted."""
+        """Reset the pose at the end of a boot, so wheel turns during the boot are not counted."""
         self._reset_pose()
 
     # Each cycle
@@ -181,7 +182,8 @@ class DriveTeensy(Teensy[DriveConfig]):
     def velocity(self) -> tuple[float, float]:
         """Return the speed of the left and the right wheel in m/s.
 
-        It is not quantised, because the firmware measures the time between two ticks of an encoder.
+        The speeds are not quantised, because the firmware measures the time between two ticks of an
+        encoder.
         """
         (left, right), (left_m, right_m) = self.vehicle.radps, self.config.radii_m
         return left * left_m, right * right_m

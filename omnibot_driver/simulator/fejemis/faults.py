@@ -35,9 +35,7 @@ FAULTS: dict[str, Callable[[Half], None]] = {
     "sums-begin": _set(sums=True),
     "sums-end": _set(sums=False),
 }
-"""Faults of either half. silent: it obeys, but sends nothing; hung: it does neither; unplugged:
-nothing passes its cable; well: ends these three; sums-begin, sums-end: whether its lines carry
-checksums."""
+"""Faults of either Teensy, by name."""
 
 SENSOR_FAULTS: dict[str, Callable[[Half], None]] = {
     "sensor-well": _set(diagnosis=HEALTHY, error_flags=0, frozen=False, absent=False),
@@ -56,9 +54,9 @@ SENSOR_FAULTS: dict[str, Callable[[Half], None]] = {
     "loops-unfinished": _diagnosis(1 << 1),
     "supply-5v": _diagnosis(1 << 0),
 }
-"""Faults of the angle sensor, for the front half alone."""
+"""Faults of the angle sensor, which only the front Teensy has, by name."""
 
 
 def allowed(half: str) -> dict[str, Callable[[Half], None]]:
-    """Return the faults of ``drive`` or ``front``, by name."""
+    """Return the faults that ``drive`` or ``front`` can have, by name."""
     return FAULTS | SENSOR_FAULTS if half == "front" else FAULTS

@@ -90,7 +90,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         return -seen_deg if self.config.angle_inverted else seen_deg
 
     def _steer(self) -> None:
-        """Set the servo by the P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
+        """Set the servo's velocity by the P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
         servo, gains = self.vehicle.servo, self.config.steering
         if self._servo_raw is not None:
             servo.command = self._servo_raw

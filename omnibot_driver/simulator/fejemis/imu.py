@@ -36,12 +36,12 @@ class Imu:
         self._samples: list[Vector] = []
 
     def boot(self) -> None:
-        """Reset the orientation and give up a calibration in progress."""
+        """Reset the orientation and cancel a calibration in progress."""
         self.orientation = (0.0, 0.0, 0.0)
         self._kind, self._samples = "", []
 
     def cycle(self, step_s: float, config: DriveConfig) -> None:
-        """Integrate the yaw, and continue a calibration in progress."""
+        """Add one step to the yaw, and to a calibration in progress."""
         truth = self._vehicle.truth
         bias_dps = self._settings.gyro_bias_dps[2] - config.gyro_offset_dps[2]
         roll, pitch, yaw = self.orientation
@@ -71,11 +71,11 @@ class Imu:
         self._kind = ""
 
     def gyro(self, config: DriveConfig) -> Iterator[float]:
-        """Return the turn rates in deg/s, less the configured offsets."""
+        """Return the turn rates in deg/s, minus the configured offsets."""
         return _minus(self._raw_gyro(), config.gyro_offset_dps)
 
     def accel(self, config: DriveConfig) -> Iterator[float]:
-        """Return the specific force in m/s², calibrated."""
+        """Return the specific force in m/s², corrected by the configured calibration."""
         raw, offset = self._raw_accel(), config.accel_offset_mps2
         return (
             (axis - off) * scale
@@ -89,7 +89,7 @@ class Imu:
         return (north * cos(yaw), -north * sin(yaw), up)
 
     def mag(self, config: DriveConfig) -> Iterator[float]:
-        """Return the magnetic field in µT, calibrated."""
+        """Return the magnetic field in µT, corrected by the configured calibration."""
         shifted = list(_minus(self.mag_raw(), config.mag_offset_ut))
         rows = [config.mag_matrix[at : at + 3] for at in (0, 3, 6)]
         return (sum(a * b for a, b in zip(row, shifted, strict=True)) for row in rows)

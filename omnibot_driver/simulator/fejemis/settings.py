@@ -51,7 +51,10 @@ class Firmware:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """The fault ``what`` of ``half``, ``at_s`` after construction; see ``faults.FAULTS``."""
+    """A planned fault: ``what`` happens to the Teensy ``half``, ``at_s`` after construction.
+
+    ``what`` is a name in ``faults``.
+    """
 
     at_s: float
     half: str

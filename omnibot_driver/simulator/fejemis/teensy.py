@@ -33,7 +33,7 @@ WITHOUT_NUMBERS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A line that a Teensy executed at ``at_s`` since construction."""
+    """A line that a Teensy executed; ``at_s``: time since construction, in s."""
 
     at_s: float
     text: str
@@ -60,7 +60,7 @@ class Teensy(Generic[C]):
         self.commands: deque[Obeyed] = deque(maxlen=100_000)
         self.received = bytearray()
         self.unhandled = 0
-        """Number of lines that it did not recognise."""
+        """Number of lines that the Teensy did not recognise."""
         self.inbound = FaultyLine(
             LineFaults(lose=settings.lose_inbound), f"fejemis inbound {settings.seed} {place}"
         )
@@ -89,7 +89,7 @@ class Teensy(Generic[C]):
     def commands_table(self) -> dict[str, Callable[[str], None]]:
         """Return the function that executes each command, by the first word of the line.
 
-        It is called with the rest of the line.
+        The function is called with the rest of the line.
         """
         return {
             "sub": self._subscribe,
@@ -105,7 +105,7 @@ class Teensy(Generic[C]):
         """Reset the state, as after power-up."""
 
     def started(self) -> None:
-        """Do what is due when the boot is over."""
+        """Do what the end of a boot requires."""
 
     def cycle(self) -> None:
         """Run one control cycle."""
@@ -114,18 +114,18 @@ class Teensy(Generic[C]):
 
     @property
     def clock_s(self) -> float:
-        """Time since the boot in s, by its own crystal."""
+        """Time since the boot in s, by the Teensy's own crystal."""
         return self._clock_s
 
     def clock_text(self, digits: int) -> str:
-        """Return the clock as lines show it, with ``digits`` decimals."""
+        """Return the Teensy's clock as it is written in lines, with ``digits`` decimals."""
         time_s = self._clock_s
         if self.firmware.single_precision:
             (time_s,) = struct.unpack("f", struct.pack("f", time_s))
         return f"{time_s:.{digits}f}"
 
     def reboot(self) -> None:
-        """Cycle its power; configuration that was not saved is lost."""
+        """Power-cycle the Teensy; configuration that was not saved is lost."""
         self._restart(0.0)
 
     def _restart(self, uptime_s: float) -> None:
@@ -152,7 +152,7 @@ class Teensy(Generic[C]):
             self._arrived += self._reader.feed(data)
 
     def step(self, now_s: float) -> bytes:
-        """Let a millisecond pass, up to ``now_s``; return the bytes sent over the cable."""
+        """Advance by a millisecond, up to ``now_s``; return the bytes sent over the cable."""
         if not self.powered:
             return b""
         self._told_s = now_s
@@ -167,7 +167,7 @@ class Teensy(Generic[C]):
         return b"" if self.unplugged or self.silent or self.hung else data
 
     def say(self, text: str) -> None:
-        """Send a line."""
+        """Send a line of text."""
         self._out += wire.line(text, sums=self.sums, carriage_return=self.firmware.carriage_return)
 
     def _next_cycle(self) -> None:

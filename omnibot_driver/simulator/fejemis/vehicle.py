@@ -44,7 +44,7 @@ class Servo:
         self._lag_s = settings.servo_lag_s
 
     def advance(self, step_s: float) -> None:
-        """Let ``step_s`` seconds pass."""
+        """Advance by ``step_s`` seconds."""
         self._since_s += step_s
         if self._since_s >= SERVO_PERIOD_S - 1e-9:
             self._since_s = 0.0
@@ -66,7 +66,7 @@ class Lift:
         self.height = 0.0
 
     def advance(self, step_s: float) -> None:
-        """Let ``step_s`` seconds pass."""
+        """Advance by ``step_s`` seconds."""
         if self.volts:
             moved = self.height + self.volts / 6.0 * step_s / LIFT_SECONDS_AT_6_V
             self.height = max(0.0, min(1.0, moved))
@@ -106,7 +106,7 @@ class Vehicle:
         return self.radps == [0.0, 0.0]
 
     def advance(self, step_s: float) -> None:
-        """Let ``step_s`` seconds pass."""
+        """Advance by ``step_s`` seconds."""
         self.servo.advance(step_s)
         self.lift.advance(step_s)
         if self.standing and (self.wanted_radps == (0.0, 0.0) or not self.powered):

@@ -11,7 +11,10 @@ import re
 from enum import Enum
 
 BUFFER = 200
-"""Characters of a line that fit; each time a longer one fills the buffer, these are discarded."""
+"""Number of characters that the line buffer holds.
+
+Each time a longer line fills the buffer, the characters in it are discarded.
+"""
 
 _NUMBER = re.compile(r"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 _PREFIX = re.compile(r";(\d\d)")
@@ -38,7 +41,7 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Return the result of the check, the line without ``;NN``, and the correct checksum."""
+    """Return the checksum's check result, the line without ``;NN``, and the correct checksum."""
     found = _PREFIX.match(text)
     if found is None:
         return Check.ABSENT, text, 0
@@ -50,7 +53,7 @@ def checked(text: str) -> tuple[Check, str, int]:
 def numbers(text: str) -> list[float]:
     """Return the numbers that repeated calls of ``strtof`` find.
 
-    They end at the first text that is not a number.
+    The first text that is not a number ends the search.
     """
     found, at = [], 0
     while match := _NUMBER.match(text, at):
@@ -60,7 +63,10 @@ def numbers(text: str) -> list[float]:
 
 
 class LineReader:
-    """Splits characters into lines; a character beyond the buffer discards what it holds."""
+    """Splits characters into lines.
+
+    A character that does not fit discards all that the buffer holds.
+    """
 
     def __init__(self) -> None:
         self._held = bytearray()
@@ -70,7 +76,7 @@ class LineReader:
         self._held.clear()
 
     def feed(self, data: bytes) -> list[str]:
-        """Return the lines that these bytes complete, without line ends; omit empty ones."""
+        """Return the lines that these bytes complete, without line ends and without empty lines."""
         lines = []
         for byte in data:
             if byte in b"\r\n":

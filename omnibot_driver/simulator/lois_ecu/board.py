@@ -116,7 +116,8 @@ class SimulatedLois:
 
     @property
     def terminal_mode(self) -> int:
-        """Terminal mode, as 0x11 wrote it last; outside 0 and 4 the board itself sends no lines."""
+        """Terminal mode that 0x11 wrote last; in modes other than 0 and 4 the board sends no own
+        lines."""
         return self._terminal.mode
 
     @property
@@ -154,11 +155,11 @@ class SimulatedLois:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
-        """Block these wheels by hand, and release the others."""
+        """Block these wheels by hand, and release the wheels that are not named."""
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
-        """Receive bytes; they arrive at 115200 baud from now on, whatever ``now`` says."""
+        """Receive bytes; they arrive at 115200 baud, beginning now, and ``now`` is ignored."""
         self._uart.receive(data)
 
     def advance(self) -> list[Packet]:
@@ -272,7 +273,7 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """Finish the current scan of the timers, then run another; both take less than 1 ms."""
+        """Finish the current pass over the timers, then make another; both take less than 1 ms."""
         for _ in range(2):
             if not self._scan:
                 self._read_input()

@@ -27,9 +27,10 @@ class WheelChannel:
     ``corrections``: factors for the durations of the short and the long level of the encoder.
     ``steps``: encoder edges per turn.
 
-    ticks: encoder ticks, as 0x12 reports them. rpm: measured speed in RPM, an integer.
-    exact_rpm: the same with fraction. duty_percent: duty of the motor, -100..100.
-    open_loop: whether a duty is commanded. record, record_left: samples so far, samples to come.
+    ticks: encoder ticks, as 0x12 reports them. rpm: measured speed in RPM, an integer. exact_rpm:
+    measured speed in RPM, with fraction. duty_percent: duty of the motor, -100..100. open_loop:
+    whether a duty is commanded, not a speed. record, record_left: samples taken, number of samples
+    still to take.
     """
 
     def __init__(
@@ -48,7 +49,8 @@ class WheelChannel:
         self._count = 0
         self._ticked_s = 0.0
         self.turned_ticks = 0
-        """Ticks since the odometry last read them; signed by the true direction of the wheel."""
+        """Ticks since the odometry last read this number; signed by the true direction of the
+        wheel."""
         self.record: list[int] = []
         self.record_left = 0
         self._records_torque = False
@@ -89,7 +91,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        This is what the manual implies; with a quirk, a stalled wheel keeps its speed.
+        The manual implies this; with a quirk, a stalled wheel keeps its measured speed.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0
@@ -115,7 +117,7 @@ class WheelChannel:
     # Commands
 
     def command_rpm(self, rpm: int) -> None:
-        """Set the speed target in RPM and close the control loop; zero or a reversal halts it."""
+        """Set the speed target in RPM and close the loop; zero or a reversal stops the motor."""
         self.open_loop = False
         if rpm == 0 or rpm * self._next_target < 0:
             self._halt()
@@ -128,7 +130,10 @@ class WheelChannel:
         self.duty_percent = max(-LIMIT_PERCENT, min(LIMIT_PERCENT, percent))
 
     def release(self) -> None:
-        """React to the emergency stop button as to a command of zero, in the current mode."""
+        """Stop the motor because of the emergency stop button.
+
+        This acts like a command of zero in the current mode.
+        """
         if self.open_loop:
             self.duty_percent = 0
         else:

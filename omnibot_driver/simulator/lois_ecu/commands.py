@@ -21,7 +21,7 @@ BALL_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A valid line that the board processed in tick number ``tick``; the command may be unknown."""
+    """A valid line processed in tick number ``tick``; its command may be unknown."""
 
     tick: int
     command: int
@@ -30,7 +30,7 @@ class Obeyed:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The parts of the board that commands act on; new after each boot."""
+    """The parts of the board on which commands act; a boot makes new ones."""
 
     wheels: tuple[WheelChannel, ...]
     odometry: DocumentedOdometry
@@ -41,9 +41,9 @@ class Parts:
 
 
 class Commands:
-    """Carries out commands.
+    """Executes commands.
 
-    led: whether the LED is on. balls: number of balls dropped, which survives a reboot.
+    led: whether the LED is on. balls: number of balls dropped; a reboot does not reset it.
     """
 
     def __init__(self, quirks: Quirks) -> None:
@@ -52,12 +52,12 @@ class Commands:
         self.boot()
 
     def boot(self) -> None:
-        """Switch the LED off, and forget when the last ball was dropped."""
+        """Switch the LED off, and reset the time of the last dropped ball."""
         self.led = False
         self._ball_at_s = -BALL_S
 
     def obey(self, parts: Parts, command: int, payload: int, now_s: float, clock_ms: int) -> None:
-        """Carry out one command; ignore an unknown one."""
+        """Execute one command; ignore an unknown command."""
         quirks, (left, right) = self._quirks, parts.wheels
         high, low = payload >> 16, payload & 0xFFFF
         signed = [word - 0x10000 if word & 0x8000 else word for word in (high, low)]

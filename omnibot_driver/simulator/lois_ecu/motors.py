@@ -67,14 +67,14 @@ class Motor:
         return self._through_gap((before + self.rpm) / 2 * dt_s / 60)
 
     def _late(self, duty_percent: float, dt_s: float) -> float:
-        """Return the duty of one dead time ago, in percent."""
+        """Return the duty that was applied one dead time ago, in percent."""
         self._on_the_way.append(duty_percent)
         if len(self._on_the_way) <= round(self._settings.dead_time_s / dt_s):
             return 0.0
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """Return the turns of the wheel for these turns of the motor, after backlash."""
+        """Return the turns of the wheel, after backlash, for these turns of the motor."""
         backlash = self._settings.backlash_turns
         if not backlash:
             return turns
@@ -100,10 +100,10 @@ class Encoder:
         ]
 
     def turn(self, turns: float) -> tuple[float, bool, int] | None:
-        """Turn the disc; return the edge that was passed, or None.
+        """Turn the disc; return the edge that passed the sensor, or None.
 
-        The edge consists of its time as a fraction of the step, whether a long level ended, and its
-        direction (1 forward, -1 backward).
+        An edge has a time (as a fraction of the step), whether a long level ended, and a direction
+        (1 forward, -1 backward).
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
@@ -142,7 +142,8 @@ class SpeedController:
     """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) by the trapezoidal rule, as the firmware extends it.
 
     The coefficients are for steps of ``NOMINAL_STEP_S``, whatever the true step is. An output
-    beyond 100 % is not remembered (anti-windup), and one against the target becomes zero.
+    beyond 100 % does not enter the state (anti-windup), and an output against the target becomes
+    zero.
     """
 
     def __init__(self, gains: Gains) -> None:
@@ -150,12 +151,12 @@ class SpeedController:
         self.restart()
 
     def change(self, **gains: float) -> None:
-        """Change these gains and restart the controller."""
+        """Change the named gains and restart the controller."""
         self.gains = replace(self.gains, **gains)
         self.restart()
 
     def restart(self) -> None:
-        """Reset the controller's state; the gains stay."""
+        """Reset the controller's state; the gains remain."""
         self._errors = self._outputs = (0.0, 0.0)
         self._target = 0.0
 

@@ -16,7 +16,7 @@ PADDING, HEADING_PADDING = 10, 0x016A
 class Recorder:
     """Takes one record at a time.
 
-    number: command number of the record in progress, as requested; None without one.
+    number: command number that requested the record in progress, or None.
     """
 
     def __init__(self, quirks: Quirks, wheels: tuple[WheelChannel, ...]) -> None:
@@ -35,13 +35,13 @@ class Recorder:
             channel.start_record(samples, torque=number == TORQUE)
 
     def control(self) -> None:
-        """Take a torque sample if one is wanted; called at each step of the controllers."""
+        """Take a torque sample if a torque record runs; called at each step of the controllers."""
         if self.number == TORQUE:
             for channel in self._wheels:
                 channel.torque()
 
     def heading(self, heading: int) -> bytes:
-        """Record a compass heading in degrees; return the encoded record once it is complete."""
+        """Record a compass heading in degrees; return the encoded record if complete, else b""."""
         if self.number != HEADINGS:
             return b""
         full = len(self._headings) >= min(self._wanted, 2 * RECORD_DEPTH)
@@ -58,7 +58,7 @@ class Recorder:
         return b"".join([*lines, wire.words(HEADINGS, HEADING_PADDING, HEADING_PADDING)])
 
     def of_wheels(self) -> bytes:
-        """Return the encoded record of both wheels once it is complete."""
+        """Return the encoded record of both wheels once it is complete; until then b""."""
         left, right = self._wheels
         if self.number not in (RPM, TORQUE) or left.record_left or right.record_left:
             return b""

@@ -49,7 +49,7 @@ class Sayings:
         return group + wire.sequence(code, numbers) if quirks.appends_odometry else group
 
     def fix(self, now_s: float) -> Fix:
-        """Return the GPS fix at ``now_s``, or one of zeros if the firmware ignores the GPS."""
+        """Return the GPS fix at ``now_s``; its values are zero if the firmware ignores the GPS."""
         settings, truth = self._settings, self._vehicle.truth
         if settings.quirks.gps_is_ignored:
             return Fix(0.0, 0.0, (0, 0, 0), (0, 0, 0))

@@ -48,7 +48,7 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: average them as plain numbers, which is wrong across north.
+    ``over_north``: average the readings as plain numbers, which is wrong across north.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:
@@ -57,7 +57,7 @@ class Compass:
         self.last = 0
 
     def read(self, yaw_rad: float) -> int:
-        """Take a reading; return the new mean in degrees clockwise from north, -179..180."""
+        """Take a reading; return the mean of three in degrees clockwise from north, -179..180."""
         true = 90.0 - degrees(yaw_rad) + self._random.gauss(0.0, self._noise_deg)
         raw = int(true % 360.0) % 360
         self._raw.append(raw)

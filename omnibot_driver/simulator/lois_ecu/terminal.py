@@ -14,7 +14,7 @@ GPS, COMPASS = 1, 2
 NO_TERMINAL = (0, 4)
 PASSED_ON_DEPTH = 2048
 CHARACTERS_PER_STEP = {GPS: 0.96, COMPASS: 0.48}
-"""Characters per step of 1 ms at 9600 and 4800 baud."""
+"""Characters that a sensor's serial line carries in a step of 1 ms, at 9600 and 4800 baud."""
 
 
 class Terminal:
@@ -33,16 +33,16 @@ class Terminal:
 
     @property
     def busy(self) -> bool:
-        """Whether the main loop waits for characters that are sent to the sensor."""
+        """Whether the main loop waits because characters are being sent to the sensor."""
         return self._to_sensor > 0
 
     def heard(self, count: int) -> None:
-        """Forward ``count`` characters from the host to the sensor, if the firmware does that."""
+        """Note ``count`` characters from the host, which some firmware forwards to the sensor."""
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)
 
     def sensor(self, sensor: int, text: bytes) -> bytes:
-        """Process a text from a sensor; return the part that is sent to the host at once."""
+        """Process text from a sensor; return the part to send to the host at once."""
         if not self._quirks.terminal_mixes_sensors:
             return text if self.mode == sensor else b""
         if self.on:
@@ -50,7 +50,7 @@ class Terminal:
         return b""
 
     def mixed(self) -> bytes:
-        """Advance by one step; return one waiting character of each sensor if the board is free."""
+        """Advance by one step; return a waiting character of each sensor, none while ``busy``."""
         if self.busy:
             speed = CHARACTERS_PER_STEP.get(self.mode, BYTES_PER_STEP)
             self._to_sensor = max(self._to_sensor - speed, 0.0)

@@ -11,7 +11,7 @@ ONCE, NEVER = 0xFFFE, 0xFFFF
 
 @dataclass(slots=True)
 class Timer:
-    """Period of one message, in ms, and the time when the period began."""
+    """Period of one message and the time at which the current period began, both in ms."""
 
     period_ms: int
     since_ms: int = 0
@@ -33,16 +33,16 @@ class Timers:
         return self._timers[code]
 
     def set(self, code: int, period_ms: int, clock_ms: int) -> None:
-        """Set the period of a message and begin it now."""
+        """Set the period of a message in ms, and begin a new period now."""
         self._timers[code] = Timer(period_ms, clock_ms)
 
     def restart(self, clock_ms: int) -> None:
-        """Begin the periods of all messages again."""
+        """Begin new periods of all messages."""
         for timer in self._timers.values():
             timer.since_ms = clock_ms
 
     def take(self, code: int, clock_ms: int) -> bool:
-        """Return whether this message is due; if so, regard it as sent."""
+        """Return whether this message is due; if so, begin its next period."""
         timer = self._timers[code]
         if timer.period_ms == NEVER:
             return False

@@ -36,7 +36,7 @@ class Uart:
 
     @property
     def sending(self) -> bool:
-        """Whether data remains to be sent."""
+        """Whether some data is still to be sent."""
         return bool(self._sending)
 
     @property
@@ -54,7 +54,7 @@ class Uart:
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:
-        """Lose a character in the next ``listen``: for 0.2 ms the processor serves an interrupt."""
+        """Lose a character in the next ``listen``: an interrupt blocks the port for 0.2 ms."""
         self._misses = True
 
     def listen(self) -> int:
@@ -78,7 +78,7 @@ class Uart:
         return heard
 
     def send(self, sent: bytearray) -> bool:
-        """Send for one step, appending to ``sent``.
+        """Send for one step, appending the sent bytes to ``sent``.
 
         Return whether interrupts are switched on again; the caller must then call ``hear_kept``.
         """
@@ -96,7 +96,10 @@ class Uart:
         return False
 
     def hear_kept(self) -> int:
-        """Receive the character that the hardware kept; return the number received, 0 or 1."""
+        """Receive the character that the hardware kept while interrupts were off.
+
+        Return the number of characters received, 0 or 1.
+        """
         if self._kept is None:
             return 0
         self._hear(self._kept)

@@ -71,7 +71,7 @@ class Vehicle:
         return all(motor.rpm == 0.0 for motor in self.motors)
 
     def advance(self, duties: tuple[float, float], now_s: float, step_s: float) -> list[Edge]:
-        """Advance by the step that ends at ``now_s``; return its encoder edges in order of time."""
+        """Advance by the step that ends at ``now_s``; return the encoder edges in order of time."""
         settings, state = self._settings, self.truth
         ways: list[float] = []
         edges: list[Edge] = []

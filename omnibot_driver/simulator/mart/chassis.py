@@ -13,7 +13,10 @@ from omnibot_driver.simulator.mart.settings import MartSettings, Stuck
 STOP = 128
 STEP_S = 0.01
 RAMPS_PER_S = 40.0
-"""Updates of the applied effort per second: every 25 ms it changes by the acceleration."""
+"""Updates of the applied effort per second.
+
+Every 25 ms the effort changes by at most the acceleration.
+"""
 STANDS_MPS = 0.006
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 
@@ -23,7 +26,7 @@ class Chassis:
 
     right, left: registers. right_mps, left_mps: speeds in m/s. x_m, y_m, yaw_rad: the true pose,
     yaw unwrapped. counts: encoder counts of the right wheel since the last reset. way_m: total
-    distance, forward and backward added. Set volts, stuck, motor_status and silent by ``change``
+    distance, forward and backward added. Set volts, stuck, motor_status and silent with ``change``
     only.
     """
 
@@ -81,7 +84,7 @@ class Chassis:
         return new
 
     def set(self, right: int, left: int) -> None:
-        """Write both registers; without effect if the serial line of the board is cut."""
+        """Write both motor registers; without effect if the board's serial line is cut."""
         if not self.silent:
             self.right, self.left = right & 0xFF, left & 0xFF
 
@@ -117,7 +120,8 @@ class Chassis:
 
     @property
     def rests(self) -> bool:
-        """Whether motors, applied effort and wheels are all zero, so that time changes nothing."""
+        """Whether commands, applied effort and wheel speeds are all zero, so that time changes
+        nothing."""
         return not (self.powered or self.moving or self._applied_right or self._applied_left)
 
     @property
@@ -128,7 +132,7 @@ class Chassis:
     def _turn(
         self, wanted: int, applied: float, speed_mps: float, gain: float
     ) -> tuple[float, float]:
-        """Return the applied effort and the speed in m/s of a motor after 10 ms more."""
+        """Return a motor's applied effort and speed in m/s after 10 ms more."""
         if applied != wanted:
             slew = self.acceleration * RAMPS_PER_S * STEP_S
             if applied < wanted:
@@ -142,7 +146,7 @@ class Chassis:
         return applied, speed_mps
 
     def step(self) -> float:
-        """Let 10 ms pass; return the turn rate in deg/s, with noise while a wheel turns."""
+        """Advance by 10 ms; return the turn rate in deg/s, with noise while a wheel turns."""
         self._applied_right, right = self._turn(
             STOP - self.right, self._applied_right, self.right_mps, self._gain_right
         )

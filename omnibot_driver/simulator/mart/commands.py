@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from omnibot_driver.simulator.mart.server import MartServer
 
 Handler = Callable[["MartServer", str], str | None]
-"""Function that executes a command. It returns the reply, or None if that comes later or never."""
+"""Function that executes a command.
+
+It returns the reply, or None if the reply comes later or never.
+"""
 
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
@@ -38,7 +41,7 @@ class Row(NamedTuple):
 
 
 def execute(server: "MartServer", text: str) -> str | None:
-    """Begin a command; return its reply, or None if that comes later or never."""
+    """Begin a command; return its reply, or None if the reply comes later or never."""
     if not server.quirks.undocumented_commands and _is_undocumented(text):
         return NOT_SUPPORTED
     for word, handler, begins, is_motion in ROWS:

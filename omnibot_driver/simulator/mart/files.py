@@ -29,8 +29,8 @@ _NAMES = {
 class FileNote:
     """The data from which the file of a motion is generated.
 
-    head: its first lines. rows: number of samples in it. is_turn: whether the motion was a spin.
-    angle_deg, encoder: totals of the motion.
+    head: first lines of the file. rows: number of samples in the file. is_turn: whether the motion
+    was a spin. angle_deg, encoder: totals of the motion.
     """
 
     name: str

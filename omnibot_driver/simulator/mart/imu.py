@@ -12,8 +12,8 @@ class Imu:
     """The gyro, and what the server derives from it.
 
     alive: False while the IMU is unplugged; can be set at any time, besides the times in the
-    settings. closed: whether the server has given the IMU up, which it retries only at RST IMU or
-    SB. rate_dps: turn rate of the last sample in deg/s, less the bias that the server knows.
+    settings. closed: whether the server has given the IMU up; only RST IMU or SB makes it try
+    again. rate_dps: turn rate of the last sample in deg/s, less the bias that the server knows.
     heading_deg: the relative heading in degrees, left positive.
     """
 
@@ -25,7 +25,7 @@ class Imu:
         self.restart()
 
     def restart(self) -> None:
-        """Forget the bias, the heading and the rate, as at the start of the server."""
+        """Reset the bias, the heading and the rate, as at the start of the server."""
         self._known_dps = 0.0
         self.closed = False
         self.heading_deg = 0.0
@@ -42,11 +42,11 @@ class Imu:
         return self.alive and not self._dies_s <= now < self._returns_s
 
     def living(self, now: float) -> bool:
-        """Return whether the server receives samples."""
+        """Return whether the server receives samples of the IMU."""
         return self.alive and not self.closed and not self._dies_s <= now < self._returns_s
 
     def learn(self) -> None:
-        """Learn the gyro bias, as the server measures it while the robot is at rest."""
+        """Set the bias that the server knows, as its measurement at rest does."""
         self._known_dps = self._bias_dps
 
     def sample(self, rate_dps: float, now: float, *, integrates: bool) -> None:

@@ -53,7 +53,7 @@ class Motion:
 
     running: in progress, so that other motions are refused. watching: supervised by the alarm.
     posts: notices of a start or a stop that are not consumed yet. error: failure text of this
-    motion. right, left: what the server believes of the registers. encoder: the last reading, which
+    motion. right, left: register values as the server knows them. encoder: the last reading, which
     the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
     turned_s: when the wheel began to turn, and when it last turned. angle_deg: turned since the
     start. released: whether the stop port ended it.
@@ -85,7 +85,7 @@ class Motion:
         self.stop_samples = STOP_SAMPLES
 
     def limit(self, inches: int) -> None:
-        """Set the time after which the motion stops, from a distance and its calibration."""
+        """Compute the time after which the motion stops, from a distance and the calibration."""
         up_s, down_s = RAMPS_S[self.word]
         top_inps = TOP_SPEED_INPS[self.word]
         self.stop_after_s = (inches - (up_s + down_s) / 2 * top_inps) / top_inps + up_s

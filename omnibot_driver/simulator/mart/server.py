@@ -91,7 +91,7 @@ class MartServer(ServerState):
 
     @property
     def wake_at(self) -> float:
-        """Time of the next event that needs no datagram, in s; infinity if none is due."""
+        """Time in s of the next event that happens without a datagram; infinity if none is due."""
         if self._out:
             return self.now_s
         return min(self._step_at_s, inf if self._later is None else self._later.at_s)
@@ -138,7 +138,7 @@ class MartServer(ServerState):
     # For commands and motions
 
     def drive(self, right: int, left: int) -> None:
-        """Write the motors' registers."""
+        """Write the registers of both motors."""
         self.chassis.set(right, left)
         self._wake()
 
@@ -149,11 +149,12 @@ class MartServer(ServerState):
         self._wake()
 
     def later(self, seconds: float, then: Then, *args: Any) -> None:
-        """Continue the command after ``seconds``, by calling ``then(server, *args)``."""
+        """Schedule the next part of the command: ``then(server, *args)`` after ``seconds``."""
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Call ``then`` at the next notice of this kind of motion, or now if one is pending."""
+        """Call ``then`` at the next notice of this motion's start or end, or now if a notice is
+        pending."""
         motion = self.motions[kind]
         if motion.posts:
             motion.posts -= 1
@@ -163,7 +164,7 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Give a notice to the first waiter for this kind of motion, or keep it for the next."""
+        """Give a notice of a start or end to the first waiter, or keep it if none waits."""
         for waiter in self.waiters:
             if waiter.kind is kind:
                 self.waiters.remove(waiter)

@@ -39,7 +39,7 @@ class ServerState:
 
     now_s: simulated time since construction. crashed: why the server ended; empty while it runs.
     busy: a command is in progress. motions: what the server knows of each kind; alarm: the kind
-    that it supervises; starting: the kind whose command is not answered yet. custom: parameters set
+    that is supervised; starting: the kind whose command is not answered yet. custom: parameters set
     by SLMP and SSP. sampling_since_s: since when a motion uses a sonar, or -1. front_m, rear_m,
     dock_m and the attributes of the chassis and the IMU can be changed at any time.
     """
@@ -96,12 +96,12 @@ class ServerState:
 
     @property
     def clock_s(self) -> float:
-        """Wall clock of the server, in Unix time."""
+        """Time of the server's clock, as Unix time in s."""
         return self.now_s + self.clock_offset_s
 
     @property
     def date(self) -> str:
-        """Wall clock of the server as text, in the form at the beginning of its files."""
+        """Date and time of the server's clock as text, in the form used in its files."""
         return time.strftime("%m/%d/%Y  %H:%M:%S", time.gmtime(self.clock_s))
 
     @property
@@ -120,14 +120,14 @@ class ServerState:
         return self.manual or self.recording or any(each.running for each in self.motions)
 
     def save(self, note: FileNote) -> None:
-        """Keep a file as the last move or turn; beyond 100 files, drop the oldest."""
+        """Store a file as that of the last move or turn; beyond 100 files, delete the oldest."""
         self.files[note.name] = note
         if len(self.files) > FILES:
             del self.files[next(iter(self.files))]
         self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
 
     def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
-        """Return the reading of a sonar ``ago_s`` ago, in inches; -1 if it sees nothing."""
+        """Return the reading of a sonar ``ago_s`` ago, in inches; -1 if no wall is in range."""
         seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
         way_m = self.chassis.speed_mps * ago_s
         inches = (seen_m - way_m if backward else seen_m + way_m) * INCHES_PER_M
@@ -136,7 +136,7 @@ class ServerState:
     def clearance_in(self, *, backward: bool) -> int:
         """Return the last reading in inches of the sonar that a motion uses.
 
-        It is -1 if the sonar sees nothing, or before its first reading.
+        Return -1 if no wall is in range, or before the first reading.
         """
         since_s = self.sampling_since_s
         if since_s < 0.0 or self.now_s - since_s < NEAR_READINGS_S:
@@ -145,7 +145,7 @@ class ServerState:
 
     @property
     def heading_integrates(self) -> bool:
-        """Whether turning changes the relative heading now."""
+        """Return whether turning currently changes the relative heading."""
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
     def sample_reference(self, *, first: bool) -> None:

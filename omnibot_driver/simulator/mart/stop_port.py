@@ -33,7 +33,7 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
-    """Stop an uncontrolled motion; return whether a notice of its end will follow."""
+    """Stop an uncontrolled motion; return whether a notice of the motion's end will follow."""
     if motion.kind is Kind.SPIN:
         if motion.stopping:
             return False
@@ -70,7 +70,7 @@ def _stop_first(server: "MartServer", kinds: tuple[Kind, ...]) -> None:
 
 
 def _limit(server: "MartServer", text: str) -> None:
-    """Limit an unlimited move to a distance in inches from where it began to move (SDR)."""
+    """Limit an unlimited move to a distance in inches from the place where it began (SDR)."""
     motion = next(
         (each for each in server.motions if each.running and each.kind in DRIVES[1:3]), None
     )

@@ -25,13 +25,13 @@ def reply(text: str) -> bytes:
 
 
 def integer(text: str) -> int:
-    """Return the number at the beginning of the text, or 0."""
+    """Return the number at the beginning of the text, or 0 without a number."""
     found = _NUMBER.match(text)
     return int(found[1]) if found else 0
 
 
 def fields(text: str) -> list[str]:
-    """Return, for each blank, all the text behind it."""
+    """Return, for each blank in the text, everything behind this blank."""
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 
 

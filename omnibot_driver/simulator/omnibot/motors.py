@@ -92,7 +92,7 @@ class Motor:
         return turned
 
     def turn(self, counts: float, pwm: float) -> None:
-        """Turn by ``counts`` in one tick, moved from outside, whatever the effort."""
+        """Turn by ``counts`` in one tick by an outside force, regardless of the effort."""
         self._on_the_way.append(pwm)
         self._on_the_way.popleft()
         self.speed = counts

@@ -15,7 +15,7 @@ from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 class Odometry:
-    """The board's own pose in its earth frame, and the part of it that is not sent yet."""
+    """The board's own pose in its earth frame, and the part of its motion not yet sent."""
 
     _body_unsent: tuple[float, float, float]
     _counts_unsent: Triple
@@ -38,7 +38,7 @@ class Odometry:
         self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
 
     def difference(self) -> Triple:
-        """Return the values of the 25 Hz frame, and begin the next difference."""
+        """Return the values of the next 25 Hz frame, and begin a new difference."""
         words = self._counts_unsent
         if self._settings.frame == "body":
             words = _tenths(self._body_unsent)

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Positional control, of which the manual says only that the switch selects it.
+"""Positional control: driving to a commanded pose.
 
-Knows the units of a commanded pose and how fast the robot drives to it. Must not know wheels.
+The manual says no more than that the switch selects this control. Knows the units of a commanded
+pose and how fast the robot drives there. Must not know wheels.
 """
 
 from math import cos, hypot, sin
@@ -12,7 +13,7 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 from omnibot_driver.simulator.omnibot.wire import Triple
 
 SPEED_PER_WAY = 2.0
-"""Speed per distance from the pose, in 1/s, up to the limits below."""
+"""Speed per distance from the goal, in 1/s, up to the limits below."""
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3

@@ -44,7 +44,10 @@ _NOTHING: Final[Step] = (b"", None, False)
 
 
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames by counting seven bytes after FF FE, without a timeout; FF FF FE has a header."""
+    """Find frames by counting seven bytes after FF FE, without a timeout.
+
+    FF FF FE also contains a header.
+    """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""
     if not held and byte != _FIRST:
@@ -60,7 +63,7 @@ def naive(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames like ``counting``, but discard an incomplete frame after a pause."""
+    """Find frames like ``counting``, but discard an incomplete frame after ``IDLE_GAP_S``."""
     return counting(b"" if pause_s >= IDLE_GAP_S else held, byte, pause_s)
 
 
@@ -120,7 +123,7 @@ class CommandReceiver:
         self.last_at_s = 0.0
 
     def boot(self) -> None:
-        """Process a byte that arrives while the board boots."""
+        """Process a byte that arrives during the boot: it is lost or part of the wake-up."""
         if self._wakes_while_booting and self.to_swallow:
             self.to_swallow -= 1
 

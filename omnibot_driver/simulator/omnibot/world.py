@@ -86,7 +86,7 @@ class World:
         self._slope_pwm = settings.slope_pwm
         self.held = Held()
         self.force = Force()
-        """Force of a person who pushes, or of a bump."""
+        """Current force on the robot, of a person who pushes or of a bump."""
         self.gripped: Twist | None = None
         """Twist that a person stronger than the motors imposes; None if the robot moves freely."""
         self.acceleration = (0.0, 0.0)
@@ -162,7 +162,8 @@ class World:
     def _wander(self, slip: float, rim_m: float) -> float:
         """Return the wheel's slip after ``rim_m`` of rim motion.
 
-        It drifts around the mean slip, with a standard deviation of half the mean, within 0..1.
+        The slip drifts around the mean slip, with a standard deviation of half the mean, within
+        0..1.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)

@@ -19,9 +19,10 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Return 0 on success, 1 if nothing was found, 2 on wrong usage, 130 when interrupted.
+    """Run the subcommand; return 0 if it succeeds, 1 if it finds nothing.
 
-    After 1 a sentence on stderr gives the reason. ``read`` answers questions.
+    Return 2 on wrong usage, 130 when interrupted. With 1, a sentence on stderr gives the reason.
+    ``read`` asks the user a question and returns the answer.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)

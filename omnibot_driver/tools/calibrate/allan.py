@@ -15,16 +15,21 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Least number of averages in a rest, so the longest averaging time is a ninth of the rest."""
+"""Least number of averages from which a deviation is computed.
+
+The longest averaging time is therefore a ninth of the rest.
+"""
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 60.0
-"""Least length of a rest, in s, for fitting how a bias wanders."""
+"""Least length of a rest, in s, for which the wandering of a bias is fitted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Allan:
-    """An Allan deviation with its ``sigma``, in the readings' unit, by averaging time; each
-    (n,)."""
+    """An Allan deviation with its standard deviation ``sigma``, in the readings' unit.
+
+    ``tau_s``: the averaging times in s. All have the shape (n,).
+    """
 
     tau_s: Column
     deviation: Column
@@ -45,14 +50,16 @@ class Noise:
     walk: float
 
     def deviation(self, tau_s: Column) -> Column:
-        """Return the Allan deviation of this noise."""
+        """Return the Allan deviation that this noise has at the averaging times ``tau_s``."""
         variance = self.density**2 / tau_s + FLICKER * self.instability**2
         return np.asarray(np.sqrt(variance + self.walk**2 * tau_s / 3))
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Return the Allan deviation of (n,) evenly spaced readings, at times a quarter octave
-    apart."""
+    """Return the Allan deviation of (n,) evenly spaced readings.
+
+    The averaging times are a quarter octave apart.
+    """
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS
     octaves = np.arange(0.0, np.log2(max(1, longest)) + 1e-9, 0.25)
@@ -69,7 +76,7 @@ def allan(readings: Column, period_s: float) -> Allan:
 
 
 def noise(curve: Allan) -> Noise:
-    """Return the noise terms that fit the curve best; for a short rest white noise alone."""
+    """Return the noise terms that fit the curve best; for a short rest only white noise."""
     tau_s, variance = curve.tau_s, curve.deviation**2
     terms = [1 / tau_s]
     if tau_s[-1] * FEWEST_CLUSTERS >= WALK_FROM_S:

@@ -15,7 +15,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""A parameter of drivers whose board records ticks and takes the gains of a wheel's controller."""
+"""A parameter that only drivers have whose board records ticks and takes a wheel's gains."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -29,11 +29,11 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a firmware whose control of a wheel it knows"),
 }
-"""For each subcommand the parameters, of which the driver must have one, and their meaning."""
+"""By subcommand: parameters, of which the driver must have at least one, and what they show."""
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
-    """Raise ToolError if the driver with these parameters has a board unfit for this subcommand."""
+    """Raise ToolError if the board of a driver with these parameters cannot do this subcommand."""
     wanted, thing = NEEDS[subcommand]
     if not any(parameter in parameters for parameter in wanted):
         raise ToolError(
@@ -225,7 +225,7 @@ def _step(parser: argparse.ArgumentParser) -> None:
 
 
 def _positive(text: str) -> float:
-    """Return a number above 0."""
+    """Parse a number above 0, or raise argparse's error."""
     try:
         value = float(text)
     except ValueError:
@@ -236,7 +236,7 @@ def _positive(text: str) -> float:
 
 
 def _whole(text: str) -> int:
-    """Return a whole number of at least 1."""
+    """Parse a whole number of at least 1, or raise argparse's error."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
     return int(text)

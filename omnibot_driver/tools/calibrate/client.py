@@ -59,7 +59,7 @@ class Client:
         )
 
     def _require_alone(self) -> None:
-        """Raise ToolError if another driver has the same namespace, as both would obey commands."""
+        """Raise ToolError if another driver has the same namespace: both would obey commands."""
         here = [
             name
             for name in self._here()
@@ -111,7 +111,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Set the parameters that may change while the driver runs."""
+        """Set parameters of the kind that may change while the driver runs."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }
@@ -143,7 +143,7 @@ class Client:
             self._node.destroy_client(client)
 
     def _wait(self, done: Callable[[], object], seconds: float) -> bool:
-        """Wait for the condition; return whether it became true in time."""
+        """Wait at most ``seconds`` for the condition; return whether it became true."""
         deadline_s = time.monotonic() + seconds
         while not (held := done()) and time.monotonic() < deadline_s:
             self._spin(0.05)

@@ -2,8 +2,8 @@
 
 """``calibrate commission``: a guided procedure that finds how motors and IMU are oriented.
 
-Whatever the board's data show is taken from them. A person is asked how the wheels really turn, and
-to hold the robot. A contradictory answer is explained, and the question repeated.
+What can be measured is taken from the board's data. The user is asked how the wheels really turn,
+and to hold the robot. A contradictory answer is explained, and the question repeated.
 """
 
 import argparse
@@ -46,10 +46,10 @@ from omnibot_driver.tools.needs import ToolError
 TRIES: Final = 3
 JOG_S: Final = 2.0
 WHEEL_RADPS: Final = 2.0
-"""Speed of a wheel that is shown, in rad/s: docs/commissioning.md, step 5, as for the axes."""
+"""Speed of a wheel while its direction is shown to the user, in rad/s (docs/commissioning.md)."""
 AXIS_SPEEDS: Final[tuple[Vector3, ...]] = ((0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3))
 SLOW_LSB: Final = 4
-"""Value of Vx, 0.06 m/s by default: a whole word, so that the next is exactly twice as fast."""
+"""Value of Vx in the board's units, 0.06 m/s by default; whole, to be doubled exactly."""
 TURN_RADPS: Final = 0.5
 TURN_RAD: Final = 1.6
 HELD_S: Final = 1.5
@@ -60,7 +60,7 @@ T = TypeVar("T")
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Run the selected parts. Raises ToolError where an answer stays contradictory."""
+    """Run the selected parts. Raises ToolError if an answer stays contradictory."""
     walk = Walk(robot, console)
     found = Found(before=robot.parameters)
     if "board" in arguments.only or "wheels" in arguments.only:
@@ -177,7 +177,7 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Repeat a motion until the answer is a valid pattern; return the pattern."""
+        """Repeat a motion until the user's answer is a valid pattern; return that pattern."""
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
@@ -222,8 +222,7 @@ class Walk:
     # Common to all parts
 
     def _until_possible(self, find: Callable[[], T]) -> T:
-        """Repeat a measurement until its result is possible. Raises ToolError after three
-        attempts."""
+        """Repeat a measurement until it is plausible. Raises ToolError after three attempts."""
         for _ in range(TRIES):
             try:
                 return find()
@@ -249,5 +248,5 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """Return the pattern of an answer; an empty one asks for a repetition."""
+    """Return the pattern that an answer describes; an empty pattern asks for a repetition."""
     return () if answer == "r" else understand(answer)

@@ -25,7 +25,10 @@ COLOURS: Final = {"x": "C3", "y": "C2", "z": "C0"}
 
 @dataclass(slots=True)
 class Found:
-    """What a commissioning found, None where nothing; ``before``: the driver's parameters."""
+    """The results of a commissioning, each None if not found.
+
+    ``before``: the driver's parameters before it.
+    """
 
     before: dict[str, Any]
     control_method: str | None = None

@@ -27,8 +27,8 @@ PLAIN_WIDTH: Final = 100
 class Console:
     """The dialogue on a terminal.
 
-    ``yes`` answers every question with yes; numbers are still asked for, since only the user knows
-    them.
+    With ``yes``, every yes-or-no question is answered with yes; numbers are still asked for, since
+    only the user knows them.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Console:
         return self._answer(f"{question} [y/N] ").lower() in ("y", "yes")
 
     def choose(self, question: str, answers: Sequence[str]) -> str:
-        """Ask for one of these words; an unambiguous beginning is enough."""
+        """Ask until the answer is, or clearly begins, one of these words; return the word."""
         while True:
             answer = self._answer(f"{question} [{'/'.join(answers)}] ").lower()
             fitting = [one for one in answers if answer and one.lower().startswith(answer)]
@@ -75,7 +75,7 @@ class Console:
             self.say(f"Please answer one of: {', '.join(answers)}.")
 
     def number(self, question: str, unit: str, low: float, high: float) -> float:
-        """Ask for a number in this unit and range."""
+        """Ask until the answer is a number from ``low`` to ``high``; return the number."""
         while True:
             answer = self._answer(f"{question} in {unit}: ")
             try:
@@ -87,7 +87,7 @@ class Console:
             self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
 
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
-        """Ask until the answer can be understood; print ``otherwise`` after one that cannot."""
+        """Ask until ``understand`` accepts the answer; print ``otherwise`` after others."""
         while (meant := understand(self._answer(f"{question} "))) is None:
             self.say(otherwise)
         return meant
@@ -110,7 +110,7 @@ class Console:
         self.say(f"{what}: done")
 
     def table(self, title: str, findings: Sequence[Finding]) -> None:
-        """Print the table: value ± uncertainty, and the driver's present value."""
+        """Print the table: each value with its uncertainty, and the driver's present value."""
         table = Table(title=title, title_justify="left", pad_edge=False)
         for heading in ("", "found", "±", "unit", "now"):
             table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
@@ -130,7 +130,7 @@ class Console:
 
 
 def digits(finding: Finding) -> tuple[str, str, str]:
-    """Return value, uncertainty and previous value, to two digits of the uncertainty."""
+    """Return value, uncertainty and previous value as text, to two digits of the uncertainty."""
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None
     if sigma and math.isfinite(sigma):

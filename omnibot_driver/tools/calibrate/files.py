@@ -19,9 +19,9 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
-    """Return the file to write: the given one, else the driver's, else one in this folder.
+    """Return the given file, else the driver's calibration file, else a file in this folder.
 
-    Raises ToolError where it cannot be written or holds something else.
+    Raises ToolError if the file cannot be written or holds something else.
     """
     try:
         path = calibration.locate(given or drivers or DEFAULT)
@@ -54,7 +54,7 @@ def picture_file(given: str | None, subcommand: str) -> Path:
 
 
 def save(result: Result, output: Path, table: Table) -> None:
-    """Save the result. Raises ToolError, which leaves the file unchanged."""
+    """Save the result. Raises ToolError on failure, which leaves the file unchanged."""
     try:
         for name, value in result.parameters.items():
             table.by_name[name].check(value)

@@ -2,7 +2,7 @@
 
 """Make drives on the floor, one after the other, each of which the user measures with a tape.
 
-Must not know what is computed from them.
+Must not know what is computed from the drives.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from omnibot_driver.tools.needs import ToolError
 
 
 class Planned(Protocol):
-    """A planned drive; ``name`` is shown to the user."""
+    """A planned drive; ``name`` describes the drive to the user."""
 
     @property
     def name(self) -> str: ...
@@ -36,7 +36,7 @@ def measured(
     go: Callable[[Drive], Column],
     measure: Callable[[Drive, Column], Measured],
 ) -> list[Measured]:
-    """Make the drives, and return what ``measure`` makes of each one's poses from ``go``.
+    """Make the drives with ``go``, and return what ``measure`` makes of each drive's poses.
 
     Raises ToolError.
     """
@@ -54,7 +54,7 @@ def measured(
 def speeds(robot: Any, arguments: argparse.Namespace) -> tuple[float, float]:
     """Return the speed in m/s and the yaw rate in rad/s, within the driver's limits.
 
-    Raises ToolError where one of them is 0.
+    Raises ToolError if the speed or the rate is 0.
     """
     now = robot.parameters
     speed = min(arguments.speed, now["max_linear_speed"])
@@ -74,7 +74,7 @@ def driven(
     turn_rad: float,
     seconds: float,
 ) -> Column:
-    """Drive, and return the poses of the odometry; raises ToolError.
+    """Drive by this law, and return the poses of the odometry. Raises ToolError.
 
     ``turn_rad``: the heading at the end; ``seconds``: the expected duration.
     """
@@ -95,7 +95,7 @@ def driven(
 
 
 def turned_past_mark(console: Console) -> float:
-    """Ask how far the front points past its mark; return the angle in rad, positive to the left."""
+    """Ask how far the robot's front points past its mark; return rad, positive to the left."""
     return math.radians(
         console.number(
             "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0

@@ -22,7 +22,7 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""A wheel whose radius differs from the mean by more than this part is reported to the user."""
+"""Relative difference of a wheel's radius from the mean above which the user is warned."""
 INTRODUCTION: Final = (
     "You need a tape measure, something to mark the floor with, and a plumb or a fixed point under"
     " the robot's centre. Before each drive mark where the centre is and where the front points;"
@@ -33,7 +33,10 @@ INTRODUCTION: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """One drive through ``places``; ``heading``: measure its heading, else its position."""
+    """A drive through ``places``.
+
+    ``heading``: whether the heading at the end is measured, or else the position.
+    """
 
     name: str
     places: list[Pose]
@@ -41,7 +44,7 @@ class Drive:
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Make the drives and find the geometry. Raises ToolError."""
+    """Make the drives and compute the geometry. Raises ToolError."""
     if "base_radius" not in robot.parameters:
         return odometry_scale.run(robot, console, arguments)
     console.say(INTRODUCTION)
@@ -78,7 +81,7 @@ def believed(now: Mapping[str, Any]) -> dict[str, float]:
 
 
 def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
-    """Return the drives in their order."""
+    """Return the drives to make, in order."""
     angle_rad = math.tau * turns
     number = f"{turns} turns" if turns > 1 else "1 turn"
     drives = [
@@ -128,7 +131,7 @@ def _reading(
 
 
 def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any]) -> Result:
-    """Return the findings for a geometry, to show and write; ``now``: the driver's parameters."""
+    """Return the findings for this geometry, to show and write; ``now``: driver's parameters."""
     wheels_sigma, base_sigma = map(float, np.sqrt(np.diag(found.covariance)[:2]))
     factors = {
         "wheel_radius": (found.wheels, wheels_sigma, "m"),
@@ -178,9 +181,10 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
 def misses(
     readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> tuple[float, float]:
-    """Return the odometry's mean distance, in m, from the measured ends, before and after.
+    """Return the mean distance, in m, between the odometry's end and the measured end of a drive.
 
-    The driver has one radius for all wheels, so differences between wheels are not used.
+    The first value is with the driver's present geometry, the second with the one found. The driver
+    has one radius for all wheels, so differences between wheels are not used.
     """
     before: list[float] = []
     after: list[float] = []

@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Draw the drives by the odometry before and after, with the ends that were measured by tape.
+    """Draw the drives by the odometry with old and new geometry, and the ends measured by tape.
 
-    Beside them draw the error of each reading, before and after, in its standard deviations.
+    Beside the drives, draw the error of each reading with either geometry, in its standard
+    deviations.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]

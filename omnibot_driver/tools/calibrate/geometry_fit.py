@@ -23,18 +23,18 @@ from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.needs import ToolError
 
 WHEELS_ALIKE: Final = 0.01
-"""Relative standard deviation of one wheel's radius from the mean, by manufacture."""
+"""Standard deviation of a wheel's radius from the mean that manufacture causes, relative."""
 UNKNOWN: Final = 0.2
-"""Largest relative deviation of a size from the expected one; beyond it a reading is a mistake."""
+"""Largest relative deviation of a size from the assumed one; beyond this a reading is a mistake."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
     """One measured drive.
 
-    ``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) where the robot
-    truly ended, seen from where it began, in m, m and unwrapped rad, NaN where it was not measured;
-    ``sigma``: (3,) standard deviation of the measurement.
+    ``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) true pose at the end
+    relative to the start, in m, m and unwrapped rad, NaN if not measured; ``sigma``: (3,) standard
+    deviation of the measurement.
     """
 
     name: str
@@ -47,9 +47,9 @@ class Reading:
 class Geometry:
     """Sizes relative to the assumed ones.
 
-    ``wheels``: the mean radius; ``base``; ``unlike``: (3,), by how much each wheel exceeds the
-    mean, relative. ``covariance``: (4, 4), of wheels, base and the first two of ``unlike``;
-    ``excess``: misfit over the expected one (1: as expected).
+    ``wheels``: mean radius; ``base``: base radius; ``unlike``: (3,), relative excess of each wheel
+    over the mean. ``covariance``: (4, 4), of wheels, base and the first two of ``unlike``;
+    ``excess``: misfit divided by the expected misfit.
     """
 
     wheels: float
@@ -60,7 +60,7 @@ class Geometry:
 
     @property
     def turn(self) -> float:
-        """The ratio of the true turn to the expected one."""
+        """Ratio of the true turn to the turn that the assumed sizes give."""
         return self.wheels / self.base
 
     @property
@@ -79,8 +79,9 @@ class Geometry:
 def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
     """Return the geometry that explains the readings best.
 
-    ``base_radius_m``: the assumed one; ``drift``: standard deviation in m of a wheel's way after 1
-    m, caused by slip. Raises ToolError for readings that no such robot can have made.
+    ``base_radius_m``: the assumed base radius; ``drift``: standard deviation, in m, of the distance
+    of a wheel after 1 m, caused by slip. Raises ToolError for readings that no such robot can have
+    made.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -109,7 +110,7 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the (n, 3) poses, from the identity on, of the same wheel turns with other sizes.
+    """Return the (n, 3) poses that the same wheel turns give with other sizes, from the origin on.
 
     Wheel radii are ``factors`` times as large, (3,) or step by step (n - 1, 3); the base is
     ``base`` times as large.
@@ -125,7 +126,7 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
 
 def rims_of(path: Column, base_radius_m: float) -> Column:
-    """Return how far each rim rolled from pose to pose, in m: (n - 1, 3)."""
+    """Return how far each rim rolled between successive poses, in m: (n - 1, 3)."""
     steps = np.diff(path, axis=0)
     middle = path[:-1, 2] + steps[:, 2] / 2
     cos, sin = np.cos(middle), np.sin(middle)
@@ -134,8 +135,7 @@ def rims_of(path: Column, base_radius_m: float) -> Column:
 
 
 def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
-    """Return weights that make the measured errors independent, with a standard deviation of
-    one."""
+    """Return weights with which the measured errors are independent and have unit variance."""
     path = reading.path
     x, y, yaw = np.linalg.inv(_rims(base_radius_m))
     middle = (path[:-1, 2] + path[1:, 2]) / 2

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 AXES: Final = "xyz"
 COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
 DRAWN: Final = 1000
-"""Largest number of readings drawn; more make the picture larger, but not clearer."""
+"""Largest number of readings to draw; more make the file larger, but not the picture clearer."""
 GRAVITY_SIGMA: Final = 0.01
 """Standard deviation of the local gravity as a user knows it, in m/s²."""
 
@@ -53,7 +53,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> Result:
-    """Return the findings of a rest, to show and to write; ``now`` are the driver's parameters."""
+    """Return the findings of a rest, to show and to write; ``now``: the driver's parameters."""
     too_long_mps2 = found.gravity_mps2 - gravity_mps2
     accel_bias = too_long_mps2 * found.up
     along_sigma = math.hypot(GRAVITY_SIGMA, float(found.force_sigma.max()))
@@ -126,7 +126,7 @@ def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> R
 
 
 def draw(figure: "Figure", found: Rest, imu: Imu) -> None:
-    """Draw rates and forces over time, and the Allan deviation with its fit."""
+    """Draw rates and forces over time, and the Allan deviation with the fitted noise terms."""
     grid = figure.add_gridspec(2, 2)
     rates, forces = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
     seconds = imu.stamp_s - imu.stamp_s[0]

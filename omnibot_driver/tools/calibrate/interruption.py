@@ -51,7 +51,7 @@ class Interruption:
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """A context in which a received signal has no effect until its end."""
+        """A context in which a received signal has no effect until the context ends."""
         self._deferred = True
         try:
             yield
@@ -59,7 +59,7 @@ class Interruption:
             self._deferred = False
 
     def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
-        """Return a function that reads as ``read`` does, but that a signal interrupts."""
+        """Return a function that reads as ``read`` does, but that a signal interrupts at once."""
 
         def ask(question: str) -> str:
             self.check()

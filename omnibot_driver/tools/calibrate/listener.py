@@ -24,14 +24,14 @@ from omnibot_driver.tools.needs import ToolError
 
 IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
-"""After this time without data, in s, the robot is not driven any further."""
+"""Time without data, in s, after which the robot is not driven any further."""
 AT_ONCE: Final = 100
-"""Number of messages that are read at once."""
+"""Largest number of messages that are read in one go."""
 LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Listener(Client):
-    """A client that records the robot's data; ``log`` is of the present or last motion or rest."""
+    """A client that records the robot's data; ``log``: the current or last motion or rest."""
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         super().__init__(node, context, interruption)
@@ -90,8 +90,7 @@ class Listener(Client):
         self._estop = message.data
 
     def _begin(self, states: Sequence[str]) -> None:
-        """Start a new log, with newly received data, as none is received while a person is
-        asked."""
+        """Start a new log with fresh data, since none is received while the user is asked."""
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._wait(lambda: min(self._heard_s.values()) > 0, 1.0)
@@ -115,8 +114,10 @@ class Listener(Client):
             )
 
     def _lost(self) -> list[str]:
-        """Return the topics without data, after reading pending messages, as this program may
-        lag."""
+        """Return the topics without recent data.
+
+        Pending messages are read first, as this program may lag.
+        """
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):
             for _ in range(AT_ONCE):

@@ -47,7 +47,7 @@ class Wheels:
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """Commands by sending time: ``values`` (n, 3) in m/s and rad/s, or wheel rates in rad/s."""
+    """Commands with sending times; ``values``: (n, 3) in m/s and rad/s, or wheel rates in rad/s."""
 
     stamp_s: Column
     values: Column
@@ -55,7 +55,7 @@ class Commands:
 
 @dataclass(slots=True)
 class Log:
-    """Received and sent data: rows in order of arrival, with columns for calculations."""
+    """Data received and sent: rows in order of arrival, which are available as columns."""
 
     imu_rows: list[Row] = field(default_factory=list)
     odometry_rows: list[Row] = field(default_factory=list)

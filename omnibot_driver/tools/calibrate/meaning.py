@@ -2,7 +2,8 @@
 
 """Find the meaning of the board's commands and deltas from its own odometry. Pure calculation.
 
-This needs neither a person nor a floor: the odometry is enough, whatever its signs and scales.
+Neither a person nor a measured floor is needed: the odometry is enough, whatever its signs and
+scales.
 """
 
 import math
@@ -17,17 +18,17 @@ from omnibot_driver.tools.needs import ToolError
 ControlMethod = Literal["velocity", "position"]
 
 STANDS_PART: Final = 0.1
-"""Below this part of the commanded speed the robot stands."""
+"""Fraction of the commanded speed below which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 DOUBLED: Final = (1.6, 2.5)
-"""Range of the speed ratio after the command was doubled, including friction and rounding."""
+"""Range of the ratio of speeds when the command is doubled, with friction and rounding."""
 PURE_TURN: Final = 0.5
 """Largest ratio of sideways motion to rim speed in a turn on the spot.
 
-It is 0 if the deltas are understood, else 2 or more.
+The ratio is 0 if the deltas are interpreted correctly, else 2 or more.
 """
 ALIKE: Final = 0.35
-"""Part of a turn's angle by which two directions may differ and still be the same."""
+"""Fraction of the turned angle by which two directions may differ and still be the same."""
 
 
 LEAST_M: Final = 1e-3
@@ -35,7 +36,7 @@ LEAST_M: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Mean velocity over a time by the driver's odometry: in the body's axes, m/s and rad/s.
+    """Mean velocity by the driver's odometry over some time: in the body's axes, m/s and rad/s.
 
     ``early_mps`` and ``late_mps`` are the speeds of the two halves of the time.
     """
@@ -78,10 +79,11 @@ def require_motion(odometry: Odometry) -> None:
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
-    """Return the position of the board's switch, from the motion at ``slow_mps`` and at twice that.
+    """Return whether the board commands velocity or position, from the motion at two commands.
 
-    Velocities are held and doubled. In positional control the same command is a place a few
-    millimetres from the origin of the board's frame: the robot drives there and stops.
+    ``slow``: the motion with the command for ``slow_mps``; ``fast``: with twice that command. A
+    velocity is held, and doubles. In positional control the same command is a place a few
+    millimetres from the origin of the board's frame: the robot drives to that place and stops.
     """
     least_mps = STANDS_PART * slow_mps
     held = all(
@@ -95,15 +97,15 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
 
 
 def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
-    """Whether the odometry shows a turn on the spot as one."""
+    """Return whether the odometry shows a turn on the spot as such, not as a sideways motion."""
     return turning.speed_mps < PURE_TURN * base_radius_m * abs(turning.yaw_rate)
 
 
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
-    """Whether a command leads in the same body direction after a turn by this angle.
+    """Return whether a command moves the body in the same direction before and after this turn.
 
-    With the wrong one of the frames "earth" and "body" its direction has turned as well. Raises
-    ToolError where neither is the case.
+    With the wrong choice between the frames "earth" and "body", the direction turns as well. Raises
+    ToolError if neither is the case.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

@@ -19,30 +19,31 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A function of the seconds and the pose since the motion began (yaw unwrapped), to a command.
+"""A function from time in s and pose, both since the motion began, to a command.
 
-The command is in m/s, m/s and rad/s for ``cmd_vel``, in rad/s of A, B, C for ``wheel_cmd``.
+The yaw is unwrapped. The command is in m/s, m/s and rad/s for ``cmd_vel``, in rad/s of wheels A, B,
+C for ``wheel_cmd``; None ends the motion.
 """
 
 LOOK_S: Final = 1.0
-"""Time, in s, in which a robot must move before it is reported not to obey."""
+"""Time after which a robot that has not moved is reported not to obey, in s."""
 SLOW_LOOK_S: Final = 3.0
-"""The same time, in s, where the odometry is predicted from rare measurements."""
+"""The same time for a board with rare measurements, between which odometry is predicted, in s."""
 OBEYED_PART: Final = 0.2
-"""A robot that moves by less than this part of its command counts as standing."""
+"""Fraction of the command below which the measured speed of a robot means standing still."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Commands slower than this may be lost in friction: m/s and rad/s, or rad/s of a wheel."""
+"""Slowest commands that friction cannot hold: m/s and rad/s, or rad/s of a wheel."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
     """Limits of one motion. Linear in m and m/s, turning in rad and rad/s.
 
-    ``speed``, ``turning``: of commands (for wheels, ``speed`` is the fastest wheel's, in rad/s);
-    ``way``, ``turn``: from the start, by the odometry; ``seconds``: the duration; ``acceleration``,
-    ``angular_acceleration``: how fast a command is changed (for wheels, the first one). An infinite
-    one changes commands at once.
+    ``speed``, ``turning``: largest ones of commands (for wheels, ``speed`` is the fastest wheel's,
+    in rad/s); ``way``, ``turn``: largest ones from the start, by the odometry; ``seconds``: the
+    duration; ``acceleration``, ``angular_acceleration``: how fast a command is changed (for wheels,
+    the first one). An infinite acceleration changes commands at once.
     """
 
     speed: float
@@ -54,7 +55,7 @@ class Bounds:
     angular_acceleration: float = 0.8
 
     def require_allowed(self, topic: Topic, command: Vector3) -> None:
-        """Raise ToolError if a command is too fast or not finite."""
+        """Raise ToolError if a command exceeds the limits or is not finite."""
         if topic == "wheel_cmd":
             allowed = max(map(abs, command)) <= self.speed
         else:
@@ -87,7 +88,7 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """Return the command after this time on the straight way to the wanted command."""
+        """Return the command after ``seconds`` of change from ``now`` towards ``wanted``."""
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
             return a, b, c
@@ -97,7 +98,7 @@ class Bounds:
 
 
 class Obedience:
-    """Checks that the robot roughly follows its commands, interval by interval."""
+    """Checks at short intervals that the robot roughly follows its commands."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
         """Watch commands on this topic; the driver's ``parameters`` show what its board has."""
@@ -108,7 +109,7 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Raise ToolError once the robot has not moved for a while although it was commanded to.
+        """Raise ToolError if the robot has not moved for some time although commanded to.
 
         ``seconds``: since the last call; ``measured`` has the units of ``command``.
         """
@@ -138,12 +139,12 @@ class Obedience:
 
 
 def steady(command: Vector3, seconds: float) -> Law:
-    """Return a law that commands the same for this time."""
+    """Return a law that gives the same command for ``seconds``, then ends."""
     return lambda now_s, _pose: command if now_s < seconds else None
 
 
 def stairs(steps: list[tuple[float, Vector3]]) -> Law:
-    """Return a law that gives these commands one after the other, each for its seconds."""
+    """Return a law that gives these commands one after the other, each for its time in s."""
 
     def law(now_s: float, _pose: Pose) -> Vector3 | None:
         for seconds, command in steps:

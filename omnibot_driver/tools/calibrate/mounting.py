@@ -28,14 +28,14 @@ GRAVITY_PART: Final = 0.15
 LEAST_TILT_RAD: Final = math.radians(10)
 MOST_TILT_RAD: Final = math.radians(75)
 SQUARE_RAD: Final = math.radians(35)
-"""Largest deviation from a right angle between two tilts made by hand."""
+"""Largest deviation from a right angle between two tilts made by hand, in rad."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""A sensor within this angle of a right-angled mounting is taken as mounted at right angles."""
+"""Largest angle in rad from a right-angled mounting at which a sensor is taken as so mounted."""
 HAND_RAD: Final = math.radians(2)
-"""Least standard deviation of a tilt's direction by hand, even if both tilts agree better."""
+"""Least standard deviation of a tilt's direction by hand, in rad, even if tilts agree better."""
 LEVEL_WEIGHT: Final = 20.0
-"""Weight of the level posture over a tilted one, as a floor is more exact than a hand."""
+"""Weight of the level posture relative to a tilted one, as a floor is more exact than a hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Mounting:
         return rpy(self.rotation)
 
     def snapped(self) -> "Mounting | None":
-        """Return the nearest right-angled mounting; None if none is near."""
+        """Return the nearest right-angled mounting, or None if none is within ``SNAP_RAD``."""
         nearest = max(_right_angles(), key=lambda one: float(np.trace(one.T @ self.rotation)))
         cosine = (float(np.trace(nearest.T @ self.rotation)) - 1.0) / 2.0
         if math.acos(max(-1.0, min(1.0, cosine))) > SNAP_RAD:
@@ -148,7 +148,7 @@ def _tilt(level: Array, tilted: Array, what: str) -> float:
 
 
 def _level_part(level: Array, tilted: Array) -> Array:
-    """Return the unit vector of the tilt's part in the level plane."""
+    """Return the part of ``tilted`` perpendicular to ``level``, as a unit vector."""
     part = tilted - (tilted @ level) * level
     return np.asarray(part / np.linalg.norm(part))
 

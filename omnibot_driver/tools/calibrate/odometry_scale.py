@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry`` and ``scale`` of a base that only drives straight and turns.
+"""``calibrate geometry`` and ``scale`` for a base that only drives straight and turns.
 
-They find the factors for its odometry with a tape measure. If the driver has a way for each count
-of its encoder instead, that is found. Must not know the base's wheels.
+A tape measure shows the factors for the odometry, or, if the driver has the parameter, the way for
+each count of the encoder. Must not know the base's wheels.
 """
 
 import argparse
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 LINES: Final = 2
 """Number of straight drives; two show whether one was misread."""
 UNLIKE: Final = 4.0
-"""Standard deviations by which two ratios differ that are not the same."""
+"""Difference of two ratios, in standard deviations, above which the ratios disagree."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""Parameters for the way of an encoder's count, and for the motors' units of a speed.
+"""Parameters for the distance per encoder count, and for the motors' units of a speed.
 
-A longer way for each count makes the same speed fewer units of the motors.
+A longer distance per count makes the same speed fewer units of the motors.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where the"
@@ -44,8 +44,7 @@ INTRODUCTION: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A drive of ``wanted`` m straight ahead, or of ``wanted`` rad on the spot where it
-    ``turns``."""
+    """A drive of ``wanted`` m straight ahead, or, if ``turns``, of ``wanted`` rad on the spot."""
 
     name: str
     wanted: float
@@ -54,9 +53,9 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """The ratio of the true motion to the odometry's, in the unit of its drive.
+    """The true motion and the odometry's of one drive, and their ratio; in m or rad.
 
-    ``sigma`` is the standard deviation of the true motion.
+    ``sigma``: standard deviation of the true motion.
     """
 
     drive: Drive
@@ -90,7 +89,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def plan(side_m: float, turns: int) -> list[Drive]:
-    """Return the drives in their order."""
+    """Return the drives to make, in order."""
     number, angle_rad = f"{turns} turns" if turns > 1 else "1 turn", math.tau * turns
     return [
         Drive(f"{number} to the left", angle_rad, True),
@@ -159,7 +158,7 @@ def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """Draw the ratio of true motion to the odometry's, drive by drive."""
+    """Draw for each drive the ratio of the true motion to the odometry's."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 STEP_S: Final = 0.001
 NOMINAL_S: Final = 0.2
-"""Step of the controller by the manual, in s; the board calculates its coefficients for it."""
+"""Step of the controller in the manual, in s, for which the board calculates its coefficients."""
 STALE_S: Final = 0.5
 SENDS_S: Final = 9 * 14 * 10 / 115200
 """Time in which the public firmware sends its ticks and its odometry: nine lines of 14 characters.
@@ -58,7 +58,7 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Factor by which a written time constant is longer than the one that acts."""
+        """Ratio of a time constant as written to the board to the one that takes effect."""
         return self.nominal_s / self.period_s
 
 
@@ -136,11 +136,11 @@ def answer(
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Characteristics of a step response.
+    """Characteristics of a step response; scalars or arrays.
 
-    ``overshoot``: in parts of the final speed, or of the target if that is higher. ``settled_s``:
-    time after which the speed stays in the tolerance band, infinite where it does not. ``error_s``:
-    integral of the absolute error, in parts of the target. Scalars or arrays.
+    ``overshoot``: as a fraction of the final speed, or of the target if that is higher.
+    ``settled_s``: time after which the speed stays in the tolerance band, infinite if it does not.
+    ``error_s``: integral of the absolute error, as a fraction of the target, in s.
     """
 
     overshoot: Array
@@ -149,7 +149,7 @@ class Traits:
 
 
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
-    """Return the traits of a response; its final speed is the mean of its last quarter."""
+    """Return the characteristics of a response; its final speed is the mean of the last quarter."""
     comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
     overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)
     outside = np.abs(rpm - comes_to) > band * np.maximum(comes_to, 1e-9)

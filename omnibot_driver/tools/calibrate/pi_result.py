@@ -20,23 +20,26 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""Factor of the previous error of a step above which new gains are worse; below it is noise."""
+"""Ratio of the new to the previous error of a step above which the new gains are worse."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Recorded steps of a set-point."""
+    """Recorded steps of a set-point with the same gains."""
 
     steps: list[Response]
 
     @property
     def final_rpm(self) -> float:
-        """The final speed of the steps, in RPM."""
+        """Mean final speed of the steps, in RPM."""
         return float(np.mean([one.rpm[-len(one.rpm) // 3 :].mean() for one in self.steps]))
 
     @property
     def overshoot(self) -> float:
-        """Overshoot of the steps' mean over 0.2 s; the peak of noisy samples would be too high."""
+        """Overshoot of the steps' mean over 0.2 s, as a fraction.
+
+        The peak of noisy samples would be too high.
+        """
         grid_s = np.arange(0.0, min(one.times_s[-1] for one in self.steps), 0.02)
         mean = np.mean([np.interp(grid_s, one.times_s, one.rpm) for one in self.steps], axis=0)
         calm = np.convolve(mean, np.full(10, 0.1), "valid")
@@ -44,8 +47,10 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Mean integral of the absolute error from the first tick on, in parts of the final
-        speed."""
+        """Mean integral of the absolute error from the first tick on, relative to the final speed.
+
+        The unit is s.
+        """
         errors = []
         for one in self.steps:
             wrong = np.abs(one.rpm / self.final_rpm - 1.0)
@@ -68,14 +73,14 @@ class WheelTuned:
 
     @property
     def worse(self) -> bool:
-        """Whether the wheel followed a step better before."""
+        """Whether the wheel followed a step better with the previous gains."""
         return self.after.error_s > WORSE * self.before.error_s
 
 
 def result_of(
     wheels: Sequence[WheelTuned], goals: Goals, parameters: Mapping[str, float]
 ) -> Result:
-    """Return the result; ``parameters`` are set in the driver now, and are to be kept."""
+    """Return the result; ``parameters``: those set in the driver now, which the file must keep."""
     return Result(
         findings=[row for wheel in wheels for row in _rows(wheel, goals)],
         parameters=dict(parameters),

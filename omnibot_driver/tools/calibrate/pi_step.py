@@ -2,10 +2,10 @@
 
 """``calibrate step`` for a board that records ticks and takes gains: encoders, plant, controller.
 
-Wheels turn freely at a constant duty, for the levels of their encoders. They start at full duty,
-for the plant. Then they make a step of their set-point with the present gains, and with those
-found; these steps yield the dead time. With it the gains are found anew, and a last step measures
-their effect.
+First the wheels turn freely at a constant duty, which shows the levels of their encoders. Then they
+start at full duty, which shows the plant. Then they make a step of their set-point with the present
+gains, and with the gains found; these steps yield the dead time. With the dead time the gains are
+found again, and a last step measures their effect.
 """
 
 import argparse
@@ -37,19 +37,21 @@ FIRST_RPM: Final = 30.0
 """Set-point of the steps that are made before a plant is known, in RPM."""
 ROUNDS: Final = 3
 WRITTEN_WITHIN_S: Final = 4.0
-"""Time in which settings reach the board, in s; they are repeated, as the board acknowledges none.
+"""Longest time for settings to reach the board, in s.
+
+They are repeated, because the board acknowledges none.
 """
 
 QUIET_S: Final = 0.5
 """Period in which the board sends ticks while it records, in s.
 
-The board measures no tick while it sends, so it should send as rarely as possible.
+The board measures no tick while sending, so it should send as rarely as possible.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters that are restored after the records."""
 
 Records = dict[str, list[Column]]
-"""Times between ticks of each record, by side."""
+"""Times between ticks in s of each record, by side (left or right)."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
@@ -85,7 +87,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class _Bench:
-    """A robot that records; ``show`` gets the number of finished records."""
+    """A robot that records its wheels; ``show`` gets the number of finished records."""
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
         self.robot, self._show, self._responses, self._done = robot, show, responses, 0
@@ -97,7 +99,7 @@ class _Bench:
         self.robot.rest(WRITTEN_WITHIN_S)
 
     def record(self, topic: str, command: Sequence[float], count: int = 1) -> Records:
-        """Record this number of starts, each from standstill; return the times between ticks."""
+        """Record ``count`` starts, each from standstill; return the times between ticks."""
         found: Records = {side: [] for side in SIDES}
         for _ in range(count):
             for side, column in read(self.robot.record("record_rpm", topic, command)).items():
@@ -107,7 +109,7 @@ class _Bench:
         return found
 
     def steps(self, rpm: Sequence[float]) -> Records:
-        """Record steps of the set-point to these speeds, in RPM."""
+        """Record steps of the set-point from rest to these speeds of the wheels, in RPM."""
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)
 
@@ -175,7 +177,7 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant from the static speeds at two duties: a line from the dead zone on."""
+    """Return the plant: a straight line through the speeds at two duties, from the dead zone on."""
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
         raise ToolError(
@@ -207,5 +209,5 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 
 
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
-    """Restore the parameters that are known; unset ones stay until driver and board start again."""
+    """Restore the parameters that were set; unset ones keep the new value until the next start."""
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

@@ -35,23 +35,23 @@ ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
-"""Parts of the way between two marks at which the wheel begins.
+"""Positions between two marks at which a simulated wheel starts, as fractions of the distance.
 
-This decides when ticks come in relation to the controller's steps, which changes a response.
+They decide when ticks come relative to the controller's steps, which changes a response.
 """
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Parts of the time between two groups of ticks that the board sends, at which it sends first.
+"""Times of the board's first sending, as fractions of the period in which it sends ticks.
 
-This decides which ticks are delayed by sending, which changes a response too.
+They decide which ticks are delayed by sending, which changes a response too.
 """
 DISTURBED: Final = 0.02
-"""Additional overshoot, beyond the goal, of the worst step that is disturbed by sending."""
+"""Overshoot that is allowed beyond the goal for the step that sending disturbs most."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
-"""Candidates for Td, in parts of the nominal control step.
+"""Candidates for Td, as fractions of the nominal control step.
 
-With 0 an oscillation from step to step never decays.
+With Td = 0 an oscillation from step to step never decays.
 """
 
 
@@ -59,10 +59,10 @@ With 0 an oscillation from step to step never decays.
 class Goals:
     """The goals of a tuning.
 
-    ``overshoot``, ``band``: parts of the speed. ``destination``: set-point of the step, as a part
-    of the speed at full duty. ``settled_s``: a settling time above it causes a warning. If
-    ``phase_margin_deg`` is None, the gain optimum is sought: Td = 0, and only the overshoot limits
-    the gain.
+    ``overshoot``, ``band``: as fractions of the speed. ``destination``: set-point of the step, as a
+    fraction of the speed at full duty. ``settled_s``: settling time in s above which the user is
+    warned. If ``phase_margin_deg`` is None, the gain optimum is sought: Td = 0, and only the
+    overshoot limits the gain.
     """
 
     overshoot: float = 0.05
@@ -74,7 +74,7 @@ class Goals:
 
 @dataclass(frozen=True, slots=True)
 class Tuned:
-    """The gains, and their predicted effect on a step to ``target_rpm``."""
+    """Gains, and their predicted effect on a step to ``target_rpm``."""
 
     gains: PiGains
     target_rpm: float
@@ -118,12 +118,12 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
 
 
 def target_of(plant: Plant, goals: Goals) -> float:
-    """Return the target speed, in whole RPM."""
+    """Return the set-point of the step that the goals describe, in whole RPM."""
     return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """Predict the effect of these gains on a step."""
+    """Return these gains with their predicted effect on a step."""
     target = target_of(plant, goals)
     found = _foreseen(plant, gains, loop, goals)
     return Tuned(
@@ -148,7 +148,7 @@ def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
 
 
 def _disturbed(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Array:
-    """Return the worst overshoot of a step while the board sends its ticks."""
+    """Return the largest overshoot of a step while the board sends its ticks."""
     target = target_of(plant, goals)
     begun, sent_s = (one.ravel() for one in np.meshgrid(BEGUN, loop.sends_each_s * SENT))
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=begun, sent_s=sent_s)
@@ -173,7 +173,7 @@ def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
 
 
 def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
-    """Return the model's misfit to the recorded responses, for each candidate dead time."""
+    """Return, for each candidate dead time, the model's misfit to the recorded responses."""
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]
@@ -187,15 +187,17 @@ def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
 
 
 def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
-    """Return the response recorded from a wheel at these places, in ticks, after each
-    ``STEP_S``."""
+    """Return the response that would be recorded from a wheel's positions.
+
+    ``ticks``: positions in ticks, one for each ``STEP_S``.
+    """
     marks = np.arange(1.0, ticks[-1])
     at_s = np.interp(marks, ticks, STEP_S * np.arange(1, len(ticks) + 1))
     return response(np.diff(at_s, prepend=0.0), ticks_per_revolution)
 
 
 def _unlike(shown: Response, model: Response) -> float:
-    """Return the mean square of the relative difference of two responses, until ``OVER_S``."""
+    """Return the mean square of the relative difference of two responses, up to ``OVER_S``."""
     times_s = shown.times_s[shown.times_s < OVER_S]
     told_rpm = np.interp(times_s, model.times_s, model.rpm)
     return float(np.mean((shown.rpm[: len(times_s)] / told_rpm - 1.0) ** 2))

@@ -44,7 +44,7 @@ class Rest:
 
     @property
     def up(self) -> Column:
-        """Unit vector along which the floor pushes the sensor."""
+        """Direction in which the floor pushes the sensor, as a unit vector in the sensor's axes."""
         return np.asarray(self.force_mps2 / np.linalg.norm(self.force_mps2))
 
     @property
@@ -132,13 +132,13 @@ def still(bias_radps: Column) -> Callable[[Log], None]:
 
 
 def _within(readings: Column, size: int) -> Column:
-    """Return the standard deviation of one reading within blocks of this length, axis by axis."""
+    """Return each axis's standard deviation of a reading within blocks of ``size`` readings."""
     blocks = _blocks(readings, size)
     return np.asarray(np.sqrt(blocks.var(axis=1, ddof=1).mean(axis=0)))
 
 
 def _of_mean(readings: Column, noise: Column, size: int) -> Column:
-    """Return the standard deviation of the mean: by noise, or by the blocks' scatter if larger."""
+    """Return the standard deviation of the mean, from noise or, if larger, from blocks."""
     means = _blocks(readings, size).mean(axis=1)
     white = noise / np.sqrt(len(readings))
     if len(means) < 5:

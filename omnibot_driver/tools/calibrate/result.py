@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One row of the table. ``sigma``: standard deviation, None where it is not known.
+    """One row of the table. ``sigma``: standard deviation, None if not known.
 
-    ``before``: the driver's present value, None where the driver does not have this value.
+    ``before``: the driver's present value, None if the driver does not have this value.
     """
 
     name: str

@@ -39,15 +39,15 @@ PERIOD_S: Final = 0.02
 """Period of the commands, in s."""
 STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
-"""Time from the request of a record to its commands, in s.
+"""Time from the request of a record to the first command, in s.
 
 Until then the request is repeated, as lines are lost.
 """
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
-"""A robot that stands for this time, in s, has stopped."""
+"""Time at rest, in s, after which the robot is regarded as stopped."""
 STANDING: Final = 0.01
-"""The robot stands below this speed, in m/s and rad/s."""
+"""Speed below which the robot is regarded as at rest, in m/s and rad/s."""
 UNRULY: Final = (
     "Stop was sent, but the robot still moves or sends no odometry; cut its power, then see"
     " docs/safety.md"
@@ -106,7 +106,10 @@ class Robot(Listener):
         show: Callable[[float], object] = lambda _part: None,
         states: Sequence[str] = ("nominal",),
     ) -> Log:
-        """Listen for this time without commands. ``show`` gets the completed part, from 0 to 1."""
+        """Record data for ``seconds`` without commands; return the log.
+
+        ``show`` gets the completed fraction, from 0 to 1.
+        """
         self._begin(states)
         began_s = now_s = time.monotonic()
         while now_s < began_s + seconds:
@@ -158,10 +161,10 @@ class Robot(Listener):
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
-        """Have the driver record during this command, then stand still; return the record's file.
+        """Let the driver record during this command, then stop; return the path of the record.
 
-        The record is requested while the robot stands, so it has begun before the motion. Raises
-        ToolError as `drive` does, and with the driver's reason where nothing was recorded.
+        The record is requested while the robot is at rest, so that it begins before the motion.
+        Raises ToolError as `drive` does, and with the driver's reason if nothing was recorded.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)
@@ -192,7 +195,10 @@ class Robot(Listener):
 
     @contextmanager
     def _unmonitored(self) -> Iterator[None]:
-        """A context without the motion monitor, which would stop a robot with wrong settings."""
+        """A context in which the driver's motion monitor is off.
+
+        With wrong settings the monitor would stop the robot.
+        """
         before = {"motion_monitor": self.parameters["motion_monitor"]}
         self.set_parameters({"motion_monitor": False})
         try:
@@ -236,7 +242,7 @@ class Robot(Listener):
             wanted = law(now_s - began_s, pose) if wanted is not None else None
 
     def _halt(self, topic: Topic) -> bool:
-        """Stop the robot; return whether it stands. A signal does not interrupt this."""
+        """Stop the robot; return whether the robot is at rest. A signal does not interrupt this."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
         while now_s < (
@@ -285,8 +291,7 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError if this program was suspended, so that outdated commands move no
-        robot."""
+        """Raise ToolError if this program was suspended, so that its commands are outdated."""
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(
                 f"this program did not run for {silence_s:.1f} s, so the driver stopped the"

@@ -24,9 +24,9 @@ REST_S: Final = 2.0
 ACCELERATION: Final = 1.0
 """Rate at which commands change, in m/s²; twice as much for turning, in rad/s²."""
 GYRO_TOLERANCE: Final = 0.03
-"""Tolerance of the gyro's scale factor: MPU-6050 product specification, section 6.1."""
+"""Relative tolerance of the gyro's scale: MPU-6050 product specification, section 6.1."""
 UNLIKE: Final = 4.0
-"""Standard deviations by which two scales differ that are not the same."""
+"""Difference of two scales, in standard deviations, above which the scales disagree."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
@@ -71,7 +71,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
-    """Return the findings of these speeds, to show and write; ``now``: the driver's parameters."""
+    """Return the findings from these speeds, to show and write; ``now``: driver's parameters."""
     by_axis = [[one for one in found if one.axis == axis] for axis in range(3)]
     if not all(by_axis):
         raise ToolError("not every axis was measured: drive longer, by --seconds")
@@ -117,7 +117,7 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
 def draw(
     figure: "Figure", found: Sequence[Speed], linear: Scale, angular: Scale, gyro: Scale
 ) -> None:
-    """Draw speeds over counts with the line found, and the residuals."""
+    """Draw measured speeds over commanded counts with the fitted line, and the residuals."""
     axes = figure.subplots(2, 2, sharex="col", height_ratios=(2, 1))
     series = [
         (0, 0, linear, "odometry", "o", "tab:red", "x"),

@@ -25,8 +25,10 @@ class Contradiction(Exception):
 
 
 def understand(answer: str) -> Pattern | None:
-    """Return the pattern of an answer such as ``+0-``, with or without spaces or commas; else
-    None."""
+    """Return the pattern of an answer such as ``+0-``, or None if it is not a pattern.
+
+    Spaces and commas are ignored.
+    """
     signs = answer.replace(" ", "").replace(",", "")
     values = [{"+": 1, "-": -1, "0": 0}.get(sign) for sign in signs]
     if len(values) != 3:
@@ -36,7 +38,7 @@ def understand(answer: str) -> Pattern | None:
 
 
 def in_words(pattern: Sequence[int]) -> str:
-    """Describe a pattern for a person."""
+    """Return a description of the pattern for the user."""
     return ", ".join(f"{wheel} {WORDS[sign]}" for wheel, sign in zip(WHEELS, pattern, strict=True))
 
 
@@ -75,7 +77,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """Return 1, or -1 for an axis that is reversed as a whole. Raises Contradiction otherwise."""
+    """Return 1 for the axis's pattern, -1 for its reverse. Raises Contradiction for others."""
     expected = wanted(axis)
     if seen == expected:
         return 1
@@ -88,7 +90,9 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 
 
 def mirrored(signs: Sequence[int]) -> bool:
-    """Whether these signs of the axes make a mirror image, which no choice of the front
-    explains."""
+    """Return whether these signs of the axes make a mirror image.
+
+    A mirror image cannot be explained by another choice of the robot's front.
+    """
     x, y, yaw = signs
     return x * y != yaw

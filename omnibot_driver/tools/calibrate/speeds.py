@@ -19,14 +19,18 @@ from omnibot_driver.tools.calibrate.log import Column, Log
 from omnibot_driver.tools.needs import ToolError
 
 SETTLE_S: Final = 1.2
-"""Time from a new speed to a steady one, in s: the board's integrator leaves 0.1 % after a second.
+"""Time from a command to a steady speed, in s.
+
+The board's integrator leaves an error of 0.1 % after a second.
 """
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
-"""Least standard deviation of a pose, in m and rad; after a second also in m/s and rad/s."""
+"""Least standard deviation of a pose, in m and rad, and of a speed over 1 s, in m/s and rad/s."""
 CORRECTED_WITH: Final = 5
-"""Steps of the odometry over which a correction is spread; together they count as one measurement.
+"""Steps of the odometry over which a correction is spread.
+
+Together they count as one measurement.
 """
 
 
@@ -34,7 +38,7 @@ CORRECTED_WITH: Final = 5
 class Speed:
     """One steady speed along an axis (0, 1, 2: x, y, yaw), in m/s or rad/s.
 
-    ``counts`` were commanded, ``measured`` is by the odometry; ``gyro`` is the yaw rate, NaN where
+    ``counts``: as commanded; ``measured``: by the odometry; ``gyro``: yaw rate by the gyro, NaN if
     the robot did not turn.
     """
 
@@ -50,8 +54,7 @@ class Speed:
 class Scale:
     """A scale in counts per m/s or rad/s, with its standard deviation ``sigma``.
 
-    ``excess``: how much more the speeds scatter about it than their uncertainties say (1: as
-    expected).
+    ``excess``: ratio of the scatter of the speeds to their uncertainties (1: as expected).
     """
 
     value: float
@@ -60,9 +63,9 @@ class Scale:
 
 
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
-    """Return steps to both sides along each axis, in whole counts, level by level.
+    """Return commands in both directions along each axis, each with its time in s.
 
-    ``top`` are the fastest speeds.
+    Commands are whole counts, at ``levels`` speeds up to ``top``.
     """
     stairs = []
     for level in range(1, levels + 1):
@@ -76,10 +79,10 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 
 
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
-    """Return the speed of every command in the log that was held for a while.
+    """Return the speed for every command in the log that was held long enough.
 
-    ``up``: direction of up in the sensor's axes; ``bias``: of its gyro. Raises ToolError if the log
-    has none.
+    ``up``: direction of up in the sensor's axes; ``bias``: of the gyro. Raises ToolError without
+    such a command.
     """
     odometry, imu = log.odometry, log.imu
     found = []
@@ -107,7 +110,7 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 
 
 def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
-    """Return the scale through the origin that fits the speeds, weighted by uncertainty, best."""
+    """Return the scale that fits the speeds best, weighted by uncertainty; speed 0 is 0 counts."""
     counts = np.array([one.counts for one in found], dtype=float)
     measured = np.array([one.measured if by == "odometry" else one.gyro for one in found])
     sigma = np.array([one.sigma if by == "odometry" else one.gyro_sigma for one in found])
@@ -125,9 +128,9 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """Return the spans in which the robot had settled at one command other than zero.
+    """Return the time spans in which the robot had settled at one command other than zero.
 
-    After a pause the driver may have dropped the command, so a new span begins.
+    A pause between commands begins a new span, because the driver may have dropped the command.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -148,7 +151,7 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the distance along the body's axis, at the mean heading."""
+    """Return the distance along this axis of the body, at the mean heading, for each pose."""
     if axis == 2:
         return np.asarray(pose[:, 2])
     heading_rad = pose[:, 2].mean() + axis * np.pi / 2
@@ -156,7 +159,7 @@ def _way(pose: Column, axis: int) -> Column:
 
 
 def _slope(stamp_s: Column, way: Column) -> tuple[float, float]:
-    """Return the slope of distance over time by a straight line, with its standard deviation."""
+    """Return the slope of distance over time from a straight line, with its standard deviation."""
     off_s = stamp_s - stamp_s.mean()
     speed = float(off_s @ way / (off_s @ off_s))
     left = way - way.mean() - speed * off_s

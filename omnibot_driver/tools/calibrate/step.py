@@ -23,7 +23,10 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 RUN_UP_S: Final = 2.0
-"""Time to reach the first speed from rest. Friction acts then, so this part is not evaluated."""
+"""Time to reach the first speed from rest, in s.
+
+This part of a record is not evaluated, because of friction.
+"""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:

@@ -69,8 +69,10 @@ def _draw_predictions(
     command: float,
     load: float,
 ) -> None:
-    """Draw a line for each wheel. ``load`` is in units of the effort that one count per tick
-    needs."""
+    """Draw each motor's response with present and better gains.
+
+    ``load`` is in units of the effort that one count per tick needs.
+    """
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):
         label: str | None = (

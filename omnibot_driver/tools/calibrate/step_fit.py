@@ -31,13 +31,13 @@ ON_THE_WAY_S: Final = 0.0015
 It consists of DDS, and 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
-"""Number of deltas before the onset that belong to a step."""
+"""Number of deltas before the onset that are evaluated with a step."""
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
-"""Ticks by which an onset may be earlier than calculated; that of a late command is later."""
+"""Range of corrections of an onset, in ticks: positive is earlier, negative later."""
 UNLIKE: Final = 3.0
-"""Factor of the median misfit above which a step's misfit is not noise."""
+"""Ratio of a step's misfit to the median misfit above which the step is rejected."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
@@ -49,10 +49,10 @@ DRAWS: Final = 100
 class Step:
     """One step from one commanded rate to another, in rad/s.
 
-    ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: the
-    mean rate over the four ticks before that. ``last_radps``: the rate commanded before
-    ``before_radps``, which replaced it ``last_ticks`` before the onset; its response may last
-    still.
+    ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: mean
+    rate of each delta, over the four ticks before its end. ``last_radps``: the rate commanded
+    before ``before_radps``, which replaced it ``last_ticks`` before the onset; the response to that
+    change may not have ended.
     """
 
     before_radps: float
@@ -63,13 +63,13 @@ class Step:
     last_ticks: int
 
     def sooner(self, ticks: int) -> "Step":
-        """Return this step with an onset that is earlier by these ticks."""
+        """Return this step with the onset moved earlier by ``ticks`` control ticks."""
         return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
 
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
-        """Return the predicted rates of this step.
+        """Return the predicted rates of this step's deltas, in rad/s.
 
-        ``mean`` is the mean response to a unit step, by the ticks at which a delta ends.
+        ``mean`` gives the mean response to a unit step, by the ticks at which a delta ends.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -82,7 +82,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A model with the parameters that explain the steps best.
+    """A model with the parameter values that explain the steps best.
 
     ``covariance`` is scaled by the residuals; ``rms_radps`` is the rms of the residuals.
     """
@@ -126,9 +126,9 @@ class Fit:
 
 
 def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
-    """Return the steps between two of these rates that were commanded to one wheel.
+    """Return the steps between two of the rates ``levels`` that were commanded to one wheel.
 
-    Raises ToolError where gaps in the deltas leave no whole step.
+    Raises ToolError if gaps in the deltas leave no complete step.
     """
     told = commands.values[:, wheel]
     heard = np.isfinite(wheels.rate_radps[:, wheel])
@@ -163,7 +163,7 @@ def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[fl
 
 
 def fit(model: Model, steps: Sequence[Step]) -> Fit:
-    """Fit a model by least squares. Raises ToolError where the steps do not determine it."""
+    """Fit a model by least squares. Raises ToolError if the steps do not determine the model."""
     rates = np.concatenate([step.rate_radps for step in steps])
     first = min(int(step.end_ticks.min()) for step in steps)
     last = max(int(step.end_ticks.max()) + step.last_ticks for step in steps)
@@ -197,7 +197,7 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The preferred fit of the two models that assume nothing about the closed loop."""
+        """The preferred of the two fits that assume nothing about the control loop."""
         return min(self.first, self.second, key=lambda fit: fit.aic)
 
     @property
@@ -217,10 +217,10 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps with corrected onsets, as each step shows its own: a command may have been
-    late.
+    """Return the steps with corrected onsets, as a command may have taken effect late.
 
-    A common shift of all steps would be a delay of the wheel, so the median onset stays.
+    Each step itself shows its onset. A common shift of all steps would be a delay of the wheel, so
+    the median onset stays.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):
@@ -238,7 +238,7 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
 
 
 def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps without those that differ from all others."""
+    """Return the steps whose misfit to a common model is not far above the median misfit."""
     guess = fit(model, steps)
     misfits = [_misfit(guess, step) for step in steps]
     most = UNLIKE * sorted(misfits)[len(misfits) // 2]

@@ -42,7 +42,7 @@ class Model:
     turned: Turned
 
     def mean(self, parameters: Array, end_s: Array) -> Array:
-        """Return the mean rate after a unit step over each delta that ends at these times."""
+        """Return the mean rate after a unit step over the deltas that end at ``end_s``."""
         turned = self.turned(parameters, np.concatenate((end_s, end_s - SPAN_S)))
         return np.asarray((turned[: len(end_s)] - turned[len(end_s) :]) / SPAN_S)
 

@@ -13,18 +13,24 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains
 UNLIKE_ONE: Final = 0.02
 """Deviation of a gain from 1 above which `calibrate scale` is recommended."""
 QUANTUM_RADPS: Final = 0.05
-"""Standard deviation of a delta's rate by the steps of the encoder and of 0.1 mm on the wire."""
-MANY: Final = 1.5
-"""Residuals, in quanta, from which on the user is warned.
+"""Standard deviation of a delta's rate that quantisation causes, in rad/s.
 
-With a computer that delayed commands they were 2 quanta, and the delay found was 4 ms too long.
+The steps are those of the encoder and of 0.1 mm on the wire.
+"""
+MANY: Final = 1.5
+"""Residuals, in multiples of ``QUANTUM_RADPS``, above which the user is warned.
+
+With a computer that delayed commands they were 2 such units, and the delay found was 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
-"""Factor of the second order's residuals above which the motor model does not fit."""
+"""Ratio of the motor model's residuals to the second order's above which the model does not fit."""
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Choose gains for all wheels, as the firmware has the same for all; return the result."""
+    """Choose gains and return the result.
+
+    The firmware has the same gains for all wheels.
+    """
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)
     findings = [row for wheel in found for row in _rows(wheel)]
@@ -90,7 +96,7 @@ def _traits(fit: Fit) -> Any:
 
 
 def _recorded(wheel: WheelFound) -> dict[str, Any]:
-    """Return every value with its standard deviation, for the file."""
+    """Return all values of a wheel with their standard deviations, for the file."""
     return {
         fit.model.title: {
             "residual_radps": round(fit.rms_radps, 4),
@@ -135,7 +141,7 @@ def _remarks(wheel: WheelFound) -> list[str]:
 
 
 def _told(wheels: list[Behaviour]) -> str:
-    """Describe the largest value over the wheels, figure by figure."""
+    """Return a text with the largest value of each characteristic over all wheels."""
     rise_ms, command_ms, load_ms = (
         1000 * max(float(value) for value in values)
         for values in (

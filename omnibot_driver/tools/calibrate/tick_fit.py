@@ -27,10 +27,10 @@ FEWEST_TICKS: Final = 30
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """A plant: the speed in RPM after a step of duty.
+    """A plant, whose input is duty in percent and whose output is speed in RPM.
 
-    It is the gain times the duty beyond ``dead_zone_percent``, through two lags. ``fast_s`` is 0
-    for a first order.
+    The speed is the gain times the duty beyond ``dead_zone_percent``, through two lags. ``fast_s``
+    is 0 for a first order.
     """
 
     rpm_per_percent: float
@@ -45,9 +45,9 @@ class Plant:
 
 @dataclass(frozen=True, slots=True)
 class PlantFit:
-    """The fit of a plant. ``final_rpm``: at the records' duty.
+    """The fit of a plant. ``final_rpm``: final speed at the duty of the records.
 
-    The residuals scale ``sigmas``.
+    ``sigmas`` are scaled by the residuals.
     """
 
     final_rpm: float
@@ -58,16 +58,16 @@ class PlantFit:
     samples: int
     order: int
     marks: Marks | None = None
-    """The encoder's marks, if they are off their places in the same way in each turn."""
+    """The encoder's marks, or None if no error of their places repeats in each turn."""
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion; the smaller one is preferred."""
+        """Akaike's information criterion: of two fits, the smaller value is preferred."""
         return 2 * self.samples * math.log(self.rms) + 2 * self.order
 
 
 def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the speed as a part of the final speed: the derivative of the angle."""
+    """Return the speed after a step at time 0, as a fraction of the final speed."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(1 - slow)

@@ -18,13 +18,13 @@ Column = NDArray[np.float64]
 
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
-"""Largest relative error of a time that is evaluated; beyond it an edge was missed."""
+"""Largest relative error of a time that is evaluated; a larger error means a missed edge."""
 OUTLIER: Final = 4.5
-"""Standard deviations of a time's error; beyond them an edge was late."""
+"""Error of a time, in standard deviations, above which an edge is regarded as late."""
 EXPLAINED: Final = 0.4
-"""Part of the variance that marks must explain to be accepted.
+"""Fraction of the variance that marks must explain to be accepted.
 
-By chance they explain a part that depends on their number of parameters: less than a fifth with
+By chance they explain a fraction that depends on the number of parameters: less than a fifth with
 three records of two turns.
 """
 
@@ -33,31 +33,31 @@ three records of two turns.
 class Marks:
     """The marks of an encoder.
 
-    ``steps``: how much longer each way from mark to mark is than their mean, relative to the mean.
+    ``steps``: relative excess of each distance between successive marks over the mean distance.
     """
 
     steps: Column
 
     @property
     def places(self) -> Column:
-        """The error of each mark's place, in ticks."""
+        """Displacement of each mark from its regular place, in ticks."""
         places = np.concatenate(([0.0], np.cumsum(self.steps)[:-1]))
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the step to which the first of these times belongs."""
+        """Return the index of the step to which the first of these relative errors belongs."""
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors of ``count`` times from step ``first`` on, by these marks."""
+        """Return the relative errors by these marks in ``count`` times from ``first`` on."""
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
 
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
-    """Return the marks that explain these records' times, None where no pattern repeats each turn.
+    """Return the marks that explain the times of these records, or None if no pattern repeats.
 
-    ``rows``: of each record, the relative excess of each time over that of even marks; nan where
-    that is not known.
+    ``rows``: of each record, the relative excess of each time over that of even marks; nan if not
+    known.
     """
     spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
     limit = min(LARGEST, OUTLIER * spread)
@@ -79,7 +79,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the step with which this row begins: where both agree best."""
+    """Return the step with which this row begins: that with the best agreement."""
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
     turned = np.arange(marks)[:, None] + np.arange(marks)
@@ -87,7 +87,7 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return the median of each step, shifted to a mean of zero."""
+    """Return the median error of each step over all rows, shifted to a mean of zero."""
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]
     )

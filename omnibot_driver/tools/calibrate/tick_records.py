@@ -18,14 +18,13 @@ from omnibot_driver.tools.needs import ToolError
 
 SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
-"""Largest part of a record's times that may be missing."""
+"""Largest fraction of a record's times that may be missing."""
 UNLIKE: Final = 1.5
-"""A time that differs from the median by more than this factor: an edge was missed, or came late.
-"""
+"""Largest ratio of a time to the median; beyond it an edge was missed or came late."""
 SMOOTHED: Final = 4
 """Number of ticks over which a speed is averaged.
 
-Single marks are off their places, but the error of a sum of intervals is not larger.
+A single mark may be displaced, but a sum of intervals has no larger error than one interval.
 """
 
 
@@ -66,8 +65,8 @@ class Levels:
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the levels of a wheel that turns freely at a constant duty, with corrections of 1.
 
-    The two levels alternate; the shorter one by its mean is the short level. After a missed edge
-    the assignment begins anew. Raises ToolError where the ticks are not regular.
+    The two levels alternate; the one with the shorter mean is the short level. After a missed edge
+    the assignment begins anew. Raises ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

@@ -39,13 +39,13 @@ MOST_OFF: Final = 0.4
 LAGS: Final = 60
 """Number of ticks over which the load is correlated."""
 MISSED: Final = 0.42
-"""Relative excess of a time, together with the next time, from which on a mark was missed.
+"""Relative excess of a time and the next time together above which a mark was missed.
 
-If a mark was noticed late instead, the next time is as much too short. (The board's clock loses up
-to 6 ms at a missed mark, so the time is not twice as long.)
+If a mark was noticed late instead, the next time is too short by the same amount. (The board's
+clock loses up to 6 ms at a missed mark, so the time is not twice as long.)
 """
 SURE_TICKS: Final = 4
-"""Number of first ticks in which none is missed, as the wheel is slow."""
+"""Number of first ticks in which a missed mark is impossible, because the wheel is slow."""
 OUTLIER: Final = 5.0
 """Standard deviations beyond which a time is an outlier."""
 FEWEST_RECORDS: Final = 6
@@ -53,7 +53,7 @@ FEWEST_RECORDS: Final = 6
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the way after a step at 0, for a final speed of 1, in units of speed times seconds."""
+    """Return the distance after a step at time 0 with a final speed of 1, in s."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(times_s - slow_s * (1 - slow))
@@ -95,7 +95,7 @@ class Search:
         self._good = np.ones(len(self._measured), dtype=bool)
 
     def roughly(self) -> Column:
-        """Return the values of a second order, with even marks and independent noise."""
+        """Return first values: a plant of second order, with even marks and independent noise."""
         records = len(self._lengths)
         starts = []
         for total_s in STARTS_S:
@@ -104,19 +104,18 @@ class Search:
         return self._best(starts)
 
     def closely(self, values: Column) -> Column:
-        """Continue the search from several ratios of time constants, as there are local optima."""
+        """Continue the search from several ratios of time constants, because of local optima."""
         return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
 
     def first_order(self, values: Column) -> Column:
-        """Continue the search with a single lag from values of a second order; ``order`` becomes
-        1."""
+        """Continue with a plant of first order from values of a second; ``order`` becomes 1."""
         self.order = 1
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
         """Return the relative excess of each time over that with even marks, by record.
 
-        It is nan for each way from mark to mark that was not measured by itself.
+        A distance between marks whose time was not measured separately has nan.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -127,7 +126,7 @@ class Search:
         return found
 
     def find_missed(self, values: Column) -> bool:
-        """Include the marks that the board has missed from now on; return whether there are any."""
+        """Find the marks that the board missed, and use them; return whether any were missed."""
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
             both = row + np.append(row[1:], 0.0)
@@ -143,7 +142,7 @@ class Search:
         return np.split(off, np.cumsum(self._lengths)[:-1])
 
     def with_marks(self, marks: Marks, values: Column) -> Column:
-        """Fit the places of the marks too, and use them from now on; return the other values."""
+        """Fit the places of the marks too, and use them from now on; return the plant's values."""
         self._marks, own = len(marks.steps), len(values)
         self._first_marks = [marks.first(row) for row in self.off(values)]
         values = np.concatenate((values, marks.places))
@@ -153,9 +152,9 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """Weight the residuals of these values by their correlation from now on.
+        """From now on, weight the residuals by the correlation that they have at these values.
 
-        Where the places of the marks are not known, the correlation is that of the marks; else of
+        Where the places of the marks are not known, the correlation is caused by the marks; else by
         the load.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
@@ -175,8 +174,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        It is that of all residuals, or of the scatter between records if larger, as a load changes
-        slowly.
+        The covariance comes from all residuals, or from the scatter between records if larger, as a
+        load changes slowly.
         """
         own = 1 + self.order
         found = self._search(values)
@@ -225,7 +224,7 @@ class Search:
         )
 
     def _sparsity(self) -> csr_matrix:
-        """Return the pattern of which times depend on which values."""
+        """Return the sparsity pattern of the Jacobian: which times depend on which values."""
         own, records, times = 1 + self.order, len(self._lengths), len(self._measured)
         pattern = np.zeros((times, own + records + self._marks))
         pattern[:, :own] = 1.0
@@ -253,9 +252,9 @@ class Search:
         return np.concatenate([self._whitener[: len(row), : len(row)] @ row for row in rows])
 
     def _told(self, values: Column, off: Column | None = None) -> Column:
-        """Return the predicted times between marks, record after record.
+        """Return the predicted times between marks in s, record after record.
 
-        ``off``: places of the marks, where they are not among the values.
+        ``off``: displacements of the marks, if they are not among the values.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)
@@ -280,7 +279,7 @@ def _cost(found: Any) -> float:
 def _correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return the correlation of each residual with the next ones, robust, and fading with the lag.
 
-    With one lag: -0.5 where marks are off their places, 0 where the noise is that of single times.
+    With one lag: -0.5 if marks are displaced, 0 if the errors of successive times are independent.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -300,9 +299,9 @@ def _correlation(rows: Sequence[Column], lags: int) -> Column:
 
 
 def _whitener(correlation: Column, length: int) -> Column:
-    """Return the matrix that whitens correlated residuals: the inverse of the Cholesky factor.
+    """Return the matrix that makes correlated residuals independent.
 
-    Its upper left part whitens a shorter row.
+    It is the inverse of the Cholesky factor. Its upper left part serves a shorter row.
     """
     column = np.zeros(length)
     column[: len(correlation)] = correlation[:length]

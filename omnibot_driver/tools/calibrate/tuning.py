@@ -38,12 +38,12 @@ ROUNDS: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """The behaviour of a motor with some gains.
+    """The behaviour of a motor with some gains; scalars or arrays.
 
-    ``rise_s``: from 10 % to 90 % of a step; ``overshoot``: part of the step; ``command_error_s``:
-    integral of absolute error after a step of 1; ``load_error_s``: the same for a load of one count
-    per tick's worth of effort; ``ms``: robustness, 1 is best; ``stable``: whether the response
-    settles. Scalars or arrays.
+    ``rise_s``: from 10 % to 90 % of a step; ``overshoot``: as a fraction of the step;
+    ``command_error_s``: integral of the absolute error after a step of 1; ``load_error_s``: the
+    same for a step of load that equals the effort of one count per tick; ``ms``: robustness, 1 is
+    best; ``stable``: whether the response settles.
     """
 
     rise_s: Array
@@ -55,7 +55,7 @@ class Behaviour:
 
 
 def behaviour(motor: Motor, gains: Gains) -> Behaviour:
-    """Return the simulated behaviour in the manual's loop."""
+    """Simulate a motor with these gains in the manual's control loop; return its behaviour."""
     with np.errstate(over="ignore", invalid="ignore"):
         speed = answer(motor, gains, HORIZON_TICKS).speed
         feedback = Gains(0.0, gains.proportional, gains.integral)
@@ -73,9 +73,9 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 
 
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
-    """Return the gains that are best for all these motors within the limits, by a narrowing search.
+    """Return the gains within the limits that are best for all these motors together.
 
-    ``now`` are the gains with which they are compared.
+    A narrowing search finds them. ``now``: the gains with which they are compared.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)
@@ -103,7 +103,7 @@ def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
 
 
 def _cost(behaves: Behaviour, reference: Behaviour) -> Array:
-    """Return the cost of these gains; infinite beyond the limits."""
+    """Return the cost of this behaviour relative to ``reference``; infinite beyond the limits."""
     cost = (
         behaves.command_error_s / reference.command_error_s
         + behaves.load_error_s / reference.load_error_s
@@ -117,6 +117,6 @@ def _around(value: float, reach: float, low: float, high: float) -> tuple[float,
 
 
 def _near(span: tuple[float, float], value: float) -> tuple[float, float]:
-    """Return the span of one grid step to both sides of a value, within the present span."""
+    """Return the range of one grid step to both sides of a value, within the present range."""
     factor = (span[1] / span[0]) ** (1.0 / (CANDIDATES - 1))
     return max(span[0], value / factor), min(span[1], value * factor)

@@ -20,7 +20,7 @@ ANGULAR_BRAKING: Final = 0.4
 def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
     """Return a law that drives through these poses and stops at each.
 
-    The poses count from where the motion begins, with the yaw unwrapped. ``speed`` is in m/s,
+    The poses are relative to the start of the motion, with the yaw unwrapped. ``speed`` is in m/s,
     ``turning`` in rad/s.
     """
     number = 0

@@ -21,7 +21,7 @@ TICK_S: Final = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Motor:
-    """A motor of first order: effort per count, time constant, dead time."""
+    """A motor of first order: PWM steps per count, time constant and dead time in ticks."""
 
     pwm_per_count: float
     time_constant_ticks: float
@@ -44,7 +44,7 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Speed and effort by tick, from the first tick on in which the wheel can respond."""
+    """The response of a wheel: speed and effort by tick, from the first tick that can respond."""
 
     speed: Array
     effort: Array
@@ -104,7 +104,7 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     decay = np.exp(-1.0 / lag)
 
     def way(share: float) -> float:
-        """Return the counts turned in this part of a tick, from rest at one count's effort."""
+        """Return the counts turned in this fraction of a tick from rest, at one count's effort."""
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 
     risen = [way(1.0 - part), way(2.0 - part) - way(1.0 - part), way(3.0 - part) - way(2.0 - part)]

@@ -25,7 +25,7 @@ LOOK_EVERY_S: Final = 0.05
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Return 0, 1 after an error that is printed on stderr, or 2 on wrong usage."""
+    """Run the monitor; return 0, 1 after an error printed on stderr, or 2 on wrong usage."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options, ros_arguments = _parse(arguments)
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -136,8 +136,7 @@ def _find(feed: "Feed", timeout_s: float) -> None:
 
 
 def _gather(feed: "Feed", timeout_s: float) -> View:
-    """Wait for all topics of a driver in this state and a whole window; return what was
-    received."""
+    """Wait for all topics of a driver in this state and a full window of rates; return the view."""
     began_s = time.monotonic()
     _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)
     _comes_about(lambda: time.monotonic() - began_s > WINDOW_S, WINDOW_S)

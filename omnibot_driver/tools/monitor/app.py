@@ -36,7 +36,10 @@ STATES: Final = {"nominal": GREEN, "imu_only": YELLOW, "paused": YELLOW}
 
 
 class Robot(Protocol):
-    """The figures to show and the actions of the keys. Each call returns at once."""
+    """What the screen needs of a robot: figures to show, and actions for the keys.
+
+    Each call returns at once.
+    """
 
     dead_man: DeadMan | None
 
@@ -121,7 +124,7 @@ class Monitor(App[None]):
         yield Footer()
 
     def on_mount(self) -> None:
-        """Begin to draw, and to handle signals."""
+        """Begin to redraw regularly, and to handle signals."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.exit)
@@ -133,7 +136,7 @@ class Monitor(App[None]):
         self.refresh_view()
 
     def _come_back(self) -> None:
-        """Return to the screen after SIGSTOP.
+        """Draw the screen again after a suspension by SIGSTOP.
 
         Otherwise keys would have two readers, each of which runs until its own end.
         """
@@ -190,7 +193,7 @@ class Monitor(App[None]):
     # Keys
 
     def on_key(self, event: events.Key) -> None:
-        """Steer by this key."""
+        """Use this key to steer, if it is a steering key."""
         dead_man = self._robot.dead_man
         if dead_man is None:
             return

@@ -117,7 +117,7 @@ class Feed:
         return running_drivers(self._node)
 
     def namesakes(self) -> str:
-        """Return a warning where there are several drivers of this name, else an empty string."""
+        """Return a warning if several drivers have this name, else an empty string."""
         count = self._node.count_publishers(f"{self.driver}/state")
         if count < 2:
             return ""
@@ -199,7 +199,7 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """Return the abilities that this driver's board lacks; empty while not known."""
+        """Return the abilities that this driver's board lacks; empty until they are known."""
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():
             offers = {}
@@ -280,7 +280,7 @@ class Feed:
             self._model.estop_asked = False
 
     def say(self, text: str) -> None:
-        """Show a message in the line of answers."""
+        """Show a message in the line for replies to the user's actions."""
         with self._lock:
             self._model.said = text
 

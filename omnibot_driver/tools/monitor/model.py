@@ -40,7 +40,7 @@ A pose further away than ``JUMP_M`` and this speed allow begins a new path.
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The rate and age of a topic; ``age_s`` is None without recent messages."""
+    """The rate and age of a topic; ``age_s``: time since its last message, None if not recent."""
 
     hz: float
     age_s: float | None
@@ -49,7 +49,7 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """The model at one moment. What is not known, or outdated, is None or empty.
+    """The values to show at one moment; unknown or outdated ones are None or empty.
 
     ``steers``: whether another node receives the commands sent here; ``lacks``: what the robot's
     board cannot do, of ``imu``, ``start`` and ``pause``.
@@ -167,7 +167,7 @@ class Model:
     def view(
         self, now_s: float, *, steers: bool = False, lacks: frozenset[str] = frozenset()
     ) -> View:
-        """Return the model at this time."""
+        """Return the values to show at this time."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
         imu, odom = (
             Flow(rate.hz(now_s), rate.age_s(now_s), rate.history(now_s))

@@ -33,12 +33,12 @@ class Rate:
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0
 
     def age_s(self, now_s: float) -> float | None:
-        """Return the time since the last message, in s; None if the window has none."""
+        """Return the time since the last message, in s; None if no message came in the window."""
         self._forget(now_s)
         return now_s - self._recent_s[-1] if self._recent_s else None
 
     def history(self, now_s: float) -> tuple[int, ...]:
-        """Return the arrivals in each whole second of the last minute since the beginning."""
+        """Return the number of arrivals in each full second of the last minute."""
         self._forget(now_s)
         return tuple(self._seconds)[:-1]
 

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find out whether there is a screen. Knows the streams of this process, not what is shown."""
+"""Detect a usable terminal. Knows the streams of this process, not what is shown."""
 
 import os
 import sys
 
 
 def has_screen() -> bool:
-    """Whether this process has a terminal to draw on and to read keys from."""
+    """Return whether this process has a terminal to draw on and to read keys from."""
     drawable = os.environ.get("TERM", "dumb") != "dumb"
     return drawable and all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))

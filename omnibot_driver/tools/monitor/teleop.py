@@ -21,7 +21,7 @@ REPEAT_S: Final = 0.3
 ASLEEP_S: Final = 0.5
 """Time between calls, in s, above which the program was suspended; older keys are discarded."""
 DEAF_S: Final = 0.3
-"""Time after a suspension, in s, in which keys do not steer; pending keys are read within it."""
+"""Time after a suspension, in s, in which keys do not steer, while pending keys are read."""
 ZEROS: Final = 5
 """Number of zero commands after a motion; then none follow, as others may want to drive."""
 LEVELS: Final = 10
@@ -42,7 +42,7 @@ MOTIONS: Final = {
 class DeadMan:
     """Turns pressed keys into commands; ``command`` must be called regularly.
 
-    Keys may come from another thread than these calls: they change a single reference.
+    Keys may come from another thread, because a key press changes a single reference only.
     """
 
     def __init__(self) -> None:
@@ -85,7 +85,7 @@ class DeadMan:
         return part * self.fastest[0], part * self.fastest[1]
 
     def command(self, now_s: float) -> BodyTwist | None:
-        """The command to publish now: a motion, then a few zeros, then nothing."""
+        """Return the command to publish now: a motion, then a few zeros, then None."""
         self._notice_sleep(now_s)
         self._asked_s = now_s
         key, until_s = self._held

@@ -24,9 +24,9 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """The topic ``cmd_vel`` in the type that the driver, or a node in its place, subscribes.
+    """The topic ``cmd_vel``, with the message type to which the driver subscribes.
 
-    A topic cannot have two types in one process, so subscription and publisher use that type.
+    A topic cannot have two types in one process, so subscription and publisher share the type.
     ``heard`` receives each command. Without a dead man nothing is published.
     """
 
@@ -49,7 +49,7 @@ class VelocityTopic:
             node.create_timer(DRIVE_EVERY_S, self._tick, clock=steady)
 
     def close(self) -> None:
-        """Stop a robot that was steered from here. The node must no longer be spinning."""
+        """Stop a robot that this program has steered. The node must no longer be spinning."""
         if self.dead_man and self.dead_man.has_driven and self._publisher:
             self._say(HALT)
             self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_WITHIN_S))
@@ -93,5 +93,5 @@ class VelocityTopic:
 
 
 def body_twist(twist: Any) -> BodyTwist:
-    """Return the twist as received, also if it is NaN."""
+    """Return the body twist of a message as received, even if it is NaN."""
     return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)

@@ -119,7 +119,10 @@ def _report(wanted: argparse.Namespace) -> int:
 
 
 def main(given: list[str] | None = None) -> int:
-    """Return 0; 3 if something is wrong with the drive, 1 without a report, 2 on wrong usage."""
+    """Write the report; return 0, or 3 if something is wrong with the drive.
+
+    Return 1 if a report is impossible, 2 on wrong usage.
+    """
     try:
         return _report(arguments(given))
     except ToolError as error:

@@ -25,7 +25,7 @@ NEWS_EVERY: Final = 2000
 """Number of messages between two reports of progress."""
 
 Progress = Callable[[int, int], None]
-"""A function that receives the number of messages read, and of all messages."""
+"""A function that receives the number of messages read so far, and of all messages."""
 
 
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
@@ -63,7 +63,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
 def _messages(
     reader: Reader, topics: Collection[str], troubles: list[str]
 ) -> Iterator[tuple[Connection, int, bytes]]:
-    """Yield the messages of the bag, as far as the bag can be read."""
+    """Yield the messages of the bag, as far as the bag is readable; note errors in ``troubles``."""
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return
@@ -80,7 +80,7 @@ def _messages(
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
-    """Return the readers that could be opened, and the troubles with the others."""
+    """Return the readers that could be opened, and the reasons why others could not."""
     if not path.exists():
         raise ToolError(f"there is no {path}: give the folder of a bag, or its .mcap or .db3 file")
     files, troubles = [path], []

@@ -30,7 +30,7 @@ def new_figure(height_in: float) -> Figure:
 
 
 def dress(axes: Axes, label: str, title: str = "") -> None:
-    """Add grid, frame and words to a picture."""
+    """Add grid, frame, label and title to a picture."""
     axes.set_ylabel(label)
     axes.grid(True, color="#E3E6EA", linewidth=0.7)
     axes.set_axisbelow(True)
@@ -78,7 +78,7 @@ def line(axes: Axes, times_s: Array, values: Array, colour: str, label: str, **m
 
 
 def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> None:
-    """Draw points; of too many draw every n-th one, and the extremes."""
+    """Draw points; if there are too many, only every n-th point and the extremes."""
     every = -(-len(times_s) // POINTS) or 1
     extremes_s, extremes = envelope(times_s, values)
     times_s = np.concatenate([times_s[::every], extremes_s])
@@ -87,8 +87,7 @@ def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> 
 
 
 def shade(axes: Axes, log: Log) -> None:
-    """Shade the times of a latched e-stop in red, and states that do not run in their own
-    colour."""
+    """Shade times with a latched e-stop in red, and each state other than running in its colour."""
     for span in log.latched:
         axes.axvspan(span.begin_s, span.end_s, color=RED, alpha=0.18, linewidth=0)
     for span in log.states:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge what the driver reported of itself: its state, the e-stop, /diagnostics."""
+"""Judge what the driver reported: its state, the e-stop, /diagnostics."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -59,7 +59,7 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """Return the spans in which the board was out of reach, with an open port or without."""
+    """Return the spans in which the board was out of reach, whether the port was open or not."""
     lost: list[Span] = []
     for state in states:
         if state.what in OUT_OF_REACH and state.end_s > FIRST_SECONDS:
@@ -96,7 +96,7 @@ def _estop(log: Log) -> Iterator[Finding]:
 
 
 def _diagnostics(log: Log) -> Iterator[Finding]:
-    """Judge each status by its worst message, and how often that was sent."""
+    """Judge each status by its worst message, and how often that message was sent."""
     if log.diagnostics and not log.alone:
         ports = ", ".join(sorted({status.hardware_id for status in log.diagnostics}))
         yield Finding(
@@ -126,8 +126,7 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 
 
 def _told_elsewhere(status: Status) -> bool:
-    """Whether another finding covers this status: e-stop, its refusals, pause, the first
-    seconds."""
+    """Return whether another finding covers this status, such as the e-stop or a pause."""
     if status.name.endswith("Commands"):
         return "e-stop" in status.message
     return status.name.endswith("E-stop") or (

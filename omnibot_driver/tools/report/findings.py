@@ -21,7 +21,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One sentence with its number; ``advice`` is empty where no action is needed."""
+    """One sentence with its number; ``advice`` is empty if no action is needed."""
 
     level: Level
     subject: str

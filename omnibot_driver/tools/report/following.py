@@ -15,12 +15,12 @@ from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask,
 LAGS_S: Final = np.arange(0.0, 0.62, 0.02)
 TOLERANCE: Final = 0.1
 TOLD: Final = 0.05
-"""Speed of a wheel's rim, in m/s, below which friction may hold the robot."""
+"""Commanded speed of a wheel's rim, in m/s, below which friction may hold the robot."""
 STANDS: Final = 0.2
-"""A robot slower than this part of its command does not follow."""
+"""Ratio of measured to commanded speed below which the robot does not follow."""
 SUSTAINED_S: Final = 1.0
 AFTER_STOP_S: Final = 1.5
-"""Time after a stop, in s, after which the robot must stand."""
+"""Time after a stop, in s, within which the robot must come to rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,7 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """Return the parameters to change where speeds are wrong; a base with two wheels has its
-    own."""
+    """Return the parameters that correct wrong speeds; a base with two wheels has other ones."""
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"
@@ -95,8 +94,7 @@ def _sampled(series: Series) -> Series:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How commands were followed: after ``lag_s``, with a ``gain`` on each axis (NaN: not
-    known)."""
+    """How commands were followed: after ``lag_s``, with a ``gain`` per axis (NaN: not known)."""
 
     lag_s: float
     gains: Array
@@ -104,7 +102,7 @@ class Answer:
 
 
 def answer(pair: Pair, usable: Mask) -> Answer | None:
-    """Return the lag that explains most, and its gains; None where nothing was commanded."""
+    """Return the lag that explains the measurements best, and the gains; None without commands."""
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
     best_s, least = 0.0, np.inf
@@ -127,7 +125,7 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge commands: invalid, ceased, followed or not; and motion without a command."""
+    """Judge the commands: invalid, interrupted, followed or not; and motion without a command."""
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(
             Level.NOTE,

@@ -54,9 +54,9 @@ def _all(log: Log) -> Iterator[Finding]:
 
 
 def _has_no_imu(log: Log) -> bool:
-    """Whether diagnostics were received, and show that the board does not have an IMU.
+    """Return whether diagnostics were received and show a board without an IMU.
 
-    Where the board has one, the driver's Stream status counts its frames.
+    If the board has an IMU, the driver's Stream status counts its frames.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     return bool(streams) and not any("IMU" in key for item in streams for key in item.values)

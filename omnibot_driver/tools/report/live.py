@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Record a running robot as into a bag. Knows ROS; must not know how the log is evaluated."""
+"""Record a running robot in the same form as a bag. Knows ROS, not how logs are judged."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,10 @@ from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, Recorder
 from omnibot_driver.tools.report.robots import Topics, choose, find
 
 LOOK_ROUND_S: Final = 2.0
-"""Time to look for robots, in s, even if one is found at once, as there may be others."""
+"""Time to look for robots, in s.
+
+It does not end when a robot is found, because there may be others.
+"""
 DISCOVERY_S: Final = 5.0
 DEPTH: Final = 1000
 COMMANDS: Final = ("cmd_vel", "wheel_cmd")
@@ -32,7 +35,7 @@ Progress = Callable[[int, int], None]
 def listen(
     seconds: float, namespace: str | None, progress: Progress, asked_to_end: Callable[[], bool]
 ) -> Log:
-    """Return the log of one robot's messages in this time. Raises ToolError if none is found."""
+    """Return the log of one robot's messages for ``seconds``. Raises ToolError without a robot."""
     rclpy.init(
         args=["--ros-args", "--disable-external-lib-logs"],
         signal_handler_options=SignalHandlerOptions.NO,

@@ -32,11 +32,11 @@ class Series:
 
     @property
     def finite(self) -> Mask:
-        """The rows without NaN and infinity."""
+        """Mask of the rows without NaN and infinity."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     def only(self, rows: Mask) -> "Series":
-        """The selected rows."""
+        """Return the series with the selected rows only."""
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:

@@ -114,7 +114,7 @@ def write(log: Log, findings: Sequence[Finding], source: str, folder: Path) -> P
 
 
 def png(figure: Figure) -> bytes:
-    """Return a figure as PNG data of moderate size."""
+    """Return a figure as PNG data."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
     return buffer.getvalue()

@@ -39,8 +39,7 @@ LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""Range of the drawn times, as a factor of the 99 % quantile; larger values are drawn at its edge.
-"""
+"""Range of the drawn times, in 99 % quantiles; larger values are drawn at its edge."""
 
 
 def path(log: Log) -> Figure:
@@ -164,8 +163,10 @@ def spectra(log: Log) -> Figure:
 
 
 def timing(log: Log) -> Figure:
-    """Draw steps between timestamps, and arrival delays over the least, by time and as
-    histograms."""
+    """Draw intervals of timestamps, and arrival delays above the least one.
+
+    Both are drawn over time and as histograms.
+    """
     figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")
     names: list[tuple[str, str]] = []

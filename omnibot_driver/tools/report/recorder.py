@@ -48,9 +48,9 @@ def _wheels(message: Any) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """The role of a topic: its width, and a function to read each type that it may have.
+    """The role of a topic: number of values in a row, and a function to read each message type.
 
-    A width of None is that of the robot's wheels, which ``joint_states`` names.
+    A width of None is the number of the robot's wheels, which ``joint_states`` names.
     """
 
     width: int | None
@@ -81,7 +81,7 @@ class _Column:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
         self.rows: list[Row] = []
-        """Rows of a topic whose width is not known before the end."""
+        """Rows of values; their common width may be known at the end only."""
 
     def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)

@@ -28,12 +28,12 @@ EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Time, in s, within which timestamps that leapt ahead are right again."""
+"""Time, in s, within which timestamps that jumped ahead must be right again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """The expectations of a topic.
+    """What is expected of a topic's timing.
 
     ``lost``: keys of the driver's counts of lost messages; ``rates``: keys of the expected rates in
     its diagnostics, the best first.
@@ -46,7 +46,7 @@ class Stream:
     rates: tuple[str, ...]
 
     def promised(self, log: Log) -> "Stream":
-        """Return this stream with the last expected rate that the driver published."""
+        """Return this stream with the last expected rate that the driver's diagnostics contain."""
         if not log.alone:
             return self
         for key in self.rates:
@@ -136,8 +136,7 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 
 
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
-    """Return the gap from the last message to the end of the log, if more messages were
-    expected."""
+    """Return the gap from the last message to the end, or None if no more were expected."""
     rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
         return None
@@ -145,7 +144,7 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return the end of the rows that show, for each wide step, whether it was taken back."""
+    """Return, for each wide step, the end of the rows that show whether it was taken back."""
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
     return ends

@@ -10,7 +10,7 @@ from omnibot_driver.tools.needs import ToolError
 from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, SERIES
 
 PROOF: Final = ("imu/data_raw", "odom", "state")
-"""Topics of which a namespace must have one to be a robot."""
+"""Topics that identify a robot: its namespace must have at least one of them."""
 
 Topics = dict[str, str]
 """The role of each topic."""
@@ -33,7 +33,7 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return, for each role that this topic may have, the namespace, and whether its type fits."""
+    """Return, by role that this topic may have, the namespace and whether the type fits."""
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
         if topic.endswith(f"/{role}"):

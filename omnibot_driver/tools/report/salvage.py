@@ -30,7 +30,7 @@ def breaks_off(file: Path) -> bool:
 
 
 def cut_to_records(file: Path, folder: Path) -> Path:
-    """Return a copy of this mcap with all complete records and an end."""
+    """Return a copy of this mcap that contains all complete records, and a proper end."""
     copy = Path(shutil.copy(file, folder))
     size = copy.stat().st_size
     with copy.open("r+b") as target:

@@ -19,25 +19,25 @@ from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 
 SLIGHT_ERROR: Final = 0.03
-"""Relative error of gravity up to which it is good."""
+"""Relative error of measured gravity up to which the accelerometer is judged good."""
 REST_S: Final = 0.5
-"""Time from any motion, in s, beyond which the robot is at rest."""
+"""Time before and after any motion, in s, in which readings do not count as at rest."""
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
-"""Largest rate at rest, in rad/s, where odometry is missing.
+"""Rate, in rad/s, above which the robot turns if odometry is missing.
 
-A constant larger one is taken as a turn: it might be a bias, but such a bias is rare.
+A constant rate above it might also be a bias, but such a bias is rare.
 """
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
-"""Part of a step of the odometry for which gyro data must have been received."""
+"""Fraction of an odometry step for which gyro data must have been received to compare both."""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
-"""Frequency in Hz below which the vibration is that of driving."""
+"""Frequency in Hz below which a vibration is regarded as caused by driving."""
 SEGMENT: Final = 256
 
 
@@ -49,7 +49,7 @@ def rate_hz(imu: Series) -> float:
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """Return which readings are at rest, by the odometry; without it by the IMU, block by block."""
+    """Return which readings are at rest, by the odometry, or else by blocks of the IMU."""
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
         unheard = np.diff(odom.stamp_s) > SHORT_GAP_S

@@ -15,18 +15,19 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in m/s, m/s and rad/s above which the robot moves."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""Angle in rad, as ``LEAP_M`` in m, by which a pose may differ from the twist's without a leap.
+"""Largest difference between a pose and the pose that the twist leads to, in rad.
 
-The driver corrects by no more in a step (fastest_linear_speed and so on).
+``LEAP_M`` is the same in m; more is a leap. The driver corrects by no more in a step
+(fastest_linear_speed and so on).
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Longest step, in s, in which a pose is compared with the twist; beyond, it is a gap."""
+"""Longest step, in s, in which a pose is compared with the twist; a longer step is a gap."""
 
 
 def moving(odom: Series) -> Mask:
-    """Return at which messages the robot moved, by its twists."""
+    """Return a mask of the messages at which the robot moved, by their twists."""
     return np.asarray((np.abs(odom.values[:, 3:]) > MOVING).any(axis=1))
 
 

@@ -30,7 +30,7 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return the words of mode 1 frames (base velocity) and Stops since a mark, with times."""
+    """Return words and time of each mode 1 frame (base velocity) and Stop written since a mark."""
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -40,7 +40,7 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """The same holds for the base after the wheels: Stop, then the newest command."""
+    """A base command after wheel commands sends Stop first, then the newest base command."""
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)
@@ -57,7 +57,7 @@ def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
 
 
 def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
-    """The base continues without a Stop."""
+    """After a refused wheel command the base command continues without a Stop."""
     bench.drive(0.3)
     start = len(bench.written)
     with pytest.raises(CommandRefused):
@@ -67,7 +67,7 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """At 1 m/s² it takes 0.5 s to 0.3 and 0.4 m/s; words are 70 LSB per m/s."""
+    """At 1 m/s² a step to 0.3 and 0.4 m/s takes 0.5 s; words are 70 LSB per m/s."""
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):
@@ -100,7 +100,7 @@ def test_a_reversal_is_ramped_through_zero() -> None:
 
 
 def test_turning_is_ramped_by_its_own_limit() -> None:
-    """At 2 rad/s² it takes 0.25 s to 0.5 rad/s."""
+    """At 2 rad/s² a step to 0.5 rad/s takes 0.25 s."""
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.drive(0.0, 0.0, 0.5)
@@ -111,7 +111,7 @@ def test_turning_is_ramped_by_its_own_limit() -> None:
 
 
 def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
-    """A zero command may mean that a person is in front of the robot."""
+    """Stop is written at once, because a person may be in front of the robot."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)
@@ -123,7 +123,7 @@ def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
 
 @pytest.mark.slow
 def test_what_comes_after_a_stop_begins_at_rest() -> None:
-    """A timeout, an e-stop and a zero command each reset the set point to zero."""
+    """The ramp after a timeout, an e-stop or a zero command begins at zero speed."""
     bench = running(limits=GENTLE)
     for stop in (
         lambda: bench.run(1.0),
@@ -150,7 +150,7 @@ def test_wheels_are_not_ramped() -> None:
 
 
 def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
-    """A command that is 0.3 s old has 0.2 s left."""
+    """A command whose stamp is 0.3 s old expires 0.2 s after its arrival (timeout 0.5 s)."""
     bench.drive(0.3, age_s=0.3)
     bench.run(0.19)
     assert bench.written[-1][1] != STOP
@@ -171,7 +171,7 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """The command before it expires as usual."""
+    """The command before such a command expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The e-stop: latched at once, repeated without end, ended only by its release."""
+"""The e-stop: latched at once, repeated without end, ended only by a release."""
 
 from unittest.mock import ANY
 
@@ -38,7 +38,7 @@ def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
 
 
 def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> None:
-    """Only a release ends it, and the robot then waits for a newer command."""
+    """Only a release ends the e-stop, and the robot then waits for a newer command."""
     bench.session.estop(True, bench.now)
     bench.settle()
     bench.close()
@@ -63,7 +63,7 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """It is latched while the port is closed; the answer says so."""
+    """The e-stop is latched while the port is closed, and the answer to the request says so."""
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
@@ -90,7 +90,7 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """If it stays at rest for 1 s when commanded, the driver reports it once; a reset helps."""
+    """A board that stays at rest for 1 s although commanded is reported once; a reset helps."""
     bench = driving(estop_latches=True)
     estop(bench, True)
     bench.run(1.0)
@@ -108,7 +108,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """The robot needs time to speed up, which is not a fault."""
+    """A robot needs time to speed up, so a short rest after a command is not reported."""
     for _ in range(3):
         estop(bench, True)
         bench.run(0.5)
@@ -119,7 +119,7 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
 
 
 def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
-    """Repetitions of the call are not reported."""
+    """Repeated requests to latch or release the e-stop are not reported again."""
     for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
         bench.session.estop(active, bench.now, by=by)
         bench.settle()
@@ -127,7 +127,7 @@ def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) ->
 
 
 def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
-    """It is latched and sent, but data from the board has been missing for a while."""
+    """The answer warns if data from the board has been missing for a while before the e-stop."""
     assert estop(bench, True) == "e-stop latched"
     bench.speaks = False
     bench.run(2.0)

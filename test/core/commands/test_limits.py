@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed limits keep the direction, and rounding and saturation keep within the limits."""
+"""Speed limits keep the direction, and rounding and saturation never exceed the limits."""
 
 import math
 
@@ -25,7 +25,7 @@ ULPS = 1 + 1e-11
 
 
 def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
-    """Return whether they are parallel to nine digits and not opposite; zero has all directions."""
+    """Return whether two vectors have one direction, to nine digits; zero fits any other."""
     largest_a, largest_b = max(map(abs, a)), max(map(abs, b))
     if largest_a < 1e-290 or largest_b < 1e-290:
         return True
@@ -43,7 +43,7 @@ def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
 def test_a_shortened_vector_keeps_its_direction_and_the_limit(
     vector: list[float], limit: float
 ) -> None:
-    """The length of the original vector does not matter."""
+    """A vector of any length above the limit is shortened to the limit in the same direction."""
     short = shorten(vector, limit)
     assert math.hypot(*short) <= limit * ULPS
     assert limit == 0 or same_direction(short, vector)
@@ -53,7 +53,7 @@ def test_a_shortened_vector_keeps_its_direction_and_the_limit(
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3), limits)
 def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: float) -> None:
-    """The vector is equal bit for bit; a longer one is shortened to the limit."""
+    """A vector within the limit is returned equal bit for bit; only a longer one is shortened."""
     length = math.hypot(*vector)
     if length <= limit / ULPS:
         assert shorten(vector, limit) == tuple(vector)
@@ -64,7 +64,7 @@ def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: 
 @given(vectors, limits)
 @example([1e308, -1e308], 17.0)
 def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit: float) -> None:
-    """The fastest wheel sets the factor for all."""
+    """The wheel that exceeds the limit most sets the common factor for all wheels."""
     slowed = slow(values, limit)
     assert max(map(abs, slowed)) <= limit * ULPS
     assert limit == 0 or same_direction(slowed, values)
@@ -84,7 +84,7 @@ def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: Bo
 
 @given(any_twists)
 def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
-    """What is not allowed is cut to a limit."""
+    """A twist within all limits is returned unchanged; any other is reduced to a limit."""
     limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
     if limits.allow(twist):
         limited = limits.twist(twist)
@@ -97,7 +97,7 @@ def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
-    """This holds without limits, too."""
+    """Infinity and NaN are rejected even if all limits are off."""
     values = [0.0, 0.1, -0.1]
     values[place] = bad
     none = SpeedLimits(linear_mps=math.inf, angular_radps=math.inf)
@@ -128,7 +128,7 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
-    """The value may be in any position; the message says what to fix."""
+    """The infinity or NaN may be in any position; the message says what to fix."""
     values = [0.0, 1e308, -1.0]
     values[place] = bad
     with pytest.raises(CommandRefused, match=r"cmd_vel.*NaN or infinity"):
@@ -137,7 +137,7 @@ def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
 
 @given(st.lists(finite, max_size=4))
 def test_what_is_finite_is_not_refused(values: list[float]) -> None:
-    """A large value is not an error."""
+    """A finite value is accepted however large it is."""
     require_finite("wheel_cmd", values)
 
 
@@ -145,7 +145,7 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear velocity changes as a vector, straight to the wanted one, and reaches it."""
+    """The linear velocity changes as a vector, straight to the wanted velocity, and reaches it."""
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)
     after = limits.approach(now, wanted, duration_s)
@@ -171,7 +171,7 @@ def test_an_acceleration_of_zero_is_no_limit() -> None:
 
 @pytest.mark.parametrize("age_s", [0.0, 0.5, -0.5])
 def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
-    """A clock that is ahead by up to the limit is accepted as well."""
+    """A stamp slightly in the future, within the same limit, is accepted as well."""
     require_timely("cmd_vel", age_s, 0.5)
 
 
@@ -181,6 +181,6 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """The message also says what to check."""
+    """The refusal of a stamped command contains its age, and says which clocks to check."""
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

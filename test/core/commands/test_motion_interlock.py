@@ -8,19 +8,19 @@ TIMEOUT_S = 0.5
 
 
 def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> bool:
-    """Return whether a command is accepted."""
+    """Return whether the interlock accepts a command."""
     return not interlock.arrive(now, TIMEOUT_S, stands=stands)
 
 
 def test_motion_is_allowed_until_something_trips() -> None:
-    """The number of commands does not matter."""
+    """Any number of commands is accepted before the first trip."""
     interlock = MotionInterlock()
     assert all(arrives(interlock, 0.1 * step) for step in range(20))
     assert interlock.reason(TIMEOUT_S) == ""
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """Each refused command restarts the required silence."""
+    """Each refused command restarts the silence that ends the refusal."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -37,7 +37,7 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """The zero command itself is accepted."""
+    """The zero command itself is accepted, and motion is allowed after it."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -60,7 +60,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """The same holds after ~/start."""
+    """A trip more than a minute after the last one, or after ~/start, counts as a first one."""
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)
@@ -72,7 +72,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """This holds after the second trip; an e-stop release before it changes nothing."""
+    """Release ends the refusal after a second trip; a release before that trip has no effect."""
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

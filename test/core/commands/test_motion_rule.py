@@ -43,7 +43,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """What the board did with earlier commands does not matter."""
+    """A command from before the interruption stays discarded, whatever the board did with it."""
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)
@@ -58,7 +58,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """The board boots and is started within a moment, and its notice is lost."""
+    """The board boots and starts within a moment, and its boot notice is lost on the line."""
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -77,7 +77,7 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """Silence ends the command before the board has booted; a frame may contain an S."""
+    """The command expires before the board has booted; a motion frame may contain an S."""
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -92,7 +92,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """This holds for a board that does not receive the request and drives on."""
+    """No motion follows even if the board misses the request and drives on."""
     bench.drive(0.4)
     start = len(bench.written)
     bench.hears = False
@@ -104,7 +104,7 @@ def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Requ
 
 @pytest.mark.parametrize("state", ["connecting", "paused"])
 def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
-    """A paused board takes 0x52 inside a motion command for R."""
+    """A paused board would take a byte 0x52 inside a motion command for the letter R."""
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state(state)
@@ -114,13 +114,13 @@ def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
 
 
 def test_motion_is_refused_without_a_port() -> None:
-    """The message says that the board is not connected."""
+    """The refusal of a command says that the board is not connected."""
     with pytest.raises(CommandRefused, match="not connected"):
         Bench().drive(0.3)
 
 
 def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
-    """After the timeout, Stop is sent for a second; then the line is quiet."""
+    """After the timeout, Stop is sent for 1 s; then nothing is sent."""
     bench.drive(0.5)
     bench.run(0.4)
     assert not bench.still()
@@ -132,7 +132,7 @@ def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
-    """Only the direction from the board is cut; the board still receives, so Stop is sent."""
+    """Only data from the board is lost; the board still receives, so Stop is sent."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = False
@@ -179,7 +179,7 @@ def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Ben
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
     bench: Bench,
 ) -> None:
-    """The board continues with its last command until its data arrives again."""
+    """After the outage the board repeats its last command until the driver's Stop arrives."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = bench.hears = False
@@ -191,7 +191,7 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """The last command is not repeated, and the board is not blamed for the driver's stall."""
+    """After a stall of the driver the last command is not repeated, and no notice comes."""
     bench.drive(vx=0.3)
     bench.run(0.2)
     mark = len(bench.written)

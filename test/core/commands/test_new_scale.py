@@ -17,7 +17,7 @@ def last(bench: Bench) -> bytes:
 
 
 def going_to(x_m: float) -> Bench:
-    """Return a board with its switch on position, on its way to a goal ahead."""
+    """Return a board with its switch on position control, driving to a goal ahead."""
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()
     bench.run_until_state("nominal")
@@ -27,7 +27,7 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """0.4 m/s is 28 LSB at 70 LSB per m/s, and 40 LSB at 100; a new command is not needed."""
+    """0.4 m/s is 28 LSB at 70 LSB per m/s, and 40 LSB at 100; the user need not command again."""
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)
@@ -49,7 +49,7 @@ def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> No
 
 
 def test_a_goal_is_repeated_in_the_new_scale() -> None:
-    """1 m is 1000 LSB at first, then 500."""
+    """A goal at 1 m is 1000 LSB at 1000 LSB per m, and 500 after the change."""
     bench = going_to(1.0)
     assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
     bench.configure_board(position_scale=500.0)
@@ -58,7 +58,7 @@ def test_a_goal_is_repeated_in_the_new_scale() -> None:
 
 
 def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() -> None:
-    """10 m at 10,000 LSB per m exceeds a 16-bit word."""
+    """A goal at 10 m exceeds a 16-bit word at 10,000 LSB per m, so the robot is stopped."""
     bench = going_to(10.0)
     bench.configure_board(position_scale=10_000.0)
     assert last(bench) == bare(STOP)
@@ -68,7 +68,7 @@ def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() ->
 
 
 def test_a_ramp_goes_on_from_where_it_was() -> None:
-    """The ramp continues in the new scale, without a step."""
+    """The ramp continues in the new scale, without a step in speed."""
     bench = Bench(BoardSettings(running=True), limits=RAMP)
     bench.open()
     bench.run_until_state("nominal")
@@ -88,7 +88,7 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """Velocity zero in mode 1 would be another command."""
+    """Zeros in mode 1 would be a command of another meaning than Stop."""
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)
@@ -97,7 +97,7 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
 
 
 def test_a_robot_that_nobody_commands_hears_nothing_of_it() -> None:
-    """Nothing is written on a new scale."""
+    """Without a current command, a change of scale writes nothing."""
     bench = driving()
     bench.run(3.0)
     start = len(bench.written)

@@ -19,7 +19,7 @@ ORIGIN = BoardPose()
 def at_position_control(
     initial_pose: BoardPose = ORIGIN, *, imu_only: bool = False, **options: object
 ) -> Bench:
-    """Return a running board, its switch on position, whose pose is known to the driver."""
+    """Return a running board with its switch on position; the driver knows the board's pose."""
     settings = BoardSettings(
         running=True, control="position", initial_pose=initial_pose, imu_only=imu_only
     )
@@ -48,7 +48,7 @@ def words(bench: Bench) -> list[int]:
 
 
 def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench: Bench) -> None:
-    """The goal is 1 m, -0.5 m and a quarter turn; the board does not acknowledge it."""
+    """The goal is 1 m, -0.5 m and a quarter turn; the board does not acknowledge goals."""
     start = len(bench.written)
     bench.go_to(1.0, -0.5, 1.571)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 03 E8 FE 0C 06 23")
@@ -64,7 +64,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
     heading: float, signs: tuple[int, int, int]
 ) -> None:
-    """The driver attaches late to a turned robot, whose axes may be mirrored."""
+    """The driver connects late to a turned robot; the board's axes may be mirrored."""
     bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
     bench.go_to(0.8, 0.4, 0.9)
     bench.run(8.0)
@@ -90,7 +90,7 @@ def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(tur
 
 
 def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) -> None:
-    """The driver never sends a different goal instead."""
+    """The driver refuses a goal beyond 16-bit words, instead of sending a different goal."""
     bench.go_to(0.2, 0.0, 0.0)
     for x in (33.0, 1e300, -1.7e308):
         with pytest.raises(CommandRefused, match="the limits are"):
@@ -101,14 +101,14 @@ def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
-    """Each of its numbers is tested."""
+    """Infinity and NaN are refused in x, in y and in yaw."""
     for goal in ((bad, 0.0, 0.0), (0.0, bad, 0.0), (0.0, 0.0, bad)):
         with pytest.raises(CommandRefused, match="NaN or infinity"):
             bench.go_to(*goal)
 
 
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
-    """0.3 m/s would be taken for a place 21 mm from the origin."""
+    """The board would take 0.3 m/s for a place 21 mm from its origin."""
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
         with pytest.raises(CommandRefused, match="`control_method` is 'position'"):
@@ -117,7 +117,7 @@ def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench
 
 
 def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
-    """1 m would be taken for a velocity of 14 m/s."""
+    """The board would take a goal at 1 m for a velocity of 14 m/s."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(1.5)
@@ -136,7 +136,7 @@ def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str,
 
 
 def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
-    """Motion that was lost on the line shifts odom and the board's frame equally."""
+    """Motion that was lost on the line moves odom and the board's frame by the same error."""
     bench.go_to(1.0, 0.0, 0.0)
     bench.run(0.5)
     bench.speaks = False
@@ -171,7 +171,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The robot is at rest until a newer goal, which is converted with the new board frame."""
+    """The robot then rests until a newer goal, converted with the new board frame."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -189,7 +189,7 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """Zeros in mode 1 would mean: drive to the origin."""
+    """With the switch on position, zeros in mode 1 would mean: drive to the origin."""
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)

@@ -15,7 +15,7 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """It is sent twice, even if it was sent just before."""
+    """The e-stop is sent twice on a new connection, even if it was sent just before."""
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -23,7 +23,7 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """Neither the Stop between them nor the newer command is sent."""
+    """Neither the Stop between two authorities nor the newer command is sent."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -33,7 +33,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """Stop is added for firmware that ignores mode 10; the first time both are sent twice."""
+    """Stop follows for firmware that ignores mode 10; the first time both frames are sent twice."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
@@ -58,7 +58,7 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A button node may publish at any rate; the line must have room for other data."""
+    """A button node may publish at any rate, but other data needs room on the line."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001

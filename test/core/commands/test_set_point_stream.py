@@ -21,7 +21,7 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """A motion that changes with each frame, for a given number of frames."""
+    """A test motion whose frame changes at each tick, for a given number of frames."""
 
     authority, is_zero = Authority.BASE, False
 
@@ -52,7 +52,7 @@ def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> 
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """More frames would only be more bytes that can be corrupted."""
+    """Each frame more on the line would be more bytes that can be corrupted."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
@@ -90,7 +90,7 @@ def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
 
 
 def test_stop_never_waits(stream: Stream) -> None:
-    """It does not wait for the pace of the command before it."""
+    """Stop is sent at once, even just after another command."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)
@@ -98,7 +98,7 @@ def test_stop_never_waits(stream: Stream) -> None:
 
 
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
-    """Only new commands are paced."""
+    """A new command is delayed only by the previous new command, not by a repetition."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(1.05) == GO
@@ -107,7 +107,7 @@ def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
 
 
 def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
-    """This holds at a command rate of 1 Hz, since one Stop may be lost."""
+    """At a command rate of 1 Hz Stop is still repeated faster, since one Stop may be lost."""
     stream = Stream(CommandSettings(rate_hz=1.0))
     order(stream, STOP, 1.0)
     assert len(run(stream, 1.0, 1.49)) == pytest.approx(10, abs=1)
@@ -116,7 +116,7 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """The zeros before the letter may have completed a frame that was cut."""
+    """The zeros that precede the letter may have completed a frame that was cut."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.actuator.wrote(packed(b"S"), 1.02)
@@ -124,7 +124,7 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 
 
 def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
-    """After the first Stop, a thousand more a second would only fill the line."""
+    """After the first Stop, a thousand further requests a second would only fill the line."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
@@ -136,7 +136,7 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """After it has arrived, it is repeated at the command rate."""
+    """When the motion stops changing, its frame is repeated at the command rate."""
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
     assert [frame[-1] for _, frame in written] == [3, 2, 1, 0]
@@ -154,7 +154,7 @@ def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
     stream: Stream,
 ) -> None:
-    """This holds although the command in between was never written."""
+    """One Stop precedes the newest command; the command in between is never written."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -168,7 +168,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """The first authority has been stopped already."""
+    """Stop has already been sent when the first authority's command expired."""
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
     order(stream, TURN, 1.62, Authority.WHEELS)
@@ -178,7 +178,7 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
     stream: Stream,
 ) -> None:
-    """A second Stop would only delay the new command."""
+    """A second Stop between two authorities would only delay the new command."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)
@@ -188,7 +188,7 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """This includes a Stop that was due at once, and its repetition."""
+    """A Stop that was due at once, and its repetition, are discarded as well."""
     order(stream, GO, 1.0)
     stream.halt(1.0)
     stream.discard(1.0)
@@ -197,7 +197,7 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """Commands from before a long stall of the process have no effect."""
+    """After a long stall of the process, commands from before the stall have no effect."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(60.0) == STOP
@@ -216,7 +216,7 @@ STEPS = st.lists(
 def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
     steps: list[tuple[str, float]],
 ) -> None:
-    """The rules for outbound frames hold under any sequence of events."""
+    """Random sequences of events never break the rules for outbound frames."""
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""
     for step, pause in steps:

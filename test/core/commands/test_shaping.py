@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands through a session to the line: checked, limited, in the manual's frames."""
+"""Commands through a session: checked, limited and written in the manual's frames."""
 
 import math
 
@@ -17,14 +17,14 @@ def bench() -> Bench:
 
 
 def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
-    """The frame is the manual's: 0.3 m/s is 21 LSB, -0.2 m/s is -14, 0.5 rad/s is 250."""
+    """The frame is the manual's: 0.3 m/s is 21 LSB, -0.2 m/s is -14 LSB, 0.5 rad/s is 250 LSB."""
     start = len(bench.written)
     bench.drive(0.3, -0.2, 0.5)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 15 FF F2 00 FA")
 
 
 def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
-    """10 rad/s of a 29 mm wheel is 0.29 m/s, 20.3 LSB; a limit scales all wheels equally."""
+    """10 rad/s at a radius of 29 mm is 20.3 LSB; a limit scales all wheels equally."""
     start = len(bench.written)
     bench.session.command_wheels((10.0, -10.0, 0.0), bench.now)
     bench.settle()
@@ -46,7 +46,7 @@ def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: float) -> None:
-    """It neither moves the robot nor keeps the last command alive."""
+    """A command with infinity or NaN neither moves the robot nor keeps the last command alive."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match="NaN or infinity"):
@@ -59,7 +59,7 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """The refusal contains the number of values."""
+    """The refusal of another number of wheel rates contains that number."""
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)
@@ -68,7 +68,7 @@ def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> N
 
 
 def test_a_huge_command_is_limited_in_its_own_direction(bench: Bench) -> None:
-    """1e300 m/s to the front left becomes 0.5 m/s to the front left: 24.7 LSB per axis."""
+    """1e300 m/s to the front left becomes 0.5 m/s in that direction: 24.7 LSB per axis."""
     start = len(bench.written)
     bench.drive(1e300, 1e300, -1e300)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 19 00 19 FF 06")

@@ -21,12 +21,12 @@ def bench() -> Bench:
 def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
-    """Stop comes first, three times."""
+    """Stop is written first, three times, before the letters for pause or reset."""
     assert bench.last_words(on_exit) == 3 * STOP + expected
 
 
 def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
-    """The letter P is a toggle, so it is not sent."""
+    """The letter P is a toggle, so it is not sent to a paused board."""
     bench = paused()
     assert bench.last_words("pause") == 3 * STOP
 
@@ -47,7 +47,7 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """The driver still believes the last notice, but S is on its way."""
+    """The last notice says paused, but the letter S, which starts the board, is on its way."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -58,13 +58,13 @@ def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
 
 
 def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
-    """The last frame that the board receives forbids motion."""
+    """The last frame that the board receives is the e-stop, which forbids motion."""
     bench.session.estop(True, bench.now)
     assert bench.last_words("stop") == 3 * STOP + EMERGENCY_STOP
 
 
 def left(bench: Bench) -> None:
-    """Leave as the link does: wait until the robot is seen at rest."""
+    """Shut down as the link does: wait until the robot is seen at rest."""
     bench.session.shutdown.begin(bench.now)
     bench.settle()
     while not bench.session.shutdown.stands:
@@ -72,7 +72,7 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """After that, nothing is sent that the line could corrupt into a motion."""
+    """During the wait nothing is sent, because damage on the line could make it a motion."""
     bench = driving()
     left(bench)
     assert bench.session.shutdown.fall_silent(bench.now)
@@ -85,7 +85,7 @@ def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends(
 
 
 def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
-    """An inserted byte corrupts the Stop; then Stop is sent again."""
+    """An inserted byte turns the last Stop into a motion, so Stop is sent again."""
     bench = driving()
     left(bench)
     bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))
@@ -96,7 +96,7 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """The motors of a paused board are off."""
+    """A paused board does not send displacements, but its motors are off."""
     bench = paused()
     left(bench)
     assert not bench.session.shutdown.fall_silent(bench.now)

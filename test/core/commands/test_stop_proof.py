@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Proof by displacements that a robot is at rest."""
+"""Proof that a robot is at rest, by the displacements that its board reports."""
 
 import pytest
 from hypothesis import given
@@ -27,7 +27,7 @@ def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> Dis
 
 
 def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
-    """Return whether displacements at these speeds, one each 40 ms from 0.1 s on, are a proof."""
+    """Return whether displacements at these speeds, every 40 ms from 0.1 s on, prove rest."""
     for number, speed in enumerate(speeds):
         proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
     return proof.proved
@@ -41,13 +41,13 @@ def proof() -> StopProof:
 
 
 def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof) -> None:
-    """They take 0.12 s; two displacements are not enough."""
+    """Three displacements of zero take 0.12 s; two are not enough."""
     assert not shown(proof, 0.0, 0.0)
     assert shown(proof, 0.0, 0.0, 0.0)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """With displacements each 0.4 s, the first one after Stop may still contain motion."""
+    """With displacements every 0.4 s, the first one after Stop may still contain motion."""
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
     proof.look(rare, 10.3)
@@ -61,7 +61,7 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
 
 
 def test_one_displacement_alone_is_no_proof_however_long_it_is(proof: StopProof) -> None:
-    """Boards with a ``delta_period`` of 0.1 s send such displacements."""
+    """Boards with a ``delta_period`` of 0.1 s may send such long displacements."""
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
     assert not proof.proved
@@ -70,12 +70,12 @@ def test_one_displacement_alone_is_no_proof_however_long_it_is(proof: StopProof)
 
 
 def test_without_stop_standing_still_proves_nothing() -> None:
-    """A command may be on its way to the wheels."""
+    """Without a Stop, an earlier command may still be on its way to the wheels."""
     assert not shown(StopProof(), *[0.0] * 50)
 
 
 def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
-    """Later displacements do not matter until the next Stop."""
+    """Displacements after a command to move prove nothing until the next Stop."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.moved()
     assert not proof.proved
@@ -83,14 +83,14 @@ def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
 
 
 def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopProof) -> None:
-    """A displacement that arrives within 50 ms may have ended before Stop arrived."""
+    """A displacement that arrives within 50 ms of Stop may have ended before Stop arrived."""
     for _ in range(10):
         proof.look(moved(), 10.049)
     assert not proof.proved
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """Neither a new line nor Stop alone replaces the proof."""
+    """Neither a new connection nor Stop replaces the proof that the robot is at rest."""
     assert not proof.owed
     proof.moved()
     proof.stopped(10.0)
@@ -105,14 +105,14 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """This includes a robot that was at rest and is pushed."""
+    """A robot that is pushed out of rest is not proved to be at rest either."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved
 
 
 def test_a_displacement_of_unknown_duration_is_no_evidence(proof: StopProof) -> None:
-    """The first displacement after a pause includes all motion since."""
+    """The first displacement after a pause includes all motion since the pause began."""
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
         proof.look(unknown, 10.1 + number * PERIOD_S)
@@ -120,7 +120,7 @@ def test_a_displacement_of_unknown_duration_is_no_evidence(proof: StopProof) -> 
 
 
 def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
-    """No displacement is needed to show it."""
+    """The paused state proves that the robot is at rest, without any displacement."""
     proof.paused()
     assert proof.proved
 
@@ -133,7 +133,7 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """Small displacements, as of an encoder that flickers by one count, are regarded as rest."""
+    """Displacements of one flickering encoder count are regarded as rest."""
     proof = StopProof()
     proof.stopped(10.0)
     shown(proof, *before)
@@ -155,7 +155,7 @@ def without_deltas(bench: Bench) -> None:
 
 
 def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it() -> None:
-    """All odometry frames are lost, so the log says only that the stop is unconfirmed."""
+    """All odometry frames are lost, so the log only says that the stop is not confirmed."""
     bench = driving()
     without_deltas(bench)
     bench.run(8.0)
@@ -165,7 +165,7 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
-    """The board does not receive Stop, and the motion monitor is off."""
+    """The board misses Stop and drives on; the motion monitor, which may notice it, is off."""
     bench = driving()
     bench.configure(motion_monitor=False)
     bench.hears = False

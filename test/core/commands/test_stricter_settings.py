@@ -28,7 +28,7 @@ DRIVES = Bench.drive, (0.4,)
 def test_what_was_commanded_under_looser_ones_ends(
     command: Callable[..., None], values: tuple[float, ...], changed: dict[str, object]
 ) -> None:
-    """Stop is sent at once with a message; the next command is accepted."""
+    """A stricter setting sends Stop at once, with a message; the next command is accepted."""
     bench = driving()
     command(bench, *values)
     bench.run(0.05)
@@ -54,7 +54,7 @@ def test_what_was_commanded_under_looser_ones_ends(
     ],
 )
 def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
-    """The robot also continues under other accelerations and rates."""
+    """The robot also continues after a change of accelerations and rates."""
     bench = driving()
     start = len(bench.written)
     bench.drive(0.4)
@@ -65,7 +65,7 @@ def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
 
 
 def test_a_robot_that_stands_is_told_nothing() -> None:
-    """It has no current command, or a zero command."""
+    """A robot without a command, or with a zero command, does not cause a notice."""
     bench = driving()
     bench.drive()
     bench.configure(limits=SpeedLimits(linear_mps=0.1))

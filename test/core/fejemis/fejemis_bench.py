@@ -28,8 +28,8 @@ WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
 class Bench:
     """A session with both simulated boards.
 
-    ``hears``: channels that carry bytes to the robot; ``speaks``: channels that carry bytes from
-    it.
+    ``hears``: channels on which the robot receives bytes. ``speaks``: channels on which the driver
+    receives bytes from the robot.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class Bench:
         return [e.value for e in self.events if isinstance(e, Extra) and isinstance(e.value, kind)]
 
     def lines(self, channel: int, since: float = -math.inf) -> list[str]:
-        """Return the lines written to a channel since a time, without sums and padding."""
+        """Return the lines written to a channel since a time, without checksums and padding."""
         text = b"".join(d for at, to, d in self.written if to == channel and at >= since)
         found = text.decode("ascii").split("\n")
         bare = [line[3:] if line.startswith(";") else line for line in found]
@@ -148,7 +148,7 @@ def nominal(
     settings: FejemisSettings | None = None,
     **more: Any,
 ) -> Bench:
-    """Return a bench in state nominal: both boards send, and obey."""
+    """Return a bench in state nominal: both boards send data and obey commands."""
     bench = Bench(simulated, settings, **more)
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")

@@ -25,15 +25,15 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether an angle to the right has a 6 within half a degree.
+    """Return whether an angle to the right has a digit 6 within half a degree.
 
-    These are about -60° to -69°, and -6°, -16° and so on.
+    Such angles are about -60° to -69°, and -6°, -16° and so on.
     """
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """Most angles are sent to a tenth of a degree; some need rounding, to be safe from damage."""
+    """Most angles are sent to 0.1°; some are rounded further, to be safe from lost characters."""
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -41,9 +41,9 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """The exceptions are angles to the right with a 6: they become less than 10° to the left.
+    """The exceptions are angles to the right with a digit 6: they become less than 10° to the left.
 
-    They are fewer than a tenth of all angles.
+    These are fewer than a tenth of all angles.
     """
     across = 0
     for angle_deg in EVERY:
@@ -60,7 +60,7 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """The line includes its sum and its end, and the most lenient reader is assumed."""
+    """Characters of the checksum and the line end may be lost too; the reader is a lenient one."""
     text = relayed(angle_deg)
     data = line(text, sums=True)
     for count in (1, 2):
@@ -69,7 +69,7 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
-    """Every notation has a minus sign and a 6, and a sum does not detect the loss of both."""
+    """Every notation has a minus sign and a 6, and a checksum does not detect the loss of both."""
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
         assert {"-", "6"} <= {*f"{angle_deg}"}
@@ -77,7 +77,7 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
-    """Less than 1 % of the damaged lines pass; docs/boards/fejemis.md has the figures."""
+    """Less than 1 % of lines that lost three characters pass; see docs/boards/fejemis.md."""
     chance = random.Random(seed)
     passed = total = 0
     for _ in range(3):
@@ -91,9 +91,9 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """Whole degrees are sent, of which any loss leaves a smaller number.
+    """Without checksums whole degrees are sent, of which any loss leaves a smaller number.
 
-    Only beyond 90° would the inner wheel be the faster one.
+    The inner wheel would be the faster one only at an angle beyond 90°.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
@@ -106,7 +106,7 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 @pytest.mark.parametrize("sums", [True, False])
 @pytest.mark.parametrize("angle_deg", [0.3, 5.5, 12.4, 45.5, -6.25, -64.9])
 def test_the_mean_of_what_is_told_is_the_angle(angle_deg: float, *, sums: bool) -> None:
-    """The rounding error of an angle is added to the next one."""
+    """The rounding error of an angle is added to the next one, so the mean is exact."""
     relay = AngleRelay()
     told = [float(relay.text(math.radians(angle_deg), sums=sums)[4:]) for _ in range(200)]
     assert sum(told) / len(told) == pytest.approx(angle_deg, abs=0.01)

@@ -23,7 +23,7 @@ WRITTEN: dict[Written, tuple[float, ...]] = {
 
 
 def test_only_what_the_user_set_is_written() -> None:
-    """Without settings, nothing is written; everything is read and shown in diagnostics."""
+    """Without settings by the user nothing is written; diagnostics show what is read."""
     bench = nominal()
     bench.run(3.0)
     words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -41,7 +41,7 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """Each setting is written to the board that it belongs to."""
+    """Each setting is written to the board that uses it, again after a restart of that board."""
     from omnibot_driver.simulator.fejemis import Firmware
 
     bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
@@ -66,14 +66,14 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
 
 
 def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
-    """A notice names the setting after some tries, here ``confw`` with an impossible radius."""
+    """A notice names a setting that stays unset after some tries, here an impossible radius."""
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
     bench.run(6.0)
     assert any("confw" in text for text in bench.notices)
 
 
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """The help text and the command differ in the order; the track in ``conf`` decides."""
+    """Help text and command differ in the order of values; the track in ``conf`` decides."""
     for turned in (False, True):
         configuration = Configuration("drive", {})
         for _ in range(2):
@@ -83,7 +83,7 @@ def test_the_order_of_the_steering_geometry_is_found_out() -> None:
 
 
 def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_not_take() -> None:
-    """What the user set holds before the first reading, and once it was read back."""
+    """The user's geometry holds before the first reading, and after the board has reported it."""
     configuration = Configuration("drive", {Written.STEERING: (0.35, 0.45)})
     wanted, reported = Geometry(0.35, 0.45), Geometry(0.4, 0.42)
     assert configuration.geometry == wanted
@@ -94,7 +94,7 @@ def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_no
 
 
 def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
-    """A sum does not detect one in 99 damaged answers."""
+    """Two equal readings are needed, since one in 99 damaged answers passes its checksum."""
     configuration = Configuration("drive", {})
     for text in ("confs 0.4200 0.4000", "confs 4.2 0.4000", "confs 0.4200 0.4000"):
         configuration.hear(parse(text))
@@ -106,7 +106,7 @@ def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
 
 
 def test_what_was_read_once_is_asked_for_again() -> None:
-    """The second reading confirms the first one; after that it is not queried again."""
+    """A second reading confirms the first one; after that the value is not queried again."""
     bench = nominal()
     bench.run(2.0)
     asked = bench.lines(DRIVE).count("confsi")
@@ -115,7 +115,7 @@ def test_what_was_read_once_is_asked_for_again() -> None:
 
 
 def test_what_was_written_and_read_once_is_not_written_again() -> None:
-    """It is only queried a second time, to confirm it."""
+    """A written value that was read back once is only queried a second time, to confirm it."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     bench.run(2.0)
     assert bench.lines(FRONT).count("confs 0.41 0.43") == 1
@@ -123,7 +123,7 @@ def test_what_was_written_and_read_once_is_not_written_again() -> None:
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
-    """With the wrong setting only heartbeats are understood, so a notice must give the reason."""
+    """With the wrong checksum setting only heartbeats are understood; a notice gives the reason."""
     bench = Bench(settings=FejemisSettings(line_sums="off"))
     bench.open()
     bench.run(4.0)
@@ -132,7 +132,7 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:
-    """One of the boards must be wrong, and would compute wrong wheel speeds or angles."""
+    """One of two boards with different geometries must compute wrong wheel speeds or angles."""
     bench = nominal()
     bench.robot.receive(b"confs 0.4 0.5\n", bench.now, FRONT)
     bench.session.closed(bench.now)

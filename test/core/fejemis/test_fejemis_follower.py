@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A front wheel that does not go to its commanded angle."""
+"""Faults of a front wheel that does not turn to its commanded angle."""
 
 import contextlib
 import math
@@ -28,7 +28,7 @@ def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
 
 
 def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
-    """A wheel that gets nearer, even slowly, is regarded as following."""
+    """A blocked wheel is reported once; a wheel that approaches its angle, even slowly, is not."""
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.015 * n, TICK_S * n) for n in range(100))
@@ -38,7 +38,7 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """It was near its old angle and is far from the new one, so the time begins anew."""
+    """A new commanded angle, here far from the wheel, restarts the time that the wheel may take."""
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.02 * n, TICK_S * n) for n in range(60))
@@ -47,7 +47,7 @@ def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
 
 
 def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
-    """New commands, here 0.9 and 1.5 rad in turn, do not restart the time of a wheel at rest."""
+    """Commands of 0.9 and 1.5 rad in turn do not restart the time of a wheel at rest."""
     follower = Follower()
     seen = 0
     for n in range(200):
@@ -57,7 +57,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """Otherwise a sender that continues would move the robot for a second, again and again."""
+    """Otherwise a sender that continues would move the robot for 1 s, again and again."""
     follower = Follower()
     at = blocked(follower, 0.0)
     assert follower.refusal == UNTIL_IT_MOVES
@@ -69,7 +69,7 @@ def test_motion_is_refused_until_the_wheel_has_moved() -> None:
 
 
 def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
-    """After more than a minute a fault is again a first one, which ends when the wheel moves."""
+    """A fault more than a minute after the last one ends when the wheel moves."""
     follower = Follower()
     at = blocked(follower, 0.0)
     follower.look(1.0, at + 1.0)
@@ -87,7 +87,7 @@ def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
 
 
 def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> None:
-    """Command the twist ten times a second for ``seconds``, ignoring refusals."""
+    """Command a twist ten times a second for ``seconds``, ignoring refusals."""
     for _ in range(round(seconds / 0.1)):
         with contextlib.suppress(CommandRefused):
             bench.drive(v, w)
@@ -98,7 +98,7 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """This firmware does not reverse: it turns the front wheel across instead.
 
-    Until that was noticed twice, the robot has rolled less than 12 cm.
+    The robot rolls less than 12 cm before the second fault stops it for good.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two boards, one robot: each may be swapped, disconnected, restarted or silent by itself."""
+"""Two boards of one robot: either may be swapped, disconnected, restarted or silent alone."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -13,7 +13,7 @@ HALVES = {"drive": DRIVE, "front": FRONT}
 
 
 def drive_until_refused(bench: Bench, limit_s: float = 5.0) -> float:
-    """Drive until a command is refused; return the time that it took, in s."""
+    """Drive until a command is refused; return the time until the refusal, in s."""
     began = bench.now
     with pytest.raises(CommandRefused):
         bench.drive_on(seconds=limit_s)
@@ -30,7 +30,7 @@ def assert_stands(bench: Bench) -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
-    """The heartbeats identify the boards, and the channels are renamed accordingly."""
+    """Heartbeats identify the two boards, so the channels are assigned by them."""
     bench = nominal(Simulated(swapped=swapped))
     bench.drive_on()
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
@@ -44,7 +44,7 @@ def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> None:
-    """The robot is driven again once both boards send again, and only on a new command."""
+    """The robot drives again when both boards send again, and only on a new command."""
     bench = nominal()
     bench.drive_on()
     bench.speaks = {1 - HALVES[half]}
@@ -62,7 +62,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
-    """The robot stands still meanwhile, and moves only on a new command."""
+    """Until then the robot stands still; it moves again only on a new command."""
     bench = nominal()
     bench.drive_on()
     before = dict(bench.robot.half(half).subscriptions)
@@ -81,7 +81,7 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """The link then closes both ports, and opens again those that are present."""
+    """The link then closes both ports, and opens those that are present again."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -116,7 +116,7 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
     ],
 )
 def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
-    """The reason is reported once, and motion is refused."""
+    """Two boards that do not form a pair are reported once, and motion is refused."""
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -128,7 +128,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_never_speaks_is_missed(half: str) -> None:
-    """The notice names the silent board, and comes once."""
+    """The notice comes once and names the board that never sends."""
     bench = Bench()
     bench.speaks = {1 - HALVES[half]}
     bench.open()
@@ -138,7 +138,7 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
-    """After that stop the robot is driven with, or without, sums."""
+    """When lines begin or cease to have checksums, the robot stops once, then drives as before."""
     bench = nominal(Simulated(firmware=Firmware(sums=not begins)))
     bench.drive_on()
     bench.robot.drive.sums = bench.robot.front.sums = begins
@@ -153,7 +153,7 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
 
 
 def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
-    """The front board sends it 66 times a second, and the drive board needs each without delay."""
+    """The front board sends its angle 66 times a second; the drive board needs it without delay."""
     bench = nominal()
     mark = bench.now
     bench.drive_on(0.2, 0.4, 1.0)
@@ -165,7 +165,7 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """It is stopped when the angle becomes too old, not with the next command."""
+    """The stop comes when the angle becomes too old, not only with the next command."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -186,7 +186,7 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """Each bit of the diagnosis has a notice; once it is cleared, a new command drives."""
+    """Each bit of the diagnosis has a notice; once all are clear, a new command drives again."""
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -203,7 +203,7 @@ def test_a_broken_angle_sensor_stops_the_robot() -> None:
 
 
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """Its diagnosis does not report a fault, so only the missing rotation shows it."""
+    """The sensor's diagnosis reports nothing, so only the missing rotation shows the fault."""
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
     with pytest.raises(CommandRefused, match="front wheel did not go where"):
@@ -213,7 +213,7 @@ def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_t
 
 
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
-    """They are skipped, and the unknown line is shown in diagnostics."""
+    """Such lines are skipped, and an unknown line is shown in diagnostics."""
     bench = nominal()
     bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
     bench.robot.receive(b"help\nxyz\n", bench.now, FRONT)
@@ -228,7 +228,7 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
     Firmware(shows_source=False),
 ])  # fmt: skip
 def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
-    """The variants differ in units, in optional fields and in the form of their lines."""
+    """Firmware variants differ in units, in optional fields and in the form of their lines."""
     bench = nominal(Simulated(firmware=firmware))
     bench.drive_on(0.3, 0.2, 0.8)
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
@@ -237,7 +237,7 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
 
 
 def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
-    """Both boards are silent for 0.1 s when the command comes."""
+    """Both boards have been silent for 0.1 s when the command comes, so the last angle is old."""
     bench = nominal()
     bench.speaks = set()
     bench.run(0.1)
@@ -266,7 +266,7 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
 
 
 def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() -> None:
-    """Even before its first heartbeat, as its pose begins anew."""
+    """The start message counts as a restart even before a heartbeat, as the pose begins anew."""
     bench = nominal()
     bench.close()
     bench.session.opened(bench.now)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines of both Teensys: sums, messages, damage. The golden lines are copied from the manual."""
+"""Lines of both Teensys: checksums, messages, damage. Golden lines are copied from the manual."""
 
 import random
 
@@ -41,7 +41,7 @@ GOLDEN_SUMS = [
     b";31leave",
     b";06hbt 44.97199 90 110 24.95 10 0",
 ]
-"""Lines as the public hosts write them."""
+"""Lines with their checksums, as the public hosts write them."""
 GOLDEN: dict[str, Message] = {
     "hbt 44.97199 90 110 24.95 10 0": Heartbeat(44.97199, 90, 110, 24.95, 10.0),
     "hbt 45.1 90 110 24.95 -1 0": Heartbeat(45.1, 90, 110, 24.95, -1.0),
@@ -120,7 +120,7 @@ def feed(decoder: FejemisDecoder, data: bytes) -> list[Message]:
 
 @pytest.mark.parametrize("line", GOLDEN_SUMS)
 def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
-    """A sum is written and checked as the public hosts do it."""
+    """A checksum is written and checked as the public host programs do it."""
     text = line[3:]
     assert with_sum(text) == line
     assert without_sum(line) == (text, True)
@@ -135,14 +135,14 @@ def test_every_message_is_understood(text: str) -> None:
 
 @pytest.mark.parametrize("text", DAMAGED)
 def test_what_no_board_says_is_no_message(text: str) -> None:
-    """The lines have too few fields, implausible numbers or unknown keywords."""
+    """Such lines have too few fields, implausible numbers or unknown keywords."""
     assert parse(text) is None
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 @pytest.mark.parametrize("sums", [False, True])
 def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
-    """The bytes come at once, byte by byte and in random pieces."""
+    """The same bytes are decoded at once, byte by byte and in random pieces."""
     of_each_kind = {text.split()[0]: (text, GOLDEN[text]) for text in GOLDEN}.values()
     texts = [text.encode() for text, _ in of_each_kind]
     lines = [with_sum(text) if sums else text for text in texts]
@@ -162,13 +162,13 @@ def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
 
 
 def test_extra_fields_are_left_alone() -> None:
-    """Newer firmware may add fields at the end of a line."""
+    """Newer firmware may add fields at the end of a line; the known fields are still decoded."""
     assert parse("vel 1.0 0.250 -0.250 7 8") == WheelSpeeds(0.25, -0.25, 1.0)
     assert parse("gyro 1 2 3 4 5") == Gyro(1.0, 2.0, 3.0)
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A cut line also spoils the line that is joined to it, but not the one after."""
+    """A cut line also spoils the line that is joined to it, but not the next one."""
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
     assert feed(decoder, good[:9] + good + good) == [Gyro(1.0, 2.0, 3.0)]
@@ -179,7 +179,7 @@ def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
 
 
 def test_a_line_may_have_200_characters_and_no_more() -> None:
-    """A longer line is discarded up to its end, in whatever pieces it comes."""
+    """A longer line is discarded up to its line end, in whatever pieces it arrives."""
     decoder = FejemisDecoder()
     text = b"# " + b"x" * (LONGEST_LINE - 2)
     assert len(feed(decoder, text + b"\n")) == 1
@@ -189,7 +189,7 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
 
 
 def test_half_a_line_at_the_end_is_none() -> None:
-    """Without its line end it may be incomplete."""
+    """Text without a line end is not decoded, because it may be incomplete."""
     decoder = FejemisDecoder()
     assert feed(decoder, b"gyro 1 2 3") == []
     assert decoder.flush(0.0) == []
@@ -201,7 +201,7 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 
 @pytest.mark.parametrize("sums", [False, True])
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
-    """After that, lines of the other kind are discarded."""
+    """After the first heartbeat, lines of the other kind (with or without sums) are discarded."""
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
     beat, gyro = (with_sum(t) if sums else t for t in (BEAT, b"gyro 1 2 3"))
@@ -229,7 +229,7 @@ def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None
 def test_heartbeats_contradict_a_setting_but_do_not_overrule_it(
     setting: str, *, sums: bool
 ) -> None:
-    """A board that does not understand the driver's lines may send heartbeats alone."""
+    """A board that does not understand the driver's checksums may send heartbeats only."""
     decoder = FejemisDecoder(setting)  # type: ignore[arg-type]
     right, wrong = (with_sum(BEAT), BEAT) if sums else (BEAT, with_sum(BEAT))
     for beat in (wrong, wrong, right):
@@ -239,7 +239,7 @@ def test_heartbeats_contradict_a_setting_but_do_not_overrule_it(
 
 
 def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None:
-    """A board always prints a kind of line with the same decimals, so a change shows damage."""
+    """A board always prints a value with the same number of decimals, so a change shows damage."""
     decoder = FejemisDecoder("off")
     feed(decoder, b"pose 1.00000 1.234 0.567 0.1000\n" * 3)
     assert feed(decoder, b"pose 1.00000 1.24 0.567 0.1000\n") == []
@@ -248,7 +248,7 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """Three lines in a row with new decimals are believed, as are decimals that always vary."""
+    """Three lines in a row with other decimals are believed, as are decimals that always vary."""
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
     assert len(feed(decoder, b"gyro 1.0 2.0 3.0\n" * 5)) == 3
@@ -259,7 +259,7 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
 def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
-    """Random bytes in random pieces are decoded; less than one longest line is buffered."""
+    """Random bytes in random pieces never raise; the buffer stays shorter than one longest line."""
     decoder = FejemisDecoder()
     for piece in pieces:
         feed(decoder, piece)
@@ -275,7 +275,7 @@ def test_no_line_raises(text: str) -> None:
 
 
 def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
-    """This is why ranges, decimals and steps of the values are checked too."""
+    """One damaged line in 99 passes, so ranges, decimals and steps of values are checked too."""
     chance, passed = random.Random(1), 0
     line = with_sum(b"pose 45.37199 1.234 -0.056 0.7854")
     for _ in range(20_000):
@@ -288,7 +288,7 @@ def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
 
 
 def test_what_is_a_command_without_its_last_character_is_asked_with_a_sum_alone() -> None:
-    """If ``svpi`` (a query) loses its ``i``, it is ``svp``, which sets the servo."""
+    """``svpi`` (a query) that loses its ``i`` is ``svp``, which sets the servo."""
     for sums in (True, False):
         polls = Polls("front")
         texts = [text for n in range(40) for text in polls.due(float(n), sums=sums)]

@@ -62,7 +62,7 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 
 
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """Commands over the complete range are tried, each with the line that follows it."""
+    """Commands of the complete range are tried, each with the line that follows."""
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
     behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
@@ -77,7 +77,7 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 
 
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
-    """The lines lack the pairs of characters, and the sums, that would hide a loss."""
+    """The driver avoids lines with digit pairs or checksums that would hide such a loss."""
     chance = random.Random(7)
     for _ in range(150):
         v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
@@ -87,7 +87,7 @@ def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
 
 
 def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
-    """Any one to four characters are removed."""
+    """Any one to four characters of the stop lines are removed."""
     data = line(STOP, sums=True)
     for count in range(1, 5):
         for lost in itertools.combinations(range(len(data)), count):
@@ -109,7 +109,7 @@ def test_what_three_lost_characters_leave() -> None:
 
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """The front angle is right within 0.2°, the speed of the outer wheel within 0.6 %."""
+    """The angle of the front wheel is right within 0.2°, the outer wheel's speed within 0.6 %."""
     if v == w == 0.0:
         return
     _, front_v, front_w = motions(front_line(v, w, FRONT_M) + b"\n")[0]
@@ -173,7 +173,7 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
 
 
 def test_without_sums_the_front_board_gets_both_numbers() -> None:
-    """The front board computes its angle from the ratio of the two numbers."""
+    """Without checksums the front board gets both numbers, as their ratio gives its angle."""
     assert plain_front_line(0.25, 0.5) == b"rc 2 0.25 28.65"
     assert plain_front_line(0.0, -0.5) == b"rc 2 0 -28.65"
     assert plain_drive_line(0.0004, 0.0) == STOP

@@ -25,14 +25,14 @@ TRACK_M = 0.4
 
 
 def told(place: Pose, time_s: float) -> BoardPose:
-    """Return the pose message, rounded as the board prints it."""
+    """Return the pose message of the drive board, rounded as the board prints it."""
     return BoardPose(
         round(time_s, 5), round(place.x_m, 3), round(place.y_m, 3), round(place.yaw_rad, 4), 3
     )
 
 
 class Drive:
-    """A driving board, and the odometry that takes its messages every 20 ms."""
+    """A simulated drive: its pose and speed messages go to odometry every 20 ms."""
 
     def __init__(self, *, with_speeds: bool = True) -> None:
         self.odometry = PoseOdometry(TRACK_M)
@@ -74,7 +74,7 @@ def test_displacements_add_up_to_the_pose() -> None:
 
 
 def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
-    """Poses alone have steps of a millimetre in 20 ms, which is 0.05 m/s."""
+    """Poses have steps of 1 mm in 20 ms, which alone would give speed steps of 0.05 m/s."""
     spread = {}
     for with_speeds in (True, False):
         drive = Drive(with_speeds=with_speeds)
@@ -86,7 +86,7 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
 
 
 def test_a_gap_is_settled_by_the_pose_after_it() -> None:
-    """The gap lasts 2 s, and the robot drives a curve meanwhile."""
+    """No message arrives for 2 s, in which the robot drives a curve."""
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     drive.run(0.3, 0.2, 1.0)
@@ -107,7 +107,7 @@ def test_a_gap_is_settled_by_the_pose_after_it() -> None:
     ],
 )
 def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
-    """The next correct pose continues from the last correct one."""
+    """The false pose is skipped, and the next correct pose continues from the last correct one."""
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     drive.run(0.3, 0.4, 2.0)
@@ -119,7 +119,7 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 
 
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
-    """Another program has sent ``enc0``; the robot itself has not moved."""
+    """Another program has sent ``enc0``, which sets the board's pose to zero; odometry stays."""
     drive = Drive()
     drive.run(0.5, 0.2, 4.0)
     before = drive.out
@@ -165,7 +165,7 @@ def test_the_covariance_is_consistent_over_fifty_drives() -> None:
 
 
 def normalised(pose: Pose, truth: Pose, c: Covariance) -> float:
-    """Return the normalised error squared of the pose, by its covariance."""
+    """Return the normalised squared error of the pose (NEES), by its covariance."""
     e = (
         pose.x_m - truth.x_m,
         pose.y_m - truth.y_m,
@@ -188,7 +188,7 @@ def normalised(pose: Pose, truth: Pose, c: Covariance) -> float:
 
 
 def figure_eight(bench: Bench, speed: float = 0.4, radius_m: float = 0.8) -> None:
-    """Drive a figure eight of ten metres; repeat refused commands."""
+    """Drive a figure eight of ten metres; repeat commands that are refused."""
     rate = speed / radius_m
     lap_s = math.tau / rate
     end_s, began = 2 * lap_s, bench.now
@@ -203,7 +203,7 @@ def figure_eight(bench: Bench, speed: float = 0.4, radius_m: float = 0.8) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> None:
-    """After ten metres with one character in a thousand lost, the error is below 1 % and 2°."""
+    """With one character in a thousand lost both ways, the error after 10 m is below 1 % and 2°."""
     chance = random.Random(seed)
     bench = nominal(Simulated(seed=seed, lose_inbound=1e-3))
     bench.carry = lambda _, data: bytes(byte for byte in data if chance.random() >= 1e-3)
@@ -228,7 +228,7 @@ def test_joint_states_follow_the_wheels() -> None:
 
 
 def test_odometry_goes_out_with_every_pose() -> None:
-    """That is fifty times a second, with a twist from the wheel speeds."""
+    """The board sends a pose fifty times a second; the twist comes from the wheel speeds."""
     bench = nominal()
     bench.drive_on(0.3, 0.2, 2.0)
     bench.events.clear()
@@ -239,6 +239,6 @@ def test_odometry_goes_out_with_every_pose() -> None:
 
 
 def test_the_logarithm_leads_to_the_pose() -> None:
-    """The logarithm is the inverse of rolling along an arc."""
+    """The logarithm of a pose is the twist whose integral along an arc leads to this pose."""
     way = Pose(0.3, 0.1, 0.7)
     assert roll(log_of(way)).way_to(way).way_m < 1e-12

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each line of both help lists has a golden line, and a use or the reason why it has none."""
+"""Each line of both boards' help has a golden line, and a use or a reason for having none."""
 
 import math
 import re
@@ -131,7 +131,7 @@ def listed(text: str) -> tuple[set[str], set[str]]:
 
 @pytest.mark.parametrize("text", [DRIVE_HELP, FRONT_HELP], ids=["drive", "front"])
 def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
-    """Commands have a row in SAID, subscriptions in HEARD."""
+    """Each command has a row in the table SAID, each subscription one in HEARD."""
     said, heard = listed(text)
     assert said <= SAID.keys()
     assert heard <= HEARD.keys()
@@ -148,7 +148,7 @@ def test_no_row_is_of_something_else() -> None:
 
 @pytest.mark.parametrize("keyword", HEARD)
 def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
-    """It is requested by a subscription, by a poll or with the configuration."""
+    """Each message is requested by a subscription, by a poll or with the configuration."""
     golden = [text for text in GOLDEN if text.split()[0] == keyword]
     assert golden
     assert parse(golden[0]) is not None
@@ -192,7 +192,7 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """Commands without a use, such as ``setid``, which can erase the board, are never sent."""
+    """A command without a use, such as ``setid``, which can erase the board, is never sent."""
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden
     words = {text.split()[0] for text in said}

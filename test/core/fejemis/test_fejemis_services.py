@@ -31,7 +31,7 @@ def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
 
 
 def test_the_gyro_is_calibrated_by_the_board() -> None:
-    """The request succeeds because the offset that is read back has changed."""
+    """The calibration succeeds when the gyro offset read back from the board has changed."""
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
     done = ask(bench, Job.CALIBRATE_GYRO)
     assert done.success
@@ -42,7 +42,7 @@ def test_the_gyro_is_calibrated_by_the_board() -> None:
 
 
 def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
-    """A damaged answer that passes its sum proves nothing."""
+    """One damaged answer may pass its checksum, so two equal readings are needed."""
     jobs = Jobs()
     jobs.ask(Job.CALIBRATE_GYRO, None, 0.0)
     jobs.due(0.0)
@@ -56,7 +56,7 @@ def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
 
 
 def test_the_accelerometer_is_calibrated_by_the_board() -> None:
-    """The robot is on level ground, where only gravity acts."""
+    """The robot must be on level ground, where gravity is the only acceleration."""
     bench = nominal(Simulated(accel_bias_mps2=(0.2, -0.1, 0.3)))
     assert ask(bench, Job.CALIBRATE_ACCELEROMETER).success
     bench.events.clear()
@@ -66,7 +66,7 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
 
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
-    """Only loading a configuration is accepted, and stops the robot first."""
+    """Each job is refused then, except loading a configuration, which stops the robot first."""
     bench = nominal()
     bench.drive_on()
     if job is not Job.LOAD:
@@ -78,7 +78,7 @@ def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
 
 
 def test_a_job_that_nothing_confirms_fails() -> None:
-    """It fails within its time limit; a second job meanwhile is refused."""
+    """A job without confirmation fails within its time limit; a second one meanwhile is refused."""
     bench = nominal()
     bench.hears = {FRONT}
     token = object()
@@ -92,7 +92,7 @@ def test_a_job_that_nothing_confirms_fails() -> None:
 
 
 def test_a_job_is_answered_when_the_port_is_lost() -> None:
-    """The result comes at once, without waiting for the port to come back."""
+    """The job fails at once, without waiting for the port to come back."""
     bench = nominal()
     token = object()
     bench.board.services.ask(Job.CALIBRATE_GYRO, token, bench.now)
@@ -104,7 +104,7 @@ def test_a_job_is_answered_when_the_port_is_lost() -> None:
 
 
 def test_a_robot_that_rolls_is_not_calibrated() -> None:
-    """It is commanded to stop, but still moves."""
+    """The robot is commanded to stop, but still rolls, so the calibration is refused."""
     bench = nominal()
     bench.drive_on(0.5)
     bench.drive(0.0)
@@ -113,7 +113,7 @@ def test_a_robot_that_rolls_is_not_calibrated() -> None:
 
 
 def test_a_configuration_is_saved_and_loaded() -> None:
-    """Both boards save and load it."""
+    """Both boards save the configuration, and both load it."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     assert bench.robot.drive.saved.confs_m == (0.4, 0.42)
     assert ask(bench, Job.SAVE).success
@@ -123,7 +123,7 @@ def test_a_configuration_is_saved_and_loaded() -> None:
 
 
 def test_power_off_is_called_back_by_a_start() -> None:
-    """Until then motion is refused."""
+    """Motion is refused between the request to power off and the start."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
     done = ask(bench, Job.POWER_OFF)
     assert done.success
@@ -137,7 +137,7 @@ def test_power_off_is_called_back_by_a_start() -> None:
 
 
 def test_power_off_cuts_the_power() -> None:
-    """The power ends after the configured delay."""
+    """The board cuts its power after the configured delay."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=4.0))
     assert ask(bench, Job.POWER_OFF).success
     bench.run(4.0)
@@ -145,7 +145,7 @@ def test_power_off_cuts_the_power() -> None:
 
 
 def test_all_sensors_are_told_in_si_units() -> None:
-    """They are battery, magnetometer, orientation, four ranges and the steered wheel."""
+    """Battery, magnetometer, orientation, four ranges and the steered wheel are published."""
     bench = nominal(Simulated(front_m=0.3))
     bench.run(1.0)
     battery = bench.extras(BatteryReading)[-1]
@@ -163,7 +163,7 @@ def test_all_sensors_are_told_in_si_units() -> None:
 
 
 def test_a_low_battery_is_told_once_a_minute() -> None:
-    """The voltage per cell decides."""
+    """The voltage per cell decides whether the battery is low."""
     bench = nominal(Simulated(volts=20.4))
     bench.run(4.0)
     assert bench.extras(BatteryReading)[-1].low
@@ -172,7 +172,7 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
 
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
-    """An offset that is measured in motion would be wrong."""
+    """An offset that is measured in motion would be wrong, so motion is refused meanwhile."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -187,7 +187,7 @@ def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.LOAD])
 @pytest.mark.parametrize("stop", ["e-stop", "pause"])
 def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: str) -> None:
-    """The job fails at once."""
+    """The running job fails at once on an e-stop or a pause."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -218,7 +218,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
-    """So the robot may be driven again."""
+    """The restart cancels the power-off, so the robot may be driven again."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=100.0))
     assert ask(bench, Job.POWER_OFF).success
     with pytest.raises(CommandRefused, match="power"):

@@ -31,7 +31,7 @@ angles = st.floats(-math.pi / 2, math.pi / 2)
 
 
 def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
-    """Return speed and turn rate of the body, literally by the manual, section Turning control."""
+    """Return the body's speed and turn rate by the manual's section Turning control."""
     b, f = 0.4, 0.5
     v2 = math.hypot(v, w) * (-1.0 if v < 0.0 else 1.0)
     if theta_rad == 0.0:
@@ -54,14 +54,14 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """The numbers are computed by hand: the body does not move with the v and w of ``rc``."""
+    """By the manual's equations, the body does not move with the v and w of an ``rc`` command."""
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
 
 
 @given(speeds, rates, angles)
 def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: float) -> None:
-    """They agree for every angle that the wheel may have."""
+    """The driver's equations and the manual's agree for every angle that the wheel may have."""
     assume(math.hypot(v, w) > 1e-3 and abs(theta_rad) > 1e-6)
     body = told_twist(v, w, ROBOT, theta_rad)
     expected = manual(v, w, theta_rad)
@@ -70,7 +70,7 @@ def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: fl
 
 @given(speeds, rates)
 def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
-    """The wheel is at the angle to which the front board moves it."""
+    """The front wheel is at the angle to which the front board moves it."""
     assume(outer_mps(BodyTwist(v, 0.0, w), 0.4) > 1e-3 and v >= 0.0)
     factor = scale(BodyTwist(v, 0.0, w), 0.4)
     theta_rad = math.atan2(0.5 * factor * w, factor * v)
@@ -82,7 +82,7 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """The tolerance is the effect of an angle that is wrong by 5°."""
+    """While the wheel turns to its angle, an error of 5° in that angle is tolerated."""
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist
@@ -96,7 +96,7 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 
 @given(rates, angles)
 def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> None:
-    """The wheel must be within 5° of ±90°; before that the drive board is stopped."""
+    """The drive board is stopped until the wheel is within 5° of ±90°."""
     assume(abs(w) > 0.01)
     told = steer(BodyTwist(0.0, 0.0, w), ROBOT, angle_rad, turning=False)
     stands = abs(angle_rad - math.copysign(math.pi / 2, w)) <= ALIGNED_RAD
@@ -105,7 +105,7 @@ def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> N
 
 
 def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
-    """It would compute with an old angle."""
+    """Without a current angle the board would compute with an old one, so it is stopped."""
     told = steer(BodyTwist(0.3, 0.0, 0.1), ROBOT, None, turning=False)
     assert told.part == 0.0
     assert told.speed_mps > 0.3
@@ -130,7 +130,7 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The tolerances are 1.2 % of the outer wheel's speed, and 3 % of it over the track width."""
+    """Tolerances: 1.2 % of the outer wheel's speed, and 3 % of that speed over the track width."""
     bench = nominal()
     bench.drive_on(v, w, 2.5)
     truth = bench.robot.truth
@@ -140,7 +140,7 @@ def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
 
 
 def test_the_digits_cost_less_than_one_per_cent() -> None:
-    """The motion of the written lines, by the manual, is compared with the command."""
+    """By the manual, the motion of the rounded lines differs by less than 1 % from the command."""
     for v in (0.05, 0.1, 0.15, 0.25, 0.5, 1.0):
         for w in (-1.5, -0.3, 0.0, 0.1, 0.12, 0.8):
             factor = scale(BodyTwist(v, 0.0, w), 0.4)
@@ -164,7 +164,7 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 
 
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
-    """The servo needs more than a second for 180°, which must not be reported as a fault."""
+    """The servo needs over 1 s for 180°; meanwhile the robot rests, and no fault is reported."""
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)
     before_m = bench.robot.truth.x_m
@@ -194,7 +194,7 @@ def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int
 
 
 def test_reverse_is_off_until_it_is_allowed() -> None:
-    """The robot stands still, and the reason is reported once."""
+    """Reverse needs a parameter; without it the robot stands still and one notice explains why."""
     bench = nominal()
     bench.drive_on(-0.2, 0.3, 1.0)
     assert bench.robot.standing
@@ -203,7 +203,7 @@ def test_reverse_is_off_until_it_is_allowed() -> None:
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
-    """With this firmware, the robot reverses along the commanded curve."""
+    """With firmware that mirrors the angle in reverse, the robot follows the commanded curve."""
     bench = nominal(
         Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)
     )
@@ -214,7 +214,7 @@ def test_a_mirrored_reverse_is_driven() -> None:
 
 
 def test_a_speed_of_nothing_that_is_negative_is_none() -> None:
-    """A controller's rounding error, here -1e-9 m/s, must not be refused as reverse."""
+    """A speed of -1e-9 m/s, a controller's rounding error, must not be refused as reverse."""
     bench = nominal()
     bench.drive_on(-1e-9, 0.5, 3.0)
     assert bench.robot.truth.yaw_rate_radps == pytest.approx(0.5, abs=0.02)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of e-stop and pause, of brush, lift and lights, and of the last lines at the exit."""
+"""Tests of e-stop and pause, of brush, lift and lights, and of the last lines before the exit."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ def without_relays(lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """The old command is set to zero before ``start`` is sent, as some firmware resumes it."""
+    """The old command is set to zero before ``start``, since some firmware resumes it."""
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
     mark = bench.now
@@ -47,7 +47,7 @@ def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) 
 
 
 def test_the_stop_of_an_estop_is_a_word_alone() -> None:
-    """The firmware of a related robot does not accept ``stop`` with spaces after it."""
+    """The e-stop sends ``stop`` without padding, which related firmware does not accept."""
     bench = nominal()
     mark = bench.now
     bench.estop(True)
@@ -56,7 +56,7 @@ def test_the_stop_of_an_estop_is_a_word_alone() -> None:
 
 
 def test_a_lost_start_after_an_estop_is_said_again() -> None:
-    """It is repeated until the heartbeat shows that the drive board obeys."""
+    """``start`` is repeated until the heartbeat shows that the drive board obeys again."""
     bench = nominal()
     bench.estop(True)
     bench.run(1.0)
@@ -72,7 +72,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The pause outlasts an e-stop, and only a start ends it."""
+    """The heartbeat names who stopped the board; the pause outlasts an e-stop, until a start."""
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)
@@ -92,7 +92,7 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 
 
 def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone() -> None:
-    """The parameter ``auto_start`` decides."""
+    """The parameter ``auto_start`` decides whether the driver starts a stopped board."""
     for run in (True, False):
         bench = Bench(run=run)
         bench.run(0.5)
@@ -108,7 +108,7 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The time is sent with the voltage, so the lift stops even if the driver dies."""
+    """The time limit is sent with the voltage, so the lift stops even if the driver dies."""
     bench = nominal()
     lift_it(bench)
     bench.hears = {DRIVE}
@@ -121,7 +121,7 @@ def test_the_lift_runs_no_longer_than_a_command() -> None:
 
 
 def test_the_time_of_the_lift_follows_the_timeout() -> None:
-    """The time is at most ``command_timeout_s``."""
+    """The time limit sent to the lift is at most ``command_timeout_s``."""
     bench = nominal(settings=FejemisSettings(command_timeout_s=0.2))
     lift_it(bench, -6.0)
     said = [text for text in bench.lines(FRONT) if text.startswith("motv -")]
@@ -131,9 +131,9 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """Each is sent at most twenty times a second.
+    """Each value is sent at most twenty times a second.
 
-    A stop is sent at once, and the flood does not multiply the lines of the brush.
+    A stop is sent at once, and frequent values do not multiply the lines of the brush.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -154,7 +154,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """Its time begins when it is sent; a stop meanwhile discards it."""
+    """The time of a delayed voltage begins when it is sent; a stop before that discards it."""
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
     machine.due(0.0)
@@ -186,7 +186,7 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
-    """They are still off when the robot works again."""
+    """After a stop, brush and lift are still off when the robot works again."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     lift_it(bench)
@@ -206,7 +206,7 @@ def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]
 
 
 def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
-    """Switching it off is always allowed."""
+    """Brush and lift may always be switched off, but not on."""
     bench = nominal()
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop"):
@@ -222,7 +222,7 @@ def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
 
 
 def test_a_command_that_expires_leaves_the_brush_on() -> None:
-    """A sweeping robot may stand still for a while."""
+    """A sweeping robot may stand still for a while, so only the wheels stop."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.drive_on()
@@ -232,7 +232,7 @@ def test_a_command_that_expires_leaves_the_brush_on() -> None:
 
 
 def test_the_lights_are_given_back_at_the_end() -> None:
-    """The board controls them again, if the driver has changed them."""
+    """At the exit the board controls the lights again, if the driver has changed them."""
     bench = nominal()
     assert not any(b"leds" in data for _, data in bench.board.switch_off())
     bench.board.services.set_led(300, 128, -5, bench.now)
@@ -243,7 +243,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The guard has lines for a stop and for a latched e-stop; the exit has its own."""
+    """The guard has lines for a stop and for a latched e-stop; the exit has lines of its own."""
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
         bench.board.services.set_brush(True, bench.now)
@@ -263,7 +263,7 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
 
 @pytest.mark.parametrize("again", ["e-stop", "pause"])
 def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> None:
-    """After a release, ``start`` is repeated for a second."""
+    """After a release ``start`` is repeated for a second, unless a stop comes first."""
     bench = nominal()
     bench.estop(True)
     bench.run(0.5)
@@ -301,7 +301,7 @@ def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
 
 
 def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
-    """It may have restarted, which only its second heartbeat shows."""
+    """The front board may have restarted in its silence, which its second heartbeat shows."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -315,7 +315,7 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
 
 
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
-    """A line may be lost, and the driver cannot repeat it later."""
+    """One line may be lost, and the driver cannot repeat it after the exit."""
     bench = nominal()
     front = [data for channel, data in bench.board.switch_off() if channel == FRONT]
     assert b"".join(front).count(b"brush 0") == 3

@@ -68,7 +68,7 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
 
 
 def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """It has lost a digit; but three or more that agree show that the board has restarted."""
+    """A damaged time has lost a digit; three or more that agree show that the board restarted."""
     clock = TeensyClock()
     assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
     assert not clock.see(10.98, 6.0)
@@ -81,7 +81,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """Here the clock gives times that go back, and one after the call."""
+    """The artificial clock gives times that go back, and one after the time of the call."""
     stamped = StampedReadings()
     stamped.begin()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -94,7 +94,7 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 @pytest.mark.parametrize("gyro_first", [True, False])
 def test_a_sample_is_a_gyro_line_and_an_acceleration_line(*, gyro_first: bool) -> None:
-    """The order is arbitrary; if either line is lost, only that sample is lost."""
+    """Both lines may come first; a sample is lost if either of its lines is lost."""
     imu = ImuPairing("g")
 
     def say(now: float, *, gyro: bool = True, acceleration: bool = True) -> list[ImuReading]:
@@ -117,7 +117,7 @@ def test_a_sample_is_a_gyro_line_and_an_acceleration_line(*, gyro_first: bool) -
 
 @pytest.mark.parametrize("sums", [True, False])
 def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
-    """The stamps are 10 ms apart, within 1.5 ms."""
+    """A hundred samples a second have stamps 10 ms apart, within 1.5 ms."""
     bench = nominal(Simulated(firmware=Firmware(sums=sums)))
     bench.events.clear()
     bench.run(3.0)
@@ -129,7 +129,7 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """The times of a restarted board go back; here they only jump ahead."""
+    """The times of a restarted board go back; those after the waiting lines only jump ahead."""
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
@@ -143,10 +143,7 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 
 
 def test_what_waited_while_the_host_was_stalled_is_no_restart() -> None:
-    """Waiting lines of the same board arrive all at once, and their times do not go back.
-
-    The times of a restarted board do.
-    """
+    """Lines of a board that did not restart arrive all at once, but their times increase."""
     clock = TeensyClock()
     for n in range(100):
         assert clock.see(5.0 + 0.02 * n, 100.0 + 0.02 * n)

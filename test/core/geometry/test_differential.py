@@ -22,7 +22,7 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
 
 
 def test_straight_ahead_both_wheels_roll_alike() -> None:
-    """1 m/s at a radius of 0.1 m is 10 rad/s."""
+    """1 m/s with wheels of radius 0.1 m is 10 rad/s of both wheels."""
     assert ROBOT.wheel_rates(BodyTwist(1.0, 0.0, 0.0)) == pytest.approx((10.0, 10.0))
 
 
@@ -48,7 +48,7 @@ def test_about_a_wheel_that_stands() -> None:
 def test_wheels_and_back_is_the_feasible_part(
     robot: DifferentialKinematics, twist: BodyTwist
 ) -> None:
-    """The base cannot move sideways."""
+    """The sideways velocity of a twist is lost, because the base cannot move sideways."""
     back = robot.body_twist(robot.wheel_rates(twist))
     assert triple(back) == pytest.approx(triple(robot.feasible(twist)), rel=1e-9, abs=1e-9)
     assert robot.feasible(twist).vy_mps == 0.0
@@ -58,7 +58,7 @@ def test_wheels_and_back_is_the_feasible_part(
 def test_body_and_back_is_the_same_wheels(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """Two wheels have two degrees of freedom, so nothing is lost."""
+    """Body motion has two degrees of freedom, as two wheels have, so nothing is lost."""
     back = robot.wheel_rates(robot.body_twist(wheel_rates))
     assert back == pytest.approx(wheel_rates, rel=1e-9, abs=1e-7)
 
@@ -67,7 +67,7 @@ def test_body_and_back_is_the_same_wheels(
 def test_each_wheel_rolls_about_the_instantaneous_centre(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """Its speed is the yaw rate times its distance from the centre, which is at vx / yaw rate."""
+    """The wheel's speed is the yaw rate times its distance from the centre, at vx / yaw rate."""
     twist = robot.body_twist(wheel_rates)
     if abs(twist.yaw_rate_radps) < 1e-3:
         return

@@ -50,7 +50,7 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 
 @given(twists, st.floats(0.001, 1.0), st.floats(0.01, 2.0))
 def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base: float) -> None:
-    """This holds for robots of any size."""
+    """Converting a twist to wheel rates and back gives the same twist, for any size of robot."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     back = kinematics.body_twist(kinematics.wheel_rates(twist))
     assert as_tuple(back) == close(as_tuple(twist), rel=1e-9)
@@ -60,7 +60,7 @@ def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base
 def test_body_and_back_is_the_same_wheels(
     rates: tuple[float, float, float], radius: float, base: float
 ) -> None:
-    """Three wheels have three degrees of freedom, so nothing is lost."""
+    """Three wheel rates have three degrees of freedom, as a twist has, so nothing is lost."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     assert kinematics.wheel_rates(kinematics.body_twist(rates)) == close(rates, rel=1e-9, abs_=1e-7)
 

@@ -14,7 +14,7 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 @pytest.mark.slow
 @given(small_moves)
 def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
-    """The expected values are the textbook's."""
+    """The expected poses are those of the textbook's integral."""
     chord = roll(tangent)
     expected = arc(tangent.x_m, tangent.y_m, tangent.yaw_rad)
     assert (chord.x_m, chord.y_m) == pytest.approx(expected, abs=1e-9)
@@ -23,13 +23,13 @@ def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
 
 @given(st.builds(Pose, st.floats(-10, 10), st.floats(-10, 10), st.floats(-3.2767, 3.2767)))
 def test_unroll_and_roll_are_inverse(displacement: Pose) -> None:
-    """This holds for every turn that fits in a delta frame."""
+    """``unroll`` inverts ``roll`` for every turn that fits in a delta frame."""
     assert xyyaw(roll(log_of(displacement))) == close(xyyaw(displacement))
     assert xyyaw(log_of(roll(displacement))) == close(xyyaw(displacement))
 
 
 @pytest.mark.parametrize("turn", [0.0, 5e-324, 1e-300, -1e-300, 1e-9, -1e-9])
 def test_a_turn_of_almost_nothing_is_no_trouble(turn: float) -> None:
-    """Division by zero and loss of digits are avoided."""
+    """A turn near zero causes neither a division by zero nor a loss of digits."""
     assert xyyaw(roll(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)
     assert xyyaw(log_of(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)

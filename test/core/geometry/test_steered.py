@@ -58,14 +58,14 @@ def test_the_driven_wheels_run_on_circles_about_the_same_centre() -> None:
 
 @given(sizes, twists)
 def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """The base cannot move sideways."""
+    """The sideways velocity of a twist is lost, because the base cannot move sideways."""
     back = robot.body_twist(robot.wheel_rates(twist))
     assert triple(back) == pytest.approx(triple(robot.feasible(twist)), rel=1e-9, abs=1e-9)
 
 
 @given(sizes, twists)
 def test_the_steered_wheel_tells_the_same_twist(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """The twist is computed from its angle and the signed speed of its contact point."""
+    """The twist is computed from the steered wheel's angle and its speed, positive or negative."""
     wanted = robot.feasible(twist)
     speed_mps = math.hypot(wanted.vx_mps, robot.wheelbase_m * wanted.yaw_rate_radps)
     speed_mps = math.copysign(speed_mps, wanted.vx_mps) if wanted.vx_mps else speed_mps

@@ -41,7 +41,7 @@ def last(bench: Bench) -> ImuEstimate:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -> None:
-    """This holds in both running modes; afterwards the published rates are about zero."""
+    """In both running modes the published rates are about zero after the calibration."""
     bench = running(gyro_bias_dps=PLANTED_DPS, imu_only=imu_only)
     assert last(bench).angular_velocity == pytest.approx(PLANTED, abs=0.006)
     assert calibrated(bench).success
@@ -50,7 +50,7 @@ def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -
 
 
 def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
-    """The request is refused at once, or fails when a command arrives later."""
+    """A calibration is refused during a command, and fails if a command arrives later."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.3, 0.0, 0.0), bench.now)
     with pytest.raises(RequestRefused, match="commanded by cmd_vel; stop the sender"):
@@ -68,7 +68,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
 
 
 def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
-    """It may be pushed, or roll out, which its wheels show."""
+    """The wheels show that the robot is pushed or rolls out."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.0, 0.0, 0.5), bench.now)
     bench.run(0.4)
@@ -81,7 +81,7 @@ def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
 
 @pytest.mark.parametrize("state", ["disconnected", "paused"])
 def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> None:
-    """The answer says what to do."""
+    """The refusal says what to do."""
     bench = running()
     if state == "paused":
         bench.ask(Request.PAUSE, 5.0)
@@ -92,7 +92,7 @@ def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> No
 
 
 def test_one_calibration_at_a_time() -> None:
-    """The second request is refused, and the first continues."""
+    """A second request is refused, and the first calibration continues."""
     bench = running()
     bench.session.calibrate_gyro("first", bench.now)
     with pytest.raises(RequestRefused, match="under way"):
@@ -103,7 +103,7 @@ def test_one_calibration_at_a_time() -> None:
 
 @pytest.mark.parametrize("how", ["silence", "loss"])
 def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
-    """The cases are a board that falls silent, and a port that is lost."""
+    """The answer also comes when the board falls silent or the port is lost."""
     bench = running()
     bench.session.calibrate_gyro("token", bench.now)
     bench.run(1.0)
@@ -118,7 +118,7 @@ def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
 
 
 def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> None:
-    """No other output is due then, since Stop has already been sent for a second."""
+    """The driver wakes up for the answer, although no output is due at that time."""
     bench = Bench(BoardSettings(running=True), run=False)
     bench.open()
     bench.run(1.0)
@@ -131,7 +131,7 @@ def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> 
 
 
 def test_a_parameter_that_is_set_otherwise_replaces_the_bias_and_others_do_not() -> None:
-    """A change of limits must not undo a calibration."""
+    """A change of other parameters, as of limits, must not undo a calibration."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     calibrated(bench)
     found = bench.session.gyro_bias
@@ -161,7 +161,7 @@ def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
 
 
 def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
-    """A sensor that is set to 4 g shows half of gravity if it is read as 2 g."""
+    """A sensor that is set to 4 g shows half of gravity if its counts are read as 2 g."""
     bench = running()
     gravity = bench.session.figures(bench.now).imu.gravity_mps2
     assert gravity == pytest.approx(9.80665, rel=0.01)
@@ -176,7 +176,7 @@ def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
 
 
 def test_the_figures_count_what_happened() -> None:
-    """They count losses, restarts, limited commands and equal readings of a stuck sensor."""
+    """The figures count losses, restarts, limited commands and equal readings of a stuck sensor."""
     bench = running(gyro_stuck=(5, 5, 5))
     figures = bench.session.figures(bench.now)
     assert figures.state == "nominal"

@@ -54,7 +54,7 @@ class Bench(AnyBench):
 
 
 def told(bench: Bench, kind: type) -> list[Any]:
-    """Return the values of this type that the session passed on as ``Extra`` events."""
+    """Return the values of a type that the session passed on as ``Extra`` events."""
     return [
         event.value
         for event in bench.events

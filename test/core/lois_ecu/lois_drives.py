@@ -29,8 +29,10 @@ HOST_GAINS = LoisEcuSettings(
         Setting.RIGHT_TD: 0.60868,
     },
 )
-"""Settings with controller gains: with those of the boot, the public firmware's right wheel swings
-and comes to rest."""
+"""Settings with gains for the controllers.
+
+With the gains that the public firmware boots with, the right wheel swings before it rests.
+"""
 REPEAT_S = 0.05
 
 Program = list[tuple[float, tuple[float, float]]]
@@ -199,7 +201,7 @@ class Rig:
         self.driver.wrote(data, self.now)
 
     def run(self, seconds: float) -> None:
-        """Run the board; the driver writes what is due and reads what arrives."""
+        """Run the board for some time; the driver writes what is due and reads what arrives."""
         for _ in range(round(seconds / self.board.tick_s)):
             if self.now >= self.driver.wake_at:
                 self.say(self.driver.due(self.now))

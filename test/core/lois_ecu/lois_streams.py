@@ -22,7 +22,7 @@ Piece = tuple[float, bytes]
 
 
 def float32(number: float) -> float:
-    """Return the number as it comes out of a line: rounded to 32 bits."""
+    """Return the number rounded to 32 bits, as it is when decoded from a line."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", number))
     return float(rounded)
 
@@ -58,7 +58,7 @@ def pieces(said: list[tuple[float, Report]]) -> list[Piece]:
 
 
 def decoded(given: list[Piece], *, sum_required: bool = True) -> tuple[list[Report], LoisDecoder]:
-    """Return all reports that a new decoder finds, and the decoder."""
+    """Decode the pieces with a new decoder; return all reports found, and the decoder."""
     decoder = LoisDecoder(sum_required=sum_required)
     found: list[Report] = []
     for at, data in given:

@@ -27,7 +27,7 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """The dates stay in order even if the delay of the first group is implausible (over 0.25 s)."""
+    """Dates stay in order even if the delay of the first group is implausible (over 0.25 s)."""
     board = BoardTime()
     taken_s = []
     for step in range(60):
@@ -40,7 +40,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """Random delays of up to 30 ms give a standard deviation of about half of that."""
+    """Random read delays of up to 30 ms give the estimate a standard deviation of half of that."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -49,7 +49,7 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """While the clock is unknown, the delay is 0 and its standard deviation is 12 ms."""
+    """Without a known clock the delay is 0, with a standard deviation of 12 ms."""
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
     for step in range(20):
@@ -59,7 +59,7 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
 
 
 def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
-    """They show nothing of the clock's rate, so later groups are timed as before the stall."""
+    """Twenty groups in one read do not change the estimated clock rate, or later delays."""
     board = BoardTime()
     found = []
     for step in range(90):
@@ -78,7 +78,7 @@ def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
 def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
     reads: list[tuple[float, int]],
 ) -> None:
-    """The reads may be 0 to 4 s apart, and the clock may run at any rate."""
+    """Reads are 0 to 4 s apart, and the board's clock runs at any rate."""
     board, now, counts, taken_s = BoardTime(), 10.0, 0, 0.0
     for seconds, passed in reads * 3:
         now, counts = now + seconds, counts + passed

@@ -33,7 +33,7 @@ RPM = math.tau / 60
 
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
-    """Low pass, periods and the user's gains arrive although the board loses single lines."""
+    """Low pass, periods and the user's gains arrive although single lines are lost."""
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
     rig.run(5.0)
@@ -85,7 +85,7 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
 def test_a_board_that_was_left_in_another_mode_is_fetched_back(
     firmware: Firmware, before: TerminalMode
 ) -> None:
-    """An earlier program may have set any mode, even one without checksums in commands."""
+    """A program before the driver may have set any mode, even commands without checksums."""
     rig = Rig(nominal(firmware))
     rig.run(2.1)
     for _ in range(6):
@@ -100,7 +100,10 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """Value 4 of 0x11 selects this and overwrites the left short correction, which is restored."""
+    """Value 4 of command 0x11 selects this, and overwrites the left short correction.
+
+    The driver then restores that correction.
+    """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     for _ in range(140):
         rig.run(0.1)
@@ -113,7 +116,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 
 @BOTH
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
-    """After backward motion the public firmware does not count ticks, so standstill is unknown."""
+    """The public firmware does not count ticks after backward motion, so nothing proves rest."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 4.0)
@@ -135,7 +138,7 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """The firmware keeps the old speed of a wheel at rest, which prevents a slower start."""
+    """The driver clears the old speed that the firmware keeps for a wheel at rest."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     for _ in range(3):
@@ -162,7 +165,7 @@ def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
 @pytest.mark.slow
 @BOTH
 def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
-    """The board cuts the motors by itself; latching the e-stop is left to the session."""
+    """The board itself cuts the motors; the session latches the e-stop on the published event."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -176,7 +179,7 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """It arrives while the wheels turn; the board's clock reveals the time unit of the record."""
+    """The record arrives while the wheels turn; the board's clock gives its time unit."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -191,7 +194,7 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 
 
 def test_a_record_that_lost_a_line_is_given_up() -> None:
-    """The driver reports a failure and discards all samples."""
+    """The driver reports the failure of the record and discards all its samples."""
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
     rig.driver.record(RecordKind.TORQUE, 100)
@@ -217,7 +220,7 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_no_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """The advice names the cause, and the first valid line clears it."""
+    """One notice names the likely cause, and the first valid line clears the notice."""
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []
     assert ecu.advice is not None

@@ -31,13 +31,13 @@ GROUPS: dict[str, list[Report]] = {"0x20": [*ODOMETRY], "0x12": [*TICKS], "0x0d"
 
 
 def rounded(found: list[Report]) -> list[bytes]:
-    """Encode the reports, so that they can be compared although floats are rounded."""
+    """Encode reports to lines, so that they can be compared although floats are rounded."""
     return [encode_report(report) for report in found]
 
 
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> None:
-    """The stream is fed in pieces of one report, byte by byte, and cut at random."""
+    """The same stream is fed report by report, byte by byte, and cut at random places."""
     said = reports(20.0, firmware=firmware)
     sent = [report for _, report in said]
     stream = pieces(said)
@@ -55,7 +55,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 
 
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
-    """This holds from the second group of a kind on; the first has none to be compared with."""
+    """From the second group of a kind on, a plausible group is returned with its last byte."""
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
         for group in (odometry, ticks):
@@ -69,7 +69,7 @@ def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() 
 
 
 def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -> None:
-    """Equal lines may be one line received twice, so the next line or 50 ms of silence decides."""
+    """Equal lines may be one line received twice; the next line or 50 ms of silence decides."""
     alike = encode_report(Ticks(1000, 5, 5))
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Ticks(600, 4, 3)), 0.0) == []
@@ -126,7 +126,7 @@ def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damag
 
 
 def test_a_doubled_marker_costs_nothing() -> None:
-    """The empty group between the two markers is counted as damaged."""
+    """Between the two markers is an empty group, which is counted as damaged."""
     marker, *values = encode_report(TICKS[0]).splitlines(keepends=True)
     decoder = LoisDecoder()
     found = decoder.feed(marker + marker + b"".join(values), 0.0) + decoder.flush(0.0)
@@ -136,7 +136,7 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """Only the group that lost the line is discarded; the other and all later ones are right."""
+    """Only the group that lost the line is discarded; the odometry, or the ticks, survive."""
     decoder = LoisDecoder()
     found: list[Report] = []
     sent: list[bytes] = []
@@ -156,7 +156,7 @@ def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> Non
 
 @pytest.mark.parametrize("kind", RecordKind)
 def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKind) -> None:
-    """Anywhere in it, a line is lost, doubled or cut, or a foreign line is inserted."""
+    """A line of the record is lost, doubled or cut, or a foreign line is inserted."""
     samples = tuple(range(20, 31))
     record = Record(kind, samples, () if kind is RecordKind.HEADING else samples[:5])
     whole = encode_report(record)
@@ -183,7 +183,7 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 
 
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
-    """Its expected length is unknown, so lost lines could not be detected."""
+    """Without a request the record's length is unknown, so lost lines could not be detected."""
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
     assert decoder.group_statistics.damaged_groups == 1
@@ -246,7 +246,7 @@ def test_a_line_that_lost_its_end_costs_no_other() -> None:
 
 
 def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required() -> None:
-    """A checksum that is present must be right, even where none is required."""
+    """A checksum that is present must be right, even where checksums are optional."""
     heading = encode_report(Heading(5))
     for sum_required in (True, False):
         decoder = LoisDecoder(sum_required=sum_required)
@@ -256,7 +256,7 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
 
 
 def test_lines_of_a_sensor_come_out_where_they_are_expected() -> None:
-    """They are expected in a terminal mode only; elsewhere they are counted as damage."""
+    """Sensor lines are passed on in a terminal mode; in other modes they count as damage."""
     data = b"$HEHDT,12.3,T*1F\r\n\xff\xfe\n" + encode_report(Heading(5))
     decoder = LoisDecoder()
     assert decoder.feed(data, 0.0) == [Heading(5)]

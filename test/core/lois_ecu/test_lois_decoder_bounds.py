@@ -32,7 +32,7 @@ codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
 def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
     chunks: list[bytes], terminal: bool
 ) -> None:
-    """Nothing raises, and fewer than 256 bytes are held between calls."""
+    """Any bytes in any chunks raise nothing, and fewer than 256 bytes are held between calls."""
     data = b"".join(chunks)
     results = []
     for cut in (chunks, [data], [bytes([byte]) for byte in data]):
@@ -54,7 +54,7 @@ def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
 def test_any_lines_are_taken_in_any_chunks_with_equal_results(
     lines: list[tuple[int, int, int, int]], kind: RecordKind
 ) -> None:
-    """Valid lines, and lines that lost a character, come in any order."""
+    """Valid lines, and lines that lost a character, come in any order and any chunks."""
     data = b""
     for code, payload, at, harm in lines:
         line = b":%02x%08x" % (code, payload)
@@ -77,7 +77,7 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A sample of 0/0 looks like the end, under 0x17 (manual) and under 0x04 (public firmware)."""
+    """A torque sample of 0/0 looks like the end, under 0x17 (manual) and 0x04 (public firmware)."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)
     zero, some = b":" + code + b"00000000", b":" + code + b"00010002"
@@ -91,7 +91,7 @@ def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> No
 
 
 def test_a_record_without_end_is_not_kept() -> None:
-    """The decoder holds at most the requested number of samples."""
+    """The decoder holds at most the requested number of samples of a record."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 10, 10)
     decoder.feed(b":04000a000b3d\n" * 5000, 0.0)
@@ -103,7 +103,7 @@ def test_a_record_without_end_is_not_kept() -> None:
 @pytest.mark.parametrize("sum_required", [True, False], ids=["with sum", "sum off"])
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmware: bool) -> None:
-    """Each seed is ten minutes; of each kind, 85 % of the expected reports must come out."""
+    """Each seed is a drive of ten minutes; 85 % of the reports of each kind must arrive."""
     sent, came, wrong = Counter[str](), Counter[str](), Counter[str]()
     for seed in range(SEEDS):
         said = reports(600.0, firmware=firmware)

@@ -28,7 +28,7 @@ def told(bench: AnyBench) -> list[str]:
 
 
 def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
-    """The log has one notice, and the diagnostics name the gains as long as they are not set."""
+    """The log has one notice, and the diagnostics name the gains until they are set."""
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)
     assert "in a few drives by 0.2 to 2 m. Run calibrate step" in sentence
@@ -38,7 +38,7 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
 
 
 def test_gains_that_are_set_need_no_words() -> None:
-    """If a single gain is not set, the notice names it."""
+    """The notice names each gain that is not set, and is absent if all are set."""
     assert told(opened(HOST_GAINS)) == []
     written = {name: one for name, one in HOST_GAINS.written.items() if name != Setting.RIGHT_TN}
     (sentence,) = told(opened(replace(HOST_GAINS, written=written)))
@@ -46,5 +46,5 @@ def test_gains_that_are_set_need_no_words() -> None:
 
 
 def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
-    """Duty bypasses the speed controllers."""
+    """Commands of duty bypass the speed controllers, so no notice is needed."""
     assert told(opened(LoisEcuSettings(drive_mode="duty"))) == []

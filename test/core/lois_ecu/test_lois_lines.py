@@ -102,7 +102,7 @@ def sum_in_capitals(lines: bytes) -> bytes:
 
 @pytest.mark.parametrize(("line", "command"), COMMANDS, ids=lambda value: str(value)[:32])
 def test_a_command_is_its_line_both_ways(line: bytes, command: Command) -> None:
-    """The lines are the manual's; upper case and a carriage return are accepted too."""
+    """The manual's lines are encoded and decoded; upper case and a carriage return are valid."""
     assert encode_command(command) == line
     for form in (line, in_capitals(line), sum_in_capitals(line), line[:-1] + b"\r\n"):
         decoded = decode_command(form)
@@ -117,7 +117,7 @@ def test_a_command_is_its_line_both_ways(line: bytes, command: Command) -> None:
 def test_a_command_without_checksum_is_two_characters_shorter(
     line: bytes, command: Command
 ) -> None:
-    """The board expects such lines after 0x11 with value 4."""
+    """The board expects lines without checksum after command 0x11 with value 4."""
     short = line[:11] + b"\n"
     assert encode_command(command, with_sum=False) == short
     assert type(decode_command(short, with_sum=False)) is type(command)
@@ -127,7 +127,7 @@ def test_a_command_without_checksum_is_two_characters_shorter(
 
 @pytest.mark.parametrize(("lines", "report"), REPORTS, ids=lambda value: str(value)[:32])
 def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
-    """The decoder may hold a report until the next call; upper case is read like lower case."""
+    """Lines give the report and the report the lines; upper case is decoded like lower case."""
     assert encode_report(report) == lines
     for form in (lines, in_capitals(lines), sum_in_capitals(lines), lines.replace(b"\n", b"\r\n")):
         decoder = LoisDecoder()
@@ -136,7 +136,7 @@ def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
 
 
 def test_odometry_behind_ticks_is_told_by_its_length() -> None:
-    """The public firmware sends both under 0x12: ticks in 3 lines, odometry in 6."""
+    """Under 0x12 the public firmware sends 3 lines of ticks, or 6 with odometry behind them."""
     decoder = LoisDecoder()
     ticks = b":12ffffffff39\n:120000019031\n:120000000a68\n:120000000930\n"
     odometry = encode_report(BoardOdometry(0.5, 0.25, 0.125, 0.0, 0.0, 0.0, appended=True))
@@ -148,7 +148,7 @@ def test_odometry_behind_ticks_is_told_by_its_length() -> None:
 
 
 def test_a_velocity_that_is_no_number_is_reported_as_such() -> None:
-    """The pose in the same report stays valid."""
+    """The velocity is reported as missing; the pose in the same report stays valid."""
     decoder = LoisDecoder()
     lines = encode_report(BoardOdometry(1.0, 2.0, 3.0, math.nan, math.inf, -math.inf))
     (report,) = decoder.feed(lines, 0.0) + decoder.flush(0.0)
@@ -159,7 +159,7 @@ def test_a_velocity_that_is_no_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """The board pads the shorter channel with 10, which is removed."""
+    """The board pads the shorter channel with 10; this padding is removed."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 2, 1)
     data = b":04000a000b3d\n" + encode_report(Record(RecordKind.RPM, (10, 12), (11,)))[14:]
@@ -168,7 +168,7 @@ def test_a_record_of_tick_times_ends_with_zeros() -> None:
 
 
 def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> None:
-    """The public firmware answers 0x17 with 0x04."""
+    """The public firmware answers the request 0x17 (torque) with 0x04 (tick times)."""
     for code in (b"04", b"17"):
         decoder = LoisDecoder()
         decoder.expect_record(RecordKind.TORQUE, 1, 1)
@@ -178,7 +178,7 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 
 
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
-    """Two paddings end the record, and a third one fills up an odd number of headings."""
+    """Two paddings of 362° end the record; a third fills up an odd number of headings."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)
     data = b":0c0005fffb68\n:0c0003016a3c\n:0c016a016a69\n"
@@ -201,7 +201,7 @@ def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
     ids=str,
 )
 def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
-    """Period 0 makes the board deaf; a record of more than 1024 samples never completes."""
+    """Period 0 would make the board deaf; a record of over 1024 samples never completes."""
     with pytest.raises(FrameError):
         encode_command(command)
 

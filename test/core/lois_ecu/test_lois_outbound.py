@@ -40,14 +40,14 @@ TALKS: dict[str, list[Command]] = {
 
 
 def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]]:
-    """Return command number and payload of each line that the firmware accepts."""
+    """Return command number and payload of each line that the firmware accepts from bytes."""
     reader = LineReader(lenient=lenient)
     reader.checks = with_sum
     return list(reader.take_all(data))
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """Yield all sets of at most ``most`` of ``length`` positions."""
+    """Yield all sets of at most ``most`` positions out of ``length`` positions."""
     for count in range(most + 1):
         yield from combinations(range(length), count)
 
@@ -58,7 +58,7 @@ def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
 def test_no_loss_of_up_to_two_characters_makes_another_line(
     name: str, with_sum: bool, lenient: bool
 ) -> None:
-    """The firmware accepts only lines that were sent, in their order; damaged ones are lost."""
+    """The firmware accepts only lines that were sent, in their order; it rejects damaged ones."""
     data = b"".join(encode_command(command, with_sum=with_sum) for command in TALKS[name])
     said = heard(data, with_sum=with_sum, lenient=lenient)
     assert len(said) == len(TALKS[name])
@@ -71,7 +71,7 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """A run of this length cannot join two neighbouring lines into another valid one."""
+    """A lost run shorter than a line cannot join two neighbouring lines into a valid one."""
     length = 14 if with_sum else 12
     for talk in TALKS.values():
         data = b"".join(encode_command(command, with_sum=with_sum) for command in talk)
@@ -83,14 +83,14 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """This limit is why set-points are 18 ms apart: the board is deaf for 13 ms at once."""
+    """So set-points are sent 18 ms apart, since the board may be deaf for 13 ms at once."""
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
     assert heard(joined, with_sum=True, lenient=False) == [(2, 17 << 16)]
 
 
 def test_set_points_are_found_in_what_was_written() -> None:
-    """Other commands between them are ignored."""
+    """Set-points are found between other commands, which are ignored."""
     commands = [STOP, Reset(), CLEAR, SetRpm(20, -20), SetDuty(5, 6)]
     for with_sum in (True, False):
         data = b"".join(encode_command(command, with_sum=with_sum) for command in commands)

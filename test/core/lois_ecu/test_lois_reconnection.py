@@ -45,7 +45,7 @@ def happen(odometry: LoisOdometry, what: object, now: float) -> None:
 
 @given(st.lists(st.tuples(WAITS_S, HAPPENINGS), max_size=30))
 def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, object]]) -> None:
-    """This includes a group that arrives at once after a new connection."""
+    """The pose is finite for reports, commands, restarts and connections in any order."""
     odometry, now = LoisOdometry(LoisEcuSettings()), 1000.0
     for wait_s, what in events:
         now += wait_s

@@ -21,7 +21,7 @@ from omnibot_driver.simulator.lois_ecu import DOCUMENTED, LoisSettings
 
 
 def test_gps_and_compass_come_in_si_units_and_enu() -> None:
-    """East is yaw 0; without a date the time is unknown, and position 0/0 is not a fix."""
+    """East is yaw 0; the GPS time needs a date, and position 0/0 is not regarded as a fix."""
     rig = Rig(
         LoisSettings(quirks=DOCUMENTED),
         LoisEcuSettings(periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000}),
@@ -62,7 +62,7 @@ def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
 
 
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
-    """With the old date the time would be one day behind."""
+    """With the old date, the time after midnight would be a day too early."""
     ecu = LoisConversation(LoisEcuSettings())
     said = [GpsDate(26, 11, 22), GpsTime(23, 59, 59), GpsTime(0, 0, 1), GpsDate(26, 11, 23)]
     found: list[object] = []
@@ -75,7 +75,7 @@ def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
 
 
 def test_declination_turns_the_heading() -> None:
-    """It is positive to the east: yaw = pi/2 - (heading + declination)."""
+    """Declination is positive to the east: yaw = pi/2 - (heading + declination)."""
     ecu = LoisConversation(LoisEcuSettings(declination_rad=0.1))
     found = ecu.receive(encode_report(Heading(90)) * 3, 0.0)
     assert found[-1] == HeadingReading(pytest.approx(-0.1))

@@ -19,7 +19,7 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The board itself would obey set-points while its button is held."""
+    """The e-stop cannot be released then; the board itself would obey set-points."""
     bench = Bench(firmware)
     bench.drive_on()
     bench.presses(True)
@@ -36,7 +36,7 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """Only this board's parameters are named; releasing the e-stop replaces a missing ~/start."""
+    """Advice names only parameters of this board, which has an e-stop release but not ~/start."""
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
         with pytest.raises(CommandRefused, match="motion monitor"):
@@ -58,7 +58,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """A few ticks (the drive of 1.2 s) are enough, because the wheels were at rest before."""
+    """The few ticks of a drive of 1.2 s are enough if the wheels are at rest at the reset."""
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
     bench.run(3.0)
@@ -71,7 +71,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """The counters were zero before, so the reset is sent at least twice and stays unconfirmed."""
+    """Counters were zero before: the reset is sent at least twice and stays unconfirmed."""
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
@@ -84,7 +84,7 @@ def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
-    """Fewer than twenty ticks do not prove a reset by themselves."""
+    """A change of fewer than twenty ticks does not prove that the board was reset."""
     bench = Bench(firmware)
     bench.drive_on(0.2, 1.2)
     bench.run(3.0)
@@ -103,7 +103,7 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
-    """For 1.2 s nothing but the record arrives, and the robot is driven meanwhile."""
+    """Only the record arrives for 1.2 s, and the robot is driven meanwhile."""
     bench = Bench(firmware)
     bench.drive_on(0.6, 2.0)
     board = bench.session.board
@@ -119,7 +119,7 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
 
 
 def test_a_long_record_is_not_taken_for_damage() -> None:
-    """Its lines are valid although they are not reports, so they must not lead to advice."""
+    """The record's lines are valid though not reports, so no advice about damage appears."""
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -133,7 +133,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The driver reports missing data; the rest of a line does not suggest a wrong baud rate."""
+    """The driver reports missing data; half a line does not lead to advice on the baud rate."""
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)
@@ -164,7 +164,7 @@ def test_every_setting_arrives_however_many_there_are(count: int) -> None:
 
 @FIRMWARE
 def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> None:
-    """All groups of 0.6 s arrive at one time, and odometry stays within 0.15 m of the truth."""
+    """All groups of 0.6 s arrive in one read; odometry stays within 0.15 m of the truth."""
     bench = Bench(firmware, HOST_GAINS)
     for _ in range(8):
         late: list[bytes] = []
@@ -182,7 +182,7 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
 
 @FIRMWARE
 def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
-    """Settings are repeated for some seconds after a connection, but not after the Stop."""
+    """The repetition of settings, which follows a connection, ends with the final Stop."""
     bench = Bench(firmware)
     bench.close()
     bench.open()

@@ -18,14 +18,14 @@ RPM = math.tau / 60
 
 
 def started(settings: LoisEcuSettings | None = None) -> LoisConversation:
-    """Return a conversation that has sent the three RPM 0/0 which are due after a Stop."""
+    """Return a conversation that has already sent the RPM 0/0 (three times) due after a Stop."""
     ecu = LoisConversation(LoisEcuSettings() if settings is None else settings)
     ecu.wrote(CLEAR * 3, 0.0)
     return ecu
 
 
 def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
-    """While the e-stop is latched, both kinds of zero alternate."""
+    """While the e-stop is latched, lines of duty zero and RPM zero alternate."""
     ecu = LoisConversation(LoisEcuSettings())
     assert ecu.stop() == STOP
     assert ecu.emergency_stop() == CLEAR
@@ -43,7 +43,7 @@ def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
     ],
 )
 def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: bytes) -> None:
-    """Both wheels are slowed by the same factor; rates that round to zero are a Stop."""
+    """Both wheels are slowed by the same factor; rates that all round to zero become a Stop."""
     ecu = started()
     total = 0
     for character in line[:11]:
@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """20 RPM are 0.2723 m/s; ``meaning`` returns the twist of a line within its rounding."""
+    """20 RPM are 0.2723 m/s; ``meaning`` returns the twist of a written line, up to rounding."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -65,7 +65,7 @@ def test_a_twist_is_said_and_understood() -> None:
 
 
 def test_an_inverted_board_has_its_wheels_exchanged() -> None:
-    """This holds for the line of a twist, and for the twist that a line means."""
+    """The wheels are exchanged when a twist is encoded and when a line is decoded."""
     ecu = started(LoisEcuSettings(inverted=True))
     left = ecu.velocity(BodyTwist(0.0, 0.0, 0.5))
     assert left == started().velocity(BodyTwist(0.0, 0.0, -0.5))
@@ -73,7 +73,7 @@ def test_an_inverted_board_has_its_wheels_exchanged() -> None:
 
 
 def test_duty_is_limited_and_belongs_to_its_mode() -> None:
-    """Duty is in percent, and both wheels are slowed by the same factor."""
+    """Duty is in percent; above the limit both wheels are slowed by the same factor."""
     with pytest.raises(CommandRefused, match="drive_mode is rpm"):
         started().duty((10, 10))
     ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
@@ -84,12 +84,12 @@ def test_duty_is_limited_and_belongs_to_its_mode() -> None:
 
 
 def encode_command_duty(left: int, right: int) -> bytes:
-    """Return the line of a duty from the codec, which has tests of its own."""
+    """Return the line of a duty command, made by the codec, which has tests of its own."""
     return encode_command(SetDuty(left, right))
 
 
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
-    """A wheel at rest might never start without RPM 0/0, which is sent three times against loss."""
+    """A wheel at rest might never start without RPM 0/0; three lines are sent in case of loss."""
     ecu = started()
     drive = b":020014001438\n"
     for now in (1.0, 1.1):

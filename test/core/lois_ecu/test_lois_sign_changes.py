@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Covariance after set-points that change sign in quick succession, when reports show little."""
+"""Covariance after set-points that change sign in quick succession."""
 
 import pytest
 from lois_drives import HOST_GAINS
@@ -29,11 +29,11 @@ def variance(settings: LoisEcuSettings, holds_s: float) -> float:
 
 
 def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own_gains() -> None:
-    """With the public firmware's gains a wheel still swings when the sign changes again."""
+    """With the public firmware's own gains a wheel still swings when the sign changes again."""
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 
 
 def test_a_wheel_that_has_settled_is_not_doubted() -> None:
-    """Its motion before the change of sign is known, whatever the gains."""
+    """The motion of a settled wheel is known, so the covariance does not grow with the gains."""
     own, host = variance(LoisEcuSettings(), 15.0), variance(HOST_GAINS, 15.0)
     assert own == pytest.approx(host, rel=0.02)

@@ -31,7 +31,7 @@ def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> An
 
 
 def off_by(bench: AnyBench) -> tuple[float, float]:
-    """Return the error of the position in m, and its standard deviation by the covariance."""
+    """Return the error of the estimated position in m, and the standard deviation of it."""
     estimate, truth = bench.odometry[-1], bench.robot.board.truth  # type: ignore[attr-defined]
     error_m = math.hypot(estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m)
     return error_m, math.sqrt(estimate.covariance.xx + estimate.covariance.yy)
@@ -44,7 +44,7 @@ def off_by(bench: AnyBench) -> tuple[float, float]:
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
     firmware: str, vx: float, seconds: float, reopened: bool
 ) -> None:
-    """The Stop did not reach the board either, so the robot drove on by metres."""
+    """No Stop reaches the board, so the robot drives on by metres during the outage."""
     error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
     assert error_m <= 3.0 * sigma_m
 
@@ -55,7 +55,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """Forward, both firmwares count, so the error is at most a tenth of the way."""
+    """Ticks count forward motion during the outage: the error is at most a tenth of the way."""
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)
     assert error_m <= 0.1 * bench.robot.way_m

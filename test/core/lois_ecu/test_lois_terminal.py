@@ -17,7 +17,7 @@ COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
 
 @FIRMWARE
 def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
-    """The mode is written when the robot is at rest; then the sensor's lines are passed on."""
+    """The mode is set once the robot is at rest; from then on the sensor's lines are passed on."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
     begun = len(bench.written)
@@ -42,7 +42,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The end is reported once, even if the first lines that end the mode are lost."""
+    """The end is reported once; it is repeated on the line until the board leaves the mode."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -62,7 +62,7 @@ def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown
 
 
 def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
-    """Its settings are written before the mode."""
+    """After the restart, settings are written first, then the terminal mode."""
     bench = Bench("firmware", GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
     bench.run(1.0)
@@ -75,7 +75,7 @@ def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
 
 @FIRMWARE
 def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
-    """Releasing it does not allow motion in this mode."""
+    """The e-stop is latched as usual, and its release does not allow motion in this mode."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -89,7 +89,7 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 
 @FIRMWARE
 def test_another_drive_mode_stops_first(firmware: str) -> None:
-    """Motion is refused until the robot is at rest, and is then commanded as duty."""
+    """Motion is refused until the robot is at rest; after that, motion is commanded as duty."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
     configure(bench, LoisEcuSettings(drive_mode="duty"))
@@ -119,7 +119,7 @@ def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass()
 
 
 def test_a_terminal_mode_ends_a_record() -> None:
-    """In this mode the record would never arrive."""
+    """A record that is under way would never arrive in this mode, so it is abandoned."""
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)

@@ -29,7 +29,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("data", "sentence"), WRONG.values(), ids=WRONG)
 def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, sentence: str) -> None:
-    """The notice comes once, and the robot can be driven as soon as the board is there."""
+    """One notice names the foreign device; once the board is there, the robot can be driven."""
     board, robot = MAKERS["lois_ecu"]()
     bench = AnyBench(board, robot)
     bench.speaks = False
@@ -55,7 +55,7 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
 def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
     firmware: str, *, checks: bool
 ) -> None:
-    """The driver restores the setting by itself, without a restart."""
+    """The driver restores the board's checksum setting, without a restart."""
     _, robot = MAKERS[firmware]()
     robot.board._reader.checks = not checks
     bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=checks)), robot)
