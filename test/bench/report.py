@@ -18,6 +18,7 @@ os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # its generator of streams
 
 import core
+import small
 import system
 from adapters import ADAPTERS
 from ratios import Figure, table
@@ -54,6 +55,9 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     say("many drivers")
     scale = system.scale(SCALES[:2] if quick else SCALES, 3 if quick else 10)
     sections += ["", "Drivers side by side on this machine, each with a board:", "", *scale]
+    say("small computer")
+    sections += ["", "One core, and a part of it for each of driver and floor:", ""]
+    sections += small.table(*(((1.0, 0.25), 3.0) if quick else ()))
     say("linearity")
     sections += ["", "Time to decode, by the length of the stream:", "", *core.linearity()]
     say("memory")

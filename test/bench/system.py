@@ -21,7 +21,7 @@ from typing import Final
 from adapters import ADAPTERS
 from processes import HERE, Program, driver, ear, floor, memory_mb, step
 from ratios import Figure, alternate
-from stage import TICK_S, Stage, number_of
+from stage import Stage, number_of
 from steps import STEPS
 
 WINDOW_S = 6.0
@@ -56,7 +56,7 @@ def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
             resident_mb.append(programs[0].resident_mb)
         heard = listener.result()["heard"]
     units = (MPS2_PER_COUNT, 1.0)
-    late = [_latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
+    late = [latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
     windowed = [
         [[us for at, us in each if start <= at < end] for each in late]
         for start, end in pairwise(marks)
@@ -71,7 +71,7 @@ def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
         )
         for name, goal, of in (
             ("median", median_goal, _median),
-            ("99th percentile", p99_goal, _p99),
+            ("99th percentile", p99_goal, p99),
         )
         if (values := [[of(each) for each in window] for window in windowed])
     ]
@@ -127,7 +127,7 @@ def steps(windows: int) -> list[str]:
             busy.append([program.busy_s for program in programs])
         heard = listener.result()["heard"]
     units = (1.0, *(MPS2_PER_COUNT,) * (len(names) - 1))
-    late = [_latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
+    late = [latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
     least = [
         [_median([us for at, us in each if start <= at < end]) for each in late]
         for start, end in pairwise(marks)
@@ -152,7 +152,7 @@ def commands(adapter: str, windows: int) -> Figure:
         seconds = str(windows * COMMANDS_S)
         hand = stack.enter_context(Program(str(HERE / "hand.py"), seconds, "ours", "floor"))
         sent = hand.result()
-    late = [_command_latencies(*each) for each in zip(sent, stage.heard, strict=True)]
+    late = [command_latencies(*each) for each in zip(sent, stage.heard, strict=True)]
     size = min(map(len, late)) // windows
     parts = [[median(each[n * size : (n + 1) * size]) for n in range(windows)] for each in late]
     name = f"{adapter}: cmd_vel to the board's side, median"
@@ -232,8 +232,8 @@ def split(seconds: float) -> list[str]:
             listener.result()
         stages = json.loads(told.read_text())
     rows = ["| stage | ms per second of stream | part |", "|---|---|---|"]
-    stream_s = stages.pop("count") * TICK_S
-    per_second = {name: 1e3 * value / stream_s for name, value in stages.items()}
+    passed_s = stages.pop("passed")
+    per_second = {name: 1e3 * value / passed_s for name, value in stages.items()}
     total = 1e3 * spent_s / seconds
     per_second["everything else (executor, pacer, guard, DDS threads)"] = total - sum(
         per_second.values()
@@ -243,7 +243,7 @@ def split(seconds: float) -> list[str]:
     return [*rows, f"| all | {total:.2f} | |"]
 
 
-def _latencies(
+def latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
     """Return for each message when its frame was delivered, and its latency in µs."""
@@ -258,7 +258,7 @@ def _latencies(
     return found
 
 
-def _command_latencies(
+def command_latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
     """Return the time from each command to the first read with its frame, in µs."""
@@ -282,5 +282,5 @@ def _median(values: Sequence[float]) -> float:
     return median(values) if values else math.nan
 
 
-def _p99(values: Sequence[float]) -> float:
+def p99(values: Sequence[float]) -> float:
     return quantiles(values, n=100)[98] if len(values) > 1 else math.nan
