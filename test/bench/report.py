@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # its generato
 import core
 import small
 import system
+import threads
 from adapters import ADAPTERS
 from ratios import Figure, table
 
@@ -49,6 +50,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     figures += core.decoding(1 if quick else 5)
     say("split")
     sections = ["", "Processor time of the driver by stage:", "", *system.split(5 if quick else 20)]
+    sections += ["", "The same by thread:", "", *threads.table(5 if quick else 20)]
     say("step by step")
     sections += ["", "From the floor to the driver, by ratios:", "", *system.steps(windows)]
     sections += ["", core.cold(200 if quick else 2000)]
