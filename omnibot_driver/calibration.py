@@ -30,8 +30,8 @@ def locate(file: str) -> Path:
         return Path(file).expanduser()
     except RuntimeError as error:
         raise ParameterError(
-            f"the calibration_file {file} cannot be found: there is no such home folder;"
-            " give the whole path"
+            f"the calibration_file {file} cannot be found: its home folder does not exist; give"
+            " the full path"
         ) from error
 
 
@@ -91,7 +91,7 @@ def _read(path: Path) -> dict[Any, Any]:
     if content is None:
         return {}
     if not isinstance(content, dict):
-        raise _bad(path, "has no names and values")
+        raise _bad(path, "has no `name: value` lines")
     return content
 
 

@@ -108,5 +108,5 @@ def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
 def test_a_home_that_nobody_has_is_refused() -> None:
     """Known home folders are filled in."""
     assert calibration.locate("~/robot.yaml") == Path.home() / "robot.yaml"
-    with pytest.raises(ParameterError, match="no such home folder; give the whole path"):
+    with pytest.raises(ParameterError, match="its home folder does not exist; give the full path"):
         calibration.locate("~nosuchuser/robot.yaml")

@@ -99,7 +99,11 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
     ("name", "wrong", "words"),
     [
         ("port", 5, "must be a string, not 5"),
-        ("on_exit", True, "must be a string, not True (YAML reads on, off, yes and no as bool:"),
+        (
+            "on_exit",
+            True,
+            "must be a string, not True (YAML reads on, off, yes and no as true or false;",
+        ),
         ("baudrate", "fast", "must be an integer, not 'fast'"),
         ("guard", 1, "must be a bool, not 1"),
         ("command_rate", True, "must be a double, not True"),

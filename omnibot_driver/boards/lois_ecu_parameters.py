@@ -50,7 +50,7 @@ WHEELS: Final = (
         "inverted",
         False,
         "",
-        "Whether the board's left wheel is the robot's right one, and vice versa.",
+        "True if the board's left wheel is the robot's right wheel, and vice versa.",
         fixed=True,
         calibrated=True,
     ),
@@ -61,16 +61,17 @@ DRIVING: Final = (
         "drive_mode",
         "rpm",
         "",
-        "How motion is commanded: by the wheels' RPM, which the board controls, or by the motors'"
-        " duty. Duty mode has no speed control, and has the topic duty_cmd. A change stops the"
-        " robot first.",
+        "What the driver commands: rpm (wheel speeds, which the board controls) or duty (motor"
+        " duty, without speed control). Only duty mode accepts duty_cmd. The driver stops the"
+        " robot before it changes the mode.",
         choices=("rpm", "duty"),
     ),
     Parameter(
         "duty_scale",
         130.0,
         "%/(m/s)",
-        "Duty that drives a wheel's rim at 1 m/s, for cmd_vel and wheel_cmd in duty mode.",
+        "Motor duty at which a wheel's rim moves at 1 m/s. It converts cmd_vel and wheel_cmd in"
+        " duty mode.",
         low=1.0,
         high=10_000.0,
         calibrated=True,
@@ -79,7 +80,7 @@ DRIVING: Final = (
         "max_duty",
         100,
         "%",
-        "Largest duty of a motor that is commanded in duty mode.",
+        "Largest motor duty that the driver commands in duty mode.",
         low=1,
         high=100,
     ),
@@ -87,8 +88,9 @@ DRIVING: Final = (
         "low_pass",
         1.0,
         "",
-        "Fraction of a new RPM that the speed controller applies in each of its steps (0x23). It"
-        " is always written: with the public firmware's default of 0 the wheels never turn.",
+        "Low-pass of the commanded RPM: the fraction of a change that the speed controller"
+        " applies in each of its steps (0x23). The driver always writes it, because the wheels"
+        " never turn with the public firmware's default of 0.",
         low=0.001,
         high=1.0,
     ),
@@ -96,7 +98,8 @@ DRIVING: Final = (
         "odom_rate",
         20.0,
         "Hz",
-        "How often odom and its transform are published, predicted between the board's messages.",
+        "Rate at which odom and its transform are published. The driver predicts them between two"
+        " messages of the board.",
         low=1.0,
         high=50.0,
     ),
@@ -112,7 +115,7 @@ DRIVING: Final = (
         "heading_stddev",
         0.1,
         "rad",
-        "Noise of the compass, for the covariance of imu/heading.",
+        "Standard deviation of the compass heading, for the covariance of imu/heading.",
         low=1e-6,
         high=10.0,
     ),
@@ -120,17 +123,17 @@ DRIVING: Final = (
         "terminal_mode",
         "host",
         "",
-        "Source of the lines that the board sends: itself (host), or its GPS or compass, whose"
-        " lines go to ~/terminal (0x11). A change stops the robot first. Motion is refused in all"
-        " modes but host.",
+        "What the board sends: its own messages (host), or the text lines of its GPS or compass,"
+        " which the driver publishes on ~/terminal (0x11). The driver stops the robot before it"
+        " changes the mode. It refuses motion in every mode except host.",
         choices=("host", "gps", "compass"),
     ),
     Parameter(
         "record_samples",
         200,
         "",
-        "Number of samples of each wheel, or of headings, in a record (~/record_rpm,"
-        " ~/record_torque, ~/record_heading). The board completes at most 1024.",
+        "Length of a record (~/record_rpm, ~/record_torque, ~/record_heading), in samples of each"
+        " wheel or in headings. The board can complete at most 1024.",
         low=1,
         high=MOST_SAMPLES,
     ),
@@ -138,14 +141,14 @@ DRIVING: Final = (
         "record_directory",
         "~/.ros/lois_ecu_records",
         "",
-        "Where records are written, as CSV.",
+        "Folder in which the driver saves records as CSV files.",
     ),
     Parameter(
         "checksum",
         True,
         "",
         "Whether the board verifies checksums (0x11). It cannot change while the driver runs,"
-        " since the guard's last words depend on it.",
+        " because the stop command of the guard process depends on it.",
         fixed=True,
     ),
 )
@@ -171,7 +174,7 @@ def _setting(name: str, what: str) -> Parameter:
         name,
         1.0,
         _UNITS.get(name.partition("_")[2], ""),
-        f"{what}. Unset: the board keeps its own.",
+        f"{what}. If it is not set, the board keeps its own value.",
         low=low,
         high=high,
         unset=True,
@@ -208,13 +211,13 @@ PERIODS: Final[Mapping[str, Stream]] = {
 
 
 def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
-    note = "" if default_s else " Unset: the board keeps its own."
+    note = "" if default_s else " If it is not set, the board keeps its own value."
     return Parameter(
         name,
         default_s,
         "s",
-        f"Period of the {what}; 0 turns it off. The shorter it is, the more of the time the"
-        f" board cannot receive.{note}",
+        f"Period of the {what}; 0 turns it off. The board cannot receive while it sends, so it"
+        f" misses more commands with a shorter period.{note}",
         low=0.0,
         high=LONGEST_PERIOD_S,
         unset=not default_s,
@@ -236,7 +239,7 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
     if values["terminal_mode"] != "host" and not values["checksum"]:
         raise ParameterError(
             "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"
-            " the board expects checksums, and would not hear a stop"
+            " the board expects checksums and would ignore a stop without one"
         )
 
 
@@ -248,8 +251,8 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(
             f"parameter 'command_rate' must be at most {MOST_TERMINAL_RATE_HZ:g} Hz in a"
-            f" terminal_mode, not {values['command_rate']:g}: the board would fall behind, and"
-            " hear a stop late or never"
+            f" terminal_mode, not {values['command_rate']:g}: with more commands the board would"
+            " receive a stop late or never"
         )
 
 
@@ -268,5 +271,6 @@ def require_possible_periods(values: Mapping[str, Any]) -> None:
     if not 0.0 < values["ticks_period"] <= 0.5:
         raise ParameterError(
             "parameter 'ticks_period' must be above 0 and at most 0.5 s, not"
-            f" {values['ticks_period']:g}: odometry and the proof of standstill need the ticks"
+            f" {values['ticks_period']:g}: without the ticks the driver has no odometry and cannot"
+            " confirm a stop"
         )

@@ -62,8 +62,8 @@ def remark(reading: RecordReading) -> str:
         return ""
     if reading.count_s is None:
         return (
-            "the record has only the board's counts, no times and speeds: the unit of the board's"
-            " time is not known yet"
+            "the file has only the board's timer counts, without times and speeds, because the"
+            " driver does not know the unit of the board's clock yet"
         )
     slow = (*reading.record.left, *reading.record.right).count(SATURATED)
     if not slow:

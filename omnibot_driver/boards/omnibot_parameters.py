@@ -15,7 +15,8 @@ OMNIBOT: Final = (
         "control_method",
         "velocity",
         "",
-        "Position of the board's own switch: velocity (cmd_vel, wheel_cmd) or position (cmd_pose).",
+        "Setting of the control switch on the board: velocity (for cmd_vel and wheel_cmd) or"
+        " position (for cmd_pose).",
         choices=("velocity", "position"),
         fixed=True,
         calibrated=True,
@@ -24,7 +25,8 @@ OMNIBOT: Final = (
         "linear_scale",
         70.0,
         "LSB/(m/s)",
-        "Command unit of the board for linear speed (and for the rim speed of a wheel).",
+        "Size of a command for 1 m/s, in units of the board (LSB): linear speed, and rim speed of"
+        " a wheel.",
         low=1.0,
         high=10_000.0,
         calibrated=True,
@@ -33,7 +35,7 @@ OMNIBOT: Final = (
         "angular_scale",
         500.0,
         "LSB/(rad/s)",
-        "Command unit of the board for the yaw rate.",
+        "Size of a command for a yaw rate of 1 rad/s, in units of the board (LSB).",
         low=1.0,
         high=100_000.0,
         calibrated=True,
@@ -42,7 +44,7 @@ OMNIBOT: Final = (
         "position_scale",
         1000.0,
         "LSB/m",
-        "Command unit of the board for a position to drive to.",
+        "Size of a command for a position of 1 m, in units of the board (LSB).",
         low=1.0,
         high=100_000.0,
     ),
@@ -50,7 +52,7 @@ OMNIBOT: Final = (
         "heading_scale",
         1000.0,
         "LSB/rad",
-        "Command unit of the board for a heading to turn to.",
+        "Size of a command for a heading of 1 rad, in units of the board (LSB).",
         low=1.0,
         high=100_000.0,
     ),
@@ -58,8 +60,9 @@ OMNIBOT: Final = (
         "delta_frame",
         "earth",
         "",
-        "Meaning of the board's odometry deltas: differences of two positions in its earth frame,"
-        " motion along its own axes, or (older firmware) counts of its wheels.",
+        "Meaning of the board's odometry deltas: earth (differences of two positions in the"
+        " board's earth frame), body (motion along the board's own axes) or wheel_counts (encoder"
+        " counts of its wheels, in older firmware).",
         choices=("earth", "body", "wheel_counts"),
         fixed=True,
         calibrated=True,
@@ -68,8 +71,8 @@ OMNIBOT: Final = (
         "delta_period",
         0.04,
         "s",
-        "Period of the board's odometry deltas. The manual has 25 Hz in one place and 10 Hz in"
-        " another; the driver says so if the board uses another one.",
+        "Period of the board's odometry deltas. The manual says 25 Hz in one place and 10 Hz in"
+        " another. The driver warns if the board uses another period.",
         choices=DELTA_PERIODS_S,
         fixed=True,
     ),
@@ -77,7 +80,8 @@ OMNIBOT: Final = (
         "use_board_pose",
         True,
         "",
-        "Correct the odometry by the board's own pose. If false, only its first heading is used.",
+        "Correct the odometry with the board's own pose. If false, the driver uses only the first"
+        " heading of that pose.",
     ),
     Parameter(
         "pose_byte_order",
@@ -142,5 +146,5 @@ def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
     if values["control_method"] == "position" and x * y != yaw:
         raise ParameterError(
             f"parameter 'axis_signs' must not be {values['axis_signs']} with control_method"
-            " 'position': the sign of yaw must be that of x times that of y"
+            " 'position': the sign of yaw must be the product of the signs of x and y"
         )

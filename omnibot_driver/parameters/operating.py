@@ -13,7 +13,7 @@ BOARD: Final = Parameter(
     "board",
     "",
     "",
-    "The motor board at the other end of the line.",
+    "Kind of motor board that the driver controls.",
     fixed=True,
 )
 """Parameter that names the board; each board's table sets its default and its only choice."""
@@ -23,8 +23,8 @@ LINE: Final = (
         "port",
         "/dev/ttyUSB0",
         "",
-        "Serial device, or any pyserial URL such as socket://host:port; sim:// is a simulated board"
-        " inside the driver, replay://bag a recorded wire.",
+        "Serial device, or any pyserial URL such as socket://host:port; sim:// is a simulated"
+        " board inside the driver, and replay://bag plays a recorded bag.",
         fixed=True,
     ),
     Parameter(
@@ -89,7 +89,8 @@ COMMANDS: Final = (
         "max_linear_speed",
         0.5,
         "m/s",
-        "Largest linear speed that is commanded. A faster command keeps its direction.",
+        "Largest linear speed that the driver commands. A faster command is slowed down and keeps"
+        " its direction.",
         low=0.0,
         high=10.0,
     ),
@@ -97,7 +98,7 @@ COMMANDS: Final = (
         "max_angular_speed",
         0.5,
         "rad/s",
-        "Largest yaw rate that is commanded.",
+        "Largest yaw rate that the driver commands.",
         low=0.0,
         high=10.0,
     ),
@@ -105,7 +106,8 @@ COMMANDS: Final = (
         "max_wheel_speed",
         17.0,
         "rad/s",
-        "Largest wheel rate that wheel_cmd may command. The other wheels keep their ratio.",
+        "Largest wheel rate that the driver commands for wheel_cmd. If one wheel exceeds it, all"
+        " wheels are slowed down in the same ratio.",
         low=0.0,
         high=200.0,
     ),
@@ -130,7 +132,7 @@ COMMANDS: Final = (
         "cmd_vel_timeout",
         0.5,
         "s",
-        "Age at which a velocity command expires; the robot is then stopped.",
+        "Age at which a velocity command expires. The driver then stops the robot.",
         low=0.05,
         high=10.0,
     ),
@@ -152,7 +154,7 @@ COMMANDS: Final = (
 )
 
 FRAMES: Final = (
-    Parameter("odom_frame", "odom", "", "Frame in which the odometry is given.", fixed=True),
+    Parameter("odom_frame", "odom", "", "Frame of the odometry.", fixed=True),
     Parameter(
         "base_frame",
         "base_link",
@@ -165,8 +167,8 @@ FRAMES: Final = (
         "frame_prefix",
         "",
         "",
-        "Prefix of every frame name, such as robot1/. No slash is added, as with"
-        " robot_state_publisher.",
+        "Prefix of every frame name, with its slash, such as robot1/. robot_state_publisher uses"
+        " its prefix in the same way.",
         fixed=True,
     ),
     Parameter(

@@ -10,7 +10,7 @@ from omnibot_driver.core.errors import ParameterError
 
 TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a string"}
 """Names of the types in ROS."""
-QUOTE: Final = "YAML reads on, off, yes and no as bool: put it in quotes"
+QUOTE: Final = "YAML reads on, off, yes and no as true or false; put the word in quotes"
 NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six")
 Item = int | float | str
 Value = bool | Item | list[int] | list[float] | list[str] | None

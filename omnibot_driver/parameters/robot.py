@@ -43,8 +43,9 @@ ROBOT: Final = (
         "fastest_linear_speed",
         2.0,
         "m/s",
-        "Physical limit of the linear speed, also when pushed by hand. Faster displacements are"
-        " rejected, and corrections of odom are not faster. It must not be below max_linear_speed.",
+        "Highest linear speed that the robot can reach, even if it is pushed. The driver rejects"
+        " faster displacements and applies corrections of odom no faster. It must not be below"
+        " max_linear_speed.",
         low=0.1,
         high=10.0,
     ),
@@ -52,8 +53,8 @@ ROBOT: Final = (
         "fastest_angular_speed",
         8.0,
         "rad/s",
-        "Physical limit of the yaw rate, also when pushed by hand. Faster displacements are"
-        " rejected. It must not be below max_angular_speed.",
+        "Highest yaw rate that the robot can reach, even if it is pushed. The driver rejects"
+        " faster displacements. It must not be below max_angular_speed.",
         low=0.1,
         high=100.0,
     ),
@@ -61,8 +62,8 @@ ROBOT: Final = (
         "fastest_linear_acceleration",
         15.0,
         "m/s²",
-        "Physical limit of the linear acceleration, also in a bump. A displacement that exceeds it"
-        " for one sample is rejected.",
+        "Highest linear acceleration that the robot can reach, even in a collision. The driver"
+        " rejects a displacement that exceeds it for a single sample.",
         low=0.1,
         high=1000.0,
     ),
@@ -70,8 +71,8 @@ ROBOT: Final = (
         "fastest_angular_acceleration",
         50.0,
         "rad/s²",
-        "Physical limit of the angular acceleration, also in a bump. A displacement or gyro"
-        " reading that exceeds it for one sample is rejected.",
+        "Highest angular acceleration that the robot can reach, even in a collision. The driver"
+        " rejects a displacement or gyro reading that exceeds it for a single sample.",
         low=1.0,
         high=10_000.0,
     ),
@@ -79,8 +80,8 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "Largest spike of one accelerometer axis that is published. A larger one that lasts one"
-        " reading and has the size of a changed bit is rejected.",
+        "Largest spike of one accelerometer axis that the driver publishes. It rejects a larger"
+        " spike that lasts one reading and has the size of a flipped bit.",
         low=0.1,
         high=1000.0,
     ),
@@ -88,8 +89,8 @@ ROBOT: Final = (
         "calibration_file",
         "",
         "",
-        "YAML file that calibrations write. Its values replace the parameters given at start"
-        " (docs/tools/calibrate.md).",
+        "YAML file that calibrations write. Its values replace the parameters that you give at"
+        " start (docs/tools/calibrate.md).",
         fixed=True,
     ),
 )
@@ -99,7 +100,7 @@ IMU: Final = (
         "gyro_bias",
         [0.0, 0.0, 0.0],
         "rad/s",
-        "Reading of the gyro at rest, in its own axes, which is subtracted. ~/calibrate_gyro"
+        "Reading of the gyro at rest, in its own axes. The driver subtracts it. ~/calibrate_gyro"
         " measures it.",
         low=-1.0,
         high=1.0,
@@ -109,7 +110,7 @@ IMU: Final = (
         "accel_bias",
         [0.0, 0.0, 0.0],
         "m/s²",
-        "Offset of the accelerometer, in its own axes, which is subtracted.",
+        "Offset of the accelerometer, in its own axes. The driver subtracts it.",
         low=-5.0,
         high=5.0,
         calibrated=True,
@@ -128,7 +129,8 @@ NOISE: Final = (
         "linear_acceleration_stddev",
         0.028,
         "m/s²",
-        "Noise of one accelerometer sample (400 µg/√Hz over 50 Hz), for the covariance.",
+        "Standard deviation of one accelerometer sample (400 µg/√Hz over 50 Hz), for the"
+        " covariance.",
         low=1e-6,
         high=100.0,
         calibrated=True,
@@ -137,7 +139,7 @@ NOISE: Final = (
         "angular_velocity_stddev",
         0.00087,
         "rad/s",
-        "Noise of one gyro sample (0.05 °/s rms), for the covariance.",
+        "Standard deviation of one gyro sample (0.05 °/s rms), for the covariance.",
         low=1e-6,
         high=100.0,
         calibrated=True,
@@ -172,7 +174,7 @@ NOISE: Final = (
         "odom_gap_acceleration",
         1.0,
         "m/s²",
-        "Largest acceleration that is assumed while odometry frames are lost.",
+        "Largest linear acceleration that the driver assumes while odometry frames are missing.",
         low=0.0,
         high=100.0,
     ),
@@ -180,7 +182,7 @@ NOISE: Final = (
         "odom_gap_angular_acceleration",
         5.0,
         "rad/s²",
-        "Largest angular acceleration that is assumed while odometry frames are lost.",
+        "Largest angular acceleration that the driver assumes while odometry frames are missing.",
         low=0.0,
         high=1000.0,
     ),
@@ -188,7 +190,7 @@ NOISE: Final = (
         "twist_linear_stddev",
         0.02,
         "m/s",
-        "Noise of the measured linear velocity, for the covariance.",
+        "Standard deviation of the measured linear velocity, for the covariance.",
         low=1e-6,
         high=10.0,
     ),
@@ -196,7 +198,7 @@ NOISE: Final = (
         "twist_angular_stddev",
         0.025,
         "rad/s",
-        "Noise of the measured yaw rate, for the covariance.",
+        "Standard deviation of the measured yaw rate, for the covariance.",
         low=1e-6,
         high=10.0,
     ),

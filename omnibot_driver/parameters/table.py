@@ -181,8 +181,8 @@ def _always(_traits: Traits) -> bool:
 def _require_two_frames(values: Mapping[str, Any]) -> None:
     if values["odom_frame"] == values["base_frame"]:
         raise ParameterError(
-            f"parameter 'odom_frame' must not be '{values['odom_frame']}', which is 'base_frame':"
-            " a frame cannot move within itself"
+            "parameter 'odom_frame' must differ from 'base_frame', but both are"
+            f" '{values['odom_frame']}'"
         )
 
 
@@ -193,6 +193,6 @@ def _require_possible_speeds(values: Mapping[str, Any]) -> None:
         if commanded in values and values[commanded] > values[possible]:
             raise ParameterError(
                 f"parameter '{commanded}' ({values[commanded]:g} {unit}) must not be above"
-                f" '{possible}' ({values[possible]:g} {unit}): odometry rejects what is faster than"
-                f" that as impossible. Lower '{commanded}', or raise '{possible}' first"
+                f" '{possible}' ({values[possible]:g} {unit}): odometry rejects faster motion as"
+                f" impossible. Lower '{commanded}', or raise '{possible}' first"
             )
