@@ -71,7 +71,7 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
     if not names:
         node.get_logger().warning(
             f"calibration_file {path} does not exist, so nothing is loaded from it; check the"
-            " path, or create the file by a calibration"
+            " path, or calibrate to create the file"
         )
     if unread:
         nearest = [

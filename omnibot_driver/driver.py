@@ -15,7 +15,7 @@ from omnibot_driver.output import UnblockedOutput
 
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 LONGEST_END_S: Final = 4.0
-USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
+USAGE: Final = "give parameters like this: --ros-args -p port:=/dev/ttyUSB0"
 HELP: Final = f"""\
 usage: ros2 run omnibot_driver driver [--ros-args -p NAME:=VALUE ... --params-file FILE]
 

@@ -142,7 +142,7 @@ class OmniBotDriver(Node):
             return
         trace = "".join(traceback.format_exception(error))
         self.get_logger().fatal(
-            f"the driver stops because of a defect in it; please report this:\n{trace}"
+            f"the driver ends because of a bug in it; please report this:\n{trace}"
         )
         self._end(error)
 

@@ -39,18 +39,18 @@ def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
         return ""
     return (
         f"the USB adapter of {port} holds bytes for {latency_ms} ms (its latency_timer), so"
-        " measurements arrive in bursts; install udev/99-omnibot.rules, or until it is unplugged:"
-        f" echo 1 | sudo tee /sys/class/tty/{device}/device/latency_timer"
+        " measurements arrive in bursts; install udev/99-omnibot.rules, or run this after each"
+        f" time you plug it in: echo 1 | sudo tee /sys/class/tty/{device}/device/latency_timer"
     )
 
 
 def clock_advice(port: str, use_sim_time: bool) -> str:
-    """Return a warning about simulated time on a port that keeps real time; otherwise empty."""
+    """Return a warning about simulated time for a board that runs in real time; otherwise empty."""
     if not use_sim_time or port.startswith(WITHOUT_CLOCK):
         return ""
     return (
-        f"use_sim_time is set, but {port} keeps real time: stamps and the age of commands will be"
-        " wrong; start the driver with use_sim_time:=false"
+        f"use_sim_time is set, but the board on {port} runs in real time, so stamps and the age of"
+        " commands will be wrong; start the driver with use_sim_time:=false"
     )
 
 

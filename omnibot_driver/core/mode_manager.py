@@ -264,7 +264,10 @@ class ModeManager:
                 " to the board"
             )
         else:
-            reason = "the board keeps sending data; check that the cable carries data to the board"
+            reason = (
+                "the board keeps sending data, so it has not obeyed; check that the cable carries"
+                " data to the board"
+            )
         if self.phase is Phase.RESETTING:
             self.phase = Phase.SETTLED
             if self._wanted is Wanted.PAUSED:
@@ -272,9 +275,10 @@ class ModeManager:
             elif self._wanted is Wanted.RUNNING and not mode.running:
                 self._begin(now)
         if self.phase is Phase.STARTING:
-            reason += " (the start is repeated until data flows)"
+            reason += " (the driver repeats the start until data arrives)"
         elif self.phase is Phase.PAUSING:
             reason += (
-                " (the pause is repeated until it is paused, and motion is refused until ~/start)"
+                " (the driver repeats the pause until the board is paused, and refuses motion"
+                " until ~/start)"
             )
         self._answer(False, reason)

@@ -103,7 +103,9 @@ class SafetyStops:
             if self._mode_manager.phase is CLOSED:
                 return "e-stop latched; the port is not open; the stop will be sent when it opens"
             if missing := self._reporter.missing:
-                return f"e-stop latched; {missing}: the stop is sent on the other lines only"
+                return (
+                    f"e-stop latched; {missing}: the driver sends the stop on the other lines only"
+                )
             if self._board.mode is Mode.UNKNOWN:
                 return (
                     "e-stop latched; the board is not responding; delivery of the stop is"

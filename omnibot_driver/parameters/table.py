@@ -145,8 +145,8 @@ def table(
         raise ValueError(f"these are not common parameters: {', '.join(sorted(unknown))}")
     if kept := sorted({*without} - DISPENSABLE):
         raise ValueError(
-            f"the board {board} must not be without {', '.join(kept)}: the driver reads them on"
-            f" every board that its traits fit; it may be without {', '.join(sorted(DISPENSABLE))}"
+            f"the board {board} must not lack {', '.join(kept)}, which the driver reads on every"
+            f" board with such traits; a board may only lack {', '.join(sorted(DISPENSABLE))}"
         )
     sections = {
         title: tuple(

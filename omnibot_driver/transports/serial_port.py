@@ -179,7 +179,7 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
         except BlockingIOError:
             return b""
         if not data:
-            raise OSError("the device hung up")
+            raise OSError("the device was disconnected")
         return data
     return b""
 

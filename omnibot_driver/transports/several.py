@@ -169,8 +169,8 @@ class Several:
             if port.descriptors is None or len(port.descriptors) != 1:
                 port.close()
                 raise LinkError(
-                    "a port of this kind cannot be one of several: use a device like"
-                    " /dev/ttyACM0, or sim:// for all of them"
+                    "this kind of port does not work for a board with several lines; use a device"
+                    " like /dev/ttyACM0, or sim:// for all lines"
                 )
             with self._writing:
                 line.begin(port)

@@ -127,7 +127,7 @@ def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
-    assert "the pause is repeated" in answer.message
+    assert "the driver repeats the pause" in answer.message
     assert "until ~/start" in answer.message
     with pytest.raises(CommandRefused, match="being paused; call ~/start"):
         bench.drive(0.4)

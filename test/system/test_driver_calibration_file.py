@@ -31,7 +31,7 @@ def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
     line = said_of(path, start_driver)
     assert "WARN" in line
     assert WARNED.format(path) in line
-    assert "create the file by a calibration" in line
+    assert "calibrate to create the file" in line
 
 
 def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) -> None:

@@ -187,7 +187,7 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
     Simulated time on a real port is reported separately.
     """
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
-    driver.wait_for_line("use_sim_time is set, but /dev/null keeps real time")
+    driver.wait_for_line("use_sim_time is set, but the board on /dev/null runs in real time")
     assert "tf2" not in driver.output
 
 

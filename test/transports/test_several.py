@@ -222,5 +222,5 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
 
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
     """It has no descriptor."""
-    with pytest.raises(LinkError, match="cannot be one of several"):
+    with pytest.raises(LinkError, match="does not work for a board with several lines"):
         Several([partial(SerialPort, "loop://", 115200)])

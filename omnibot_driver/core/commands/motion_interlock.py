@@ -73,7 +73,7 @@ class MotionInterlock:
         """Return the reason why motion is refused, with a remedy; empty if motion is allowed."""
         if self.until is Until.RELEASE:
             return (
-                "the motion monitor has stopped the robot; send a zero command, or none for"
+                "the motion monitor has stopped the robot; send a zero command, or no command for"
                 f" {timeout_s:g} s"
             )
         if self.until is Until.START:

@@ -103,7 +103,7 @@ class CommandPipeline:
             self.policy.current.check_anew()
         except CommandRefused as error:
             self.policy.halt(now)
-            return [f"robot stopped, the current command does not fit the new scale: {error}"]
+            return [f"robot stopped: the current command does not fit the new scale ({error})"]
         return []
 
     def figures(self, now: float) -> CommandFigures:
@@ -204,8 +204,8 @@ class CommandPipeline:
             if self._board.advice:
                 advice = f"{self._board.advice}; otherwise {advice}"
             return [
-                f"{fault.value}{seen}; robot stopped: {advice}; if it comes and goes, check the"
-                f" cable to the board. {until}"
+                f"{fault.value}{seen}; robot stopped: {advice}; if the fault comes and goes, check"
+                f" the cable to the board. {until}"
             ]
         if fault is Fault.UNCOMMANDED:
             self.policy.halt(now)
@@ -228,7 +228,7 @@ class CommandPipeline:
         if not isinstance(goal, GoalSetpoint):
             return []
         if goal.alignment != self._odometry.alignments:
-            why = "odom begins anew"
+            why = "odom was reset to a new origin"
         elif any(
             goal.is_left_by(estimate.pose)
             for estimate in estimates

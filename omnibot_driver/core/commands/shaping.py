@@ -92,8 +92,8 @@ class CommandShaper:
         place = goal if own else self._odometry.in_board_frame(goal)
         if place is None or self._board.mode is Mode.IMU_ONLY:
             raise CommandRefused(
-                "cmd_pose refused: the board's own pose is not known; it needs nominal mode and"
-                " `use_board_pose`. After a restart, wait a second"
+                "cmd_pose refused: the board's own pose is not known; cmd_pose needs nominal mode"
+                " and `use_board_pose: true`. After a restart of the board, wait a second"
             )
         return GoalSetpoint(
             goal,

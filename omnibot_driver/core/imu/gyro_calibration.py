@@ -88,7 +88,7 @@ class Look:
         if shaken_mps2 > STILL_MPS2:
             return f"its accelerometer varies by {shaken_mps2:.2f} m/s²"
         if bias_radps > LARGEST_BIAS_RADPS:
-            return f"its gyro reads {bias_radps:.2f} rad/s, which is a rotation, not a bias"
+            return f"its gyro reads {bias_radps:.2f} rad/s, too much for a bias"
         return ""
 
 
@@ -130,7 +130,10 @@ class GyroCalibration:
     def tick(self, now: float) -> None:
         """Fail a running measurement that is overdue."""
         if now >= self.wake_at:
-            self.give_up("no two seconds of readings without a gap; check ~/state, then call again")
+            self.give_up(
+                "the IMU did not send readings for two seconds without a gap; check"
+                " ~/state, then call again"
+            )
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
         """Add an IMU reading, with the gyro's bias and without the accelerometer's, in SI units."""

@@ -70,8 +70,8 @@ class ResetProof:
         else:
             was = f"{self._before.left} and {self._before.right} ticks"
         return (
-            "reset sent, but unconfirmed: the wheel counters are near zero and were not far from it"
-            f" before ({was}), so the board cannot show whether it obeyed"
+            "reset sent, but unconfirmed: the wheel counters are near zero now and were near zero"
+            f" before ({was}), so they do not show whether the board obeyed"
         )
 
 

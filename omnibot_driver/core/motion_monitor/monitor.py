@@ -51,7 +51,7 @@ class Fault(Enum):
         "robot exceeds `fastest_linear_speed` or `fastest_angular_speed`, its physical limits"
     )
     UNCOMMANDED = "robot is moving without a command"
-    BLOCKED = "robot is commanded and does not move"
+    BLOCKED = "robot does not move although it is commanded"
     HELD_BY_ESTOP = "the e-stop is released and the robot is commanded, but it does not move"
 
 
@@ -72,11 +72,11 @@ ADVICE: Final[Mapping[Fault, str]] = {
     Fault.TURNS_TOO_FAST: "check the parameters of the wheels and scales",
     Fault.BEYOND_LIMITS: "check the parameters of the wheels and scales",
     Fault.UNCOMMANDED: (
-        "Stop is sent. If it is not being pushed, switch the motors off by hand, and check the"
-        " cable"
+        "The driver sends Stop. If the robot is not being pushed, switch the motors off by hand"
+        " and check the cable"
     ),
     Fault.BLOCKED: "check motor power, and whether the wheels are blocked",
-    Fault.HELD_BY_ESTOP: "check whether the board holds the stop itself",
+    Fault.HELD_BY_ESTOP: "check whether the board itself still holds an e-stop",
 }
 """Advice for any board; ``Traits.advice`` of a board names its own parameters."""
 

@@ -58,14 +58,14 @@ TRAITS: Final = Traits(
         ),
         Fault.BEYOND_LIMITS: "check `control_method`, `linear_scale` and `angular_scale`",
         Fault.UNCOMMANDED: (
-            "Stop is sent. If it is not being pushed, call ~/pause or switch the motors off by"
-            " hand, and check the cable"
+            "The driver sends Stop. If the robot is not being pushed, call ~/pause or switch the"
+            " motors off by hand, and check the cable"
         ),
         Fault.BLOCKED: (
             "check motor power, whether the wheels are blocked, and that `control_method` matches"
             " the board's switch"
         ),
-        Fault.HELD_BY_ESTOP: "the board may hold the stop itself; call ~/reset",
+        Fault.HELD_BY_ESTOP: "the board itself may still hold the e-stop; call ~/reset",
     },
 )
 

@@ -2,7 +2,7 @@
 
 """Checks for settings that the board's data contradicts. The user is advised to change them.
 
-The checks find poses that make sense only in the other byte order, deltas whose sum leads to the
+The checks find poses that are plausible only in the other byte order, deltas whose sum leads to the
 next pose only in the other frame (earth or body), and deltas at another rate than set. This module
 knows what the data means under each setting; it does not know how the user is informed.
 """
@@ -112,7 +112,7 @@ class MisconfigurationChecks:
             self._against_order = 0 if makes_sense else self._against_order + 1
         if self._against_order == SURE:
             self.advice = (
-                "the board's poses make sense only in the other byte order: set the parameter"
+                "the board's poses are plausible only in the other byte order: set the parameter"
                 f" `pose_byte_order` to {_OTHER_ORDER[order]}"
             )
         if makes_sense:
@@ -132,8 +132,8 @@ class MisconfigurationChecks:
             self._against_frame = 0
         if self._against_frame == SURE:
             self.advice = (
-                "the board's deltas lead to its poses only in the other frame: set the parameter"
-                f" `delta_frame` to {_OTHER_FRAME[frame]}"
+                "the board's deltas agree with its poses only in the other frame: set the"
+                f" parameter `delta_frame` to {_OTHER_FRAME[frame]}"
             )
 
 

@@ -100,7 +100,7 @@ class Diagnosis:
     def _board(self, link: LinkFigures, session: SessionFigures, now: float) -> Status:
         restarts = session.tally.restarts
         level, message = {
-            "disconnected": (Level.STALE, "not known while the port is closed"),
+            "disconnected": (Level.STALE, "unknown while the port is closed"),
             "connecting": (
                 Level.ERROR,
                 f"no valid data from the board; check {self._to_check}",
@@ -108,12 +108,13 @@ class Diagnosis:
             "paused": (Level.WARN, "paused; call ~/start to run it"),
             "imu_only": (
                 Level.WARN,
-                "IMU-only mode, so there is no odometry; set the board's own mode and reboot it",
+                "the board is in IMU-only mode and sends no odometry; set its own mode to nominal"
+                " and reboot it",
             ),
             "nominal": (Level.OK, "running"),
         }[session.state]
         if session.state == "connecting" and link.trouble:
-            level, message = Level.STALE, "not known while one of its lines is missing"
+            level, message = Level.STALE, "unknown while one of its lines is missing"
         if self._recent.grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
             message = "the board has restarted: unless you reset it, check its power supply"
@@ -144,10 +145,10 @@ class Diagnosis:
         ):
             level = Level.WARN
             message = (
-                f"rates are off: the reader waits {waiting:.0%} of the time for the processor;"
+                f"rates are wrong: the reader waits {waiting:.0%} of the time for the processor;"
                 " this computer is too busy: reduce its load"
                 if waiting > BUSY_SHARE
-                else "rates are off: bytes are lost, or this computer is too busy to read them;"
+                else "rates are wrong: bytes are lost, or this computer is too busy to read them;"
                 " check cable, hub and load"
             )
         elif overran:
@@ -199,14 +200,15 @@ class Diagnosis:
         delay = self._recent.delay_s()
         if session.state not in RUNNING or delay is None:
             return Status(
-                "Time", Level.STALE, "no measurements, so the board's time is unknown", {}
+                "Time", Level.STALE, "the board sends no measurements, so its time is unknown", {}
             )
         delay_s, jitter_s = delay
         level, message = Level.OK, "stamps are sampling times"
         if now - self._skewed_since > SKEW_KNOWN_S:
             level = Level.WARN
             message = (
-                "the two clocks drift apart faster than crystals do; check this computer's clock"
+                "the clocks of this computer and of the board drift apart faster than crystal"
+                " clocks do; check this computer's clock"
             )
         elif delay_s > LATE_S:
             level = Level.WARN

@@ -14,16 +14,16 @@ from omnibot_driver.core.measurement.outlier_filter import Refused
 NEWS_S: Final = 10.0
 """Shortest time in s between two notices about the same counter."""
 HEADING_ASSUMED: Final = (
-    "no valid pose from the board; the driver assumes that its heading was 0 at first"
+    "the board sends no valid pose; the driver assumes that the board's heading began at 0"
 )
 
 STOP_UNSEEN: Final = (
-    "stop unconfirmed: in IMU-only mode the board does not report motion, so Stop is repeated for"
-    " 5 s each time; check by eye that the robot has stopped"
+    "stop unconfirmed: in IMU-only mode the board does not report motion, so the driver repeats"
+    " Stop for 5 s after each stop; check by eye that the robot has stopped"
 )
 STOP_BLIND: Final = (
-    "stop unconfirmed: the board does not measure its wheels after this command; check by eye that"
-    " the robot has stopped (said once)"
+    "stop unconfirmed: the board does not measure its wheels after this command; check by eye"
+    " that the robot has stopped (said once)"
 )
 STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
 STOP_UNMEASURED: Final = (
@@ -31,8 +31,8 @@ STOP_UNMEASURED: Final = (
     " and check cable and hub"
 )
 STOP_UNHEEDED: Final = (
-    "stop unconfirmed: Stop was repeated and the robot still moves; if it is not being pushed, the"
-    " board is not receiving: switch the motors off by hand and check the cable"
+    "stop unconfirmed: Stop was repeated and the robot still moves; if it is not being pushed,"
+    " the board does not receive commands: switch the motors off by hand and check the cable"
 )
 
 
@@ -77,7 +77,7 @@ class Notices:
         total = refused.imu + refused.displacements + refused.poses
         if more := self._refused.since_told(total, now):
             news.append(
-                f"implausible readings rejected: {more} (in all {refused.imu} imu,"
+                f"implausible readings rejected: {more} (in total {refused.imu} imu,"
                 f" {refused.displacements} odometry, {refused.poses} poses); the line corrupts"
                 " bits, or a motion limit is set too low"
             )
