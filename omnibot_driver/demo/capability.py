@@ -40,7 +40,7 @@ def of(name: str) -> Capability:
     profile = boards.load(name)
     traits = profile.make(values).traits
     if Authority.BASE not in traits.authorities:
-        raise ParameterError(f"the board {name} takes no cmd_vel, so it has no demo")
+        raise ParameterError(f"the board {name} does not accept cmd_vel, so it has no demo")
     simulator = options.load(profile.SIMULATOR)
     ports = tuple(channel.parameter for channel in simulator.CHANNELS)
     sideways = profile.kinematics(values).feasible(BodyTwist(0.0, 1.0, 0.0)).vy_mps != 0.0

@@ -50,7 +50,7 @@ class Program:
         """Return an exception that says what happened, with the last output of this process."""
         self._log.seek(0)
         lines = self._log.read().splitlines()[-10:] or ["(nothing)"]
-        return DemoFailed("\n  ".join([f"{what}. The {self._name} said last:", *lines]))
+        return DemoFailed("\n  ".join([f"{what}. Last output of the {self._name}:", *lines]))
 
     def check(self) -> None:
         """Raise DemoFailed if the process has ended."""

@@ -22,10 +22,10 @@ from omnibot_driver.simulator.common.board import SimulatedBoard, SimulatorModul
 from omnibot_driver.simulator.common.serving import ServedBoard
 
 _CONSOLE_HELP = """\
-truth    one line of JSON: the true pose, and what else is known of the robot and its board
+truth    print the true pose and the true state of the robot as one line of JSON
 reboot   power-cycle the board; the robot stays where it is
-help     this list
-quit     end (so do ctrl-C and SIGTERM; the end of the input does not)"""
+help     print this list
+quit     end the simulator (as ctrl-C and SIGTERM do; the end of the input does not)"""
 
 _HEALTH_CHECK_S = 0.5
 
@@ -85,8 +85,8 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
 def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="simulator",
-        description=f"A simulated {module.TITLE} board.\nPrints where it listens, a line for each"
-        " of its ports: the path of a\npseudo-terminal, or udp://127.0.0.1:PORT.",
+        description=f"A simulated {module.TITLE} board.\nPrints the address of each port on a line"
+        " of its own: the path of a\npseudo-terminal, or udp://127.0.0.1:PORT.",
         epilog="Commands on standard input:\n" + _CONSOLE_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -96,8 +96,8 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             "--link",
             metavar="PATH",
             action="append",
-            help="make a symbolic link to the pseudo-terminal; of several: repeat it, or have a"
-            " hyphen and the port's name appended",
+            help="make a symbolic link to the pseudo-terminal; if there are several, repeat the"
+            " option, or give it once: each link then ends in a hyphen and the port's name",
         )
     if any(channel.datagrams for channel in module.CHANNELS):
         parser.add_argument(
@@ -105,7 +105,7 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             type=int,
             default=0,
             metavar="NUMBER",
-            help="the first UDP port, others follow it (default: any that are free)",
+            help="first UDP port; further ports follow it (default: any free ports)",
         )
     options.add_options(parser, module)
     return parser

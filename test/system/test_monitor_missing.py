@@ -94,7 +94,7 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
     assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
     output = capsys.readouterr()
     assert output.out.startswith("/fake/omnibot_driver  nominal")
-    assert "nothing comes on imu/data_raw, odom" in output.err
+    assert "no messages arrive on imu/data_raw, odom" in output.err
 
 
 def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
@@ -138,7 +138,7 @@ def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str])
     assert main(["--namespace", "fake"]) == 0
     output = capsys.readouterr()
     assert output.out.startswith("/fake/omnibot_driver")
-    assert "no terminal here, so this is a snapshot" in output.err
+    assert "this is not a terminal, so one snapshot is printed" in output.err
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def test_a_driver_of_another_version_is_told(
     table = replace(PARAMETERS, sections={**PARAMETERS.sections, "New": (newer,)})
     monkeypatch.setattr(omnibot, "PARAMETERS", table)
     assert rigged.calibrate("scale") == 1
-    assert "is of another version than this tool" in capsys.readouterr().err
+    assert "and this tool have different versions" in capsys.readouterr().err
 
 
 def test_what_the_driver_refuses_is_told(robot: Robot) -> None:

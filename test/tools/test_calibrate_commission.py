@@ -111,7 +111,7 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)
     assert "Please answer with three of + - 0" in told(capsys)
-    assert any("mirror image" in note for note in result_of(found).notes)
+    assert any("mirror the robot" in note for note in result_of(found).notes)
 
 
 def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:

@@ -70,7 +70,7 @@ def test_a_command_changes_no_faster_than_allowed(
 )
 def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
     """The linear velocity is limited as a vector; NaN is refused too."""
-    with pytest.raises(ToolError, match="beyond this calibration's own bounds"):
+    with pytest.raises(ToolError, match="exceeds the limits of this calibration"):
         BOUNDS.require_allowed("cmd_vel", command)
     wheels = Bounds(speed=5.0, way=1.0, seconds=1.0)
     wheels.require_allowed("wheel_cmd", (5.0, -5.0, 5.0))
@@ -222,7 +222,7 @@ def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixt
     assert "calibrate" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a firmware")])
+@pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a wheel controller")])
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
     """A board's parameters show what it can do; the OmniBot supports every calibration."""
     for subcommand in SUBCOMMANDS:

@@ -42,7 +42,7 @@ def test_a_planted_motor_is_found(
     assert 0.006 < delay_s < 0.035  # planted: 0.01 s; a busy host sends most commands a tick late
     assert 0 < sigma < 0.004
     assert "wheels off the ground" in robot.questions[0]
-    assert "No message to the board sets the gains" in table
+    assert "No message can set the gains" in table
     assert set(robot.written()) <= set(calibration.RECORDED)
     written = robot.written()["step"]
     found, _ = written["wheels"]["B"]["motor in the manual's loop"]["PWM per count"]
@@ -65,7 +65,7 @@ def still(answer: str, *words: str) -> None:
         (["--wheels", "D"], "some of ABC"),
         (["--speeds", "12", "4"], "the first is slower"),
         (["--speeds", "4", "40"], "max_wheel_speed of 17"),
-        (["--speeds", "4", "4.1"], "the same on the wire"),
+        (["--speeds", "4", "4.1"], "give the same command"),
         (["--hold", "0.1"], "0.5 s at least"),
     ],
 )

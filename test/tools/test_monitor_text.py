@@ -100,9 +100,9 @@ def test_an_estop_is_latched_asked_for_or_not() -> None:
     """An unconfirmed request does not show as latched."""
     assert text.estop(view()) == "e-stop not latched"
     assert text.estop(view(estop=True)) == "E-STOP LATCHED"
-    assert text.estop(view(estop_asked=True)) == "E-STOP ASKED FOR, NOT YET CONFIRMED"
+    assert text.estop(view(estop_asked=True)) == "E-STOP REQUESTED, NOT YET CONFIRMED"
     for unknown in (view(estop=None), view(silent_s=3.1)):
-        assert text.estop(unknown) == "e-stop: not known"
+        assert text.estop(unknown) == "e-stop: unknown"
     assert text.estop(view(estop=True, silent_s=3.1)) == "E-STOP LATCHED"
 
 

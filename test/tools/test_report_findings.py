@@ -198,7 +198,7 @@ def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
     assert first.level is Level.BAD
     assert "the gyro is stuck" in first.text
     assert (
-        "Time (/dev/ttyUSB0) said WARN 2 times, from 10 s on: “measurements wait” (2×)"
+        "Time (/dev/ttyUSB0) reported WARN 2 times, from 10 s on: “measurements wait” (2×)"
         in second.text
     )
 

@@ -235,7 +235,7 @@ def test_an_imu_that_the_board_has_not_is_not_missed(drive: Drive) -> None:
     """Its driver's diagnostics have no count of IMU frames."""
     drive.imu.drop(0.0, 99.0)
     said_of_it = [finding.text for finding in judge(drive.log())]
-    assert "No message of imu/data_raw: nothing can be said of the IMU." in said_of_it
+    assert "No message of imu/data_raw: the IMU cannot be judged." in said_of_it
     counts = {"Odometry frames lost": "0"}
     drive.statuses[:] = [(1.0, "omnibot_driver: Stream", 0, "complete", counts)]
     assert not [one for one in judge(drive.log()) if "imu/data_raw" in one.text]

@@ -62,8 +62,8 @@ def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> 
             type=_delay,
             default=0.0,
             metavar="SECONDS",
-            help="largest delay of a datagram, in either direction; later ones may overtake it"
-            " (default 0)",
+            help="largest random delay of a datagram in s, in either direction; datagrams may"
+            " change their order (default 0)",
         )
 
 

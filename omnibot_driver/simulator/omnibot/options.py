@@ -28,21 +28,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=_ticks,
         default=0.04,
         metavar="SECONDS",
-        help="period of that frame (default 0.04; the manual also has 0.1)",
+        help="period of that frame in s (default 0.04; the manual also says 0.1)",
     )
     parser.add_argument(
         "--control",
         choices=("velocity", "position"),
         default="velocity",
-        help="where the on-board switch stands (default velocity)",
+        help="position of the on-board switch (default velocity)",
     )
     parser.add_argument(
         "--receiver",
         choices=get_args(FramingName),
         default="counting",
-        help="how the firmware finds control frames: it counts bytes after FF FE, for ever "
-        "(counting, the default); the same, and FF FF FE is not a header (naive); the same, and a "
-        "pause of 5 ms ends half a frame (idle_gap); it searches the last 9 bytes (window)",
+        help="how the firmware finds control frames: counting (the default) counts seven bytes"
+        " after FF FE without a timeout; naive is the same, but misses the header in FF FF"
+        " FE; idle_gap is the same as counting, but a pause of 5 ms ends an incomplete"
+        " frame; window accepts the last 9 bytes whenever they begin with FF FE",
     )
     parser.add_argument(
         "--letters",
@@ -53,15 +54,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wakes-while-booting",
         action="store_true",
-        help="bytes that arrive while the board boots count for its three wake-up bytes",
+        help="count bytes that arrive while the board boots as its three wake-up bytes",
     )
     parser.add_argument(
-        "--ignore-estop", action="store_true", help="the firmware does not know the emergency stop"
+        "--ignore-estop", action="store_true", help="simulate a firmware without emergency stop"
     )
     parser.add_argument(
         "--latching-estop",
         action="store_true",
-        help="an emergency stop holds until the board is reset",
+        help="keep an emergency stop until the board is reset",
     )
     parser.add_argument(
         "--running", action="store_true", help="start in the running mode instead of booting"

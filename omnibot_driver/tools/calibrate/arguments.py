@@ -21,13 +21,13 @@ NEEDS: Final = {
     "imu": (("gyro_bias",), "an IMU"),
     "scale": (
         ("linear_scale", "odom_linear_scale"),
-        "a unit of its own for commanded speeds, or a scale of its odometry",
+        "`linear_scale` or `odom_linear_scale`",
     ),
     "geometry": (
         ("base_radius", "odom_linear_scale"),
-        "wheels around its centre, or a scale of its odometry",
+        "`base_radius` or `odom_linear_scale`",
     ),
-    "step": (("delta_frame", GAINS), "a firmware whose control of a wheel it knows"),
+    "step": (("delta_frame", GAINS), "a wheel controller that it can model"),
 }
 """By subcommand: parameters, of which the driver must have at least one, and what they show."""
 
@@ -37,8 +37,8 @@ def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
     wanted, thing = NEEDS[subcommand]
     if not any(parameter in parameters for parameter in wanted):
         raise ToolError(
-            f"calibrate {subcommand} needs {thing}, which the board {parameters['board']} does"
-            " not have"
+            f"calibrate {subcommand} needs {thing}, which the board {parameters['board']} does not"
+            " have"
         )
 
 
@@ -57,7 +57,11 @@ def command_line() -> argparse.ArgumentParser:
     for name, (summary, add_arguments) in SUBCOMMANDS.items():
         subparser = subparsers.add_parser(name, help=summary, description=summary)
         add_arguments(subparser)
-        subparser.add_argument("--yes", action="store_true", help="yes to every question")
+        subparser.add_argument(
+            "--yes",
+            action="store_true",
+            help="answer yes to every question",
+        )
         subparser.add_argument(
             "--output",
             metavar="FILE",
@@ -129,7 +133,7 @@ def _scale(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=_positive, default=2.0, help="seconds at each speed (default %(default)s)"
     )
-    _by_tape(parser.add_argument_group("where the board has no unit of its own for speeds"))
+    _by_tape(parser.add_argument_group("for boards without linear_scale"))
 
 
 def _by_tape(parser: argparse._ActionsContainer) -> None:
@@ -201,7 +205,7 @@ def _step(parser: argparse.ArgumentParser) -> None:
         metavar=("K_FF", "K_VP", "K_VI"),
         help="gains in the firmware (default: the manual's 40 10 1.5)",
     )
-    tuning = parser.add_argument_group("on a board whose gains are parameters")
+    tuning = parser.add_argument_group("for boards whose gains are parameters")
     for name, default, words in (
         ("records", 24, "number of recorded starts at full duty"),
         ("responses", 3, "number of recorded steps of the set-point with the same gains"),
@@ -212,16 +216,20 @@ def _step(parser: argparse.ArgumentParser) -> None:
         )
     for name, value, words in (
         ("overshoot", 5.0, "largest overshoot of a step, %%"),
-        ("band", 5.0, "band around the set-point within which a step is over, %%"),
+        ("band", 5.0, "band around the set-point in which a step has settled, %%"),
         ("destination", 50.0, "set-point of the step, %% of the speed at full duty"),
-        ("settling", 2.0, "time within which a step should be over, s"),
+        ("settling", 2.0, "time in which a step should settle, s"),
         ("phase-margin", 60.0, "smallest phase margin, degrees"),
         ("control-frequency", 11.0, "rate of the controller in the firmware, Hz"),
     ):
         tuning.add_argument(
             f"--{name}", type=_positive, default=value, help=f"{words} (default %(default)s)"
         )
-    tuning.add_argument("--gain-optimum", action="store_true", help="without phase margin: Td is 0")
+    tuning.add_argument(
+        "--gain-optimum",
+        action="store_true",
+        help="seek the fastest gains without a phase margin: Td is 0",
+    )
 
 
 def _positive(text: str) -> float:
@@ -244,23 +252,23 @@ def _whole(text: str) -> int:
 
 SUBCOMMANDS: Final = {
     "commission": (
-        "which way round everything is: a guided walk, wheels off the ground",
+        "directions of the wheels, axes and IMU, in a guided check; wheels off the ground",
         _commission,
     ),
     "imu": (
-        "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
+        "gyro bias and noise, accelerometer level, Allan deviation; the robot stands still",
         _imu,
     ),
     "scale": (
-        "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
+        "linear_scale and angular_scale, from commanded and measured speeds; the robot drives",
         _scale,
     ),
     "geometry": (
-        "wheel and base radius by your tape measure: the robot drives lines and squares",
+        "wheel and base radius, by your tape measure; the robot drives lines and squares",
         _geometry,
     ),
     "step": (
-        "how each wheel follows a step, its motor, better gains: wheels off the ground",
+        "response of each wheel to a step, its motor, better gains; wheels off the ground",
         _step,
     ),
 }

@@ -83,7 +83,8 @@ class Client:
         board = self._get_parameters(["board"])["board"]
         if board not in boards.PROFILES:
             raise ToolError(
-                f"{self.driver} drives a board {board}, which this tool does not know: update it"
+                f"{self.driver} drives a board {board}, which this tool does not know; update the"
+                " tool"
             )
         return boards.load(str(board)).PARAMETERS
 
@@ -92,7 +93,9 @@ class Client:
         answer = self._call(GetParameters, f"{self.driver}/get_parameters", request)
         values = [parameter_value_to_python(value) for value in answer.values]
         if len(values) != len(names):
-            raise ToolError(f"{self.driver} is of another version than this tool: update the older")
+            raise ToolError(
+                f"{self.driver} and this tool have different versions; update the older one"
+            )
         return {
             name: list(value) if isinstance(value, Sequence) and type(value) is not str else value
             for name, value in zip(names, values, strict=True)
@@ -134,10 +137,10 @@ class Client:
         client = self._node.create_client(kind, name)
         try:
             if not self._wait(client.service_is_ready, FOUND_WITHIN_S):
-                raise ToolError(f"{name} is not available: does the driver still run?")
+                raise ToolError(f"{name} is not available; check that the driver still runs")
             future = client.call_async(request)
             if not self._wait(future.done, ANSWER_WITHIN_S):
-                raise ToolError(f"{name} does not answer: does the driver still run?")
+                raise ToolError(f"{name} does not answer; check that the driver still runs")
             return future.result()
         finally:
             self._node.destroy_client(client)

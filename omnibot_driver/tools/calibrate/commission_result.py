@@ -90,8 +90,8 @@ def _remarks(found: Found) -> list[str]:
     remarks = []
     if found.control_method == "position":
         remarks.append(
-            "With the switch on positional control the driver takes cmd_pose alone. For velocities"
-            " move the switch, reboot the board and begin again."
+            "With the switch on positional control the driver accepts only cmd_pose. To drive by"
+            " velocities, move the switch, reboot the board and begin again."
         )
     if found.wheel_signs == (-1, -1, -1):
         remarks.append(
@@ -100,8 +100,8 @@ def _remarks(found: Found) -> list[str]:
         )
     if found.axis_signs is not None and mirrored(found.axis_signs):
         remarks.append(
-            "These signs are a mirror image, which no choice of the front explains. If you are sure"
-            " of what you saw, they are right for velocities; cmd_pose refuses them."
+            "These signs mirror the robot, which no choice of its front explains. If you are sure"
+            " of what you saw, use them for velocities; cmd_pose is refused with them."
         )
     if found.delta_frame not in (None, found.before["delta_frame"]):
         remarks.append(

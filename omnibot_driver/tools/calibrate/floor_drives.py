@@ -42,7 +42,7 @@ def measured(
     """
     console.confirm(
         f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
-        f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
+        f" begins, at up to {arguments.speed:g} m/s. Is there enough room?"
     )
     found = []
     for number, drive in enumerate(drives, 1):
@@ -60,7 +60,10 @@ def speeds(robot: Any, arguments: argparse.Namespace) -> tuple[float, float]:
     speed = min(arguments.speed, now["max_linear_speed"])
     turning = min(arguments.turning, now["max_angular_speed"])
     if not (speed and turning):
-        raise ToolError("max_linear_speed or max_angular_speed is 0: the robot may not move")
+        raise ToolError(
+            "max_linear_speed or max_angular_speed is 0, so the robot must not move;"
+            " set both above 0"
+        )
     return speed, turning
 
 

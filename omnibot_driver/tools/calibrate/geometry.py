@@ -24,10 +24,10 @@ from omnibot_driver.tools.calibrate.waypoints import square, visit
 PLAIN: Final = 0.005
 """Relative difference of a wheel's radius from the mean above which the user is warned."""
 INTRODUCTION: Final = (
-    "You need a tape measure, something to mark the floor with, and a plumb or a fixed point under"
-    " the robot's centre. Before each drive mark where the centre is and where the front points;"
-    " after it you are asked where the robot has got to, seen from those marks: forward and left"
-    " count as positive, back and right as negative. Let it go where it goes, and do not push it."
+    "You need a tape measure, something to mark the floor with, and a plumb or a fixed point"
+    " under the robot's centre. Before each drive mark where the centre is and where the front"
+    " points; after it, enter where the robot stands relative to these marks: forward and left"
+    " are positive, back and right are negative. Do not push the robot or correct its course."
 )
 
 

@@ -30,11 +30,12 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Record the IMU at rest and evaluate it. Raises ToolError."""
     if robot.parameters["auto_gyro_bias"]:
         raise ToolError(
-            "auto_gyro_bias is on, so the driver changes the bias meanwhile: start it without"
+            "auto_gyro_bias is on, so the driver would change the bias during the measurement;"
+            " set it to false"
         )
     console.confirm(
-        f"The robot will stand still for {60 * arguments.minutes:g} s, on a level floor, untouched."
-        " Is it so?"
+        f"The measurement takes {60 * arguments.minutes:g} s. Does the robot stand still on a"
+        " level floor, and will it stay untouched?"
     )
     biases = {name: np.array(robot.parameters[name]) for name in ("gyro_bias", "accel_bias")}
     ask = still(biases["gyro_bias"])

@@ -63,15 +63,15 @@ class Bounds:
             allowed = not twist.faster_than(self.speed, self.turning)
         if not (all(map(math.isfinite, command)) and allowed):
             raise ToolError(
-                f"a command of {_numbers(command)} on {topic} is beyond this calibration's own"
-                " bounds: choose lower speeds"
+                f"a command of {_numbers(command)} on {topic} exceeds the limits of this"
+                " calibration; choose lower speeds"
             )
 
     def require_within(self, seconds: float, pose: Pose) -> None:
         """Raise ToolError if the robot is too far from its start, or drives for too long."""
         if not pose.finite:
             raise ToolError(
-                "the robot was stopped, because `odom` contains NaN or infinity: find the node"
+                "the robot was stopped because `odom` contains NaN or infinity: find the node"
                 " that publishes it"
             )
         if pose.way_m > self.way:
@@ -83,7 +83,7 @@ class Bounds:
         else:
             return
         raise ToolError(
-            f"the robot was stopped, because it went too far ({where}): check `linear_scale`,"
+            f"the robot was stopped because it went too far ({where}): check `linear_scale`,"
             " `angular_scale` and that `odom` is right (docs/commissioning.md)"
         )
 

@@ -92,9 +92,8 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     square_rad = math.atan2(float(level @ np.cross(forward, left)), float(forward @ left))
     if abs(square_rad - math.pi / 2) > SQUARE_RAD:
         raise Contradiction(
-            f"the tilts of the two raised sides should be 90° apart, and are"
-            f" {math.degrees(square_rad):.0f}°: one of the two was not as"
-            " asked"
+            "the tilts of the two raised sides should be 90° apart, and are"
+            f" {math.degrees(square_rad):.0f}°: repeat both tilts"
         )
     body = np.array(
         [

@@ -36,9 +36,9 @@ COUNT, UNITS = "metres_per_count", "linear_scale"
 A longer distance per count makes the same speed fewer units of the motors.
 """
 INTRODUCTION: Final = (
-    "You need a tape measure and something to mark the floor with. Before each drive mark where the"
-    " robot's centre is and where the front points; after it you are asked how far it has come, or"
-    " how far it has turned past its mark. Let it go where it goes, and do not push it."
+    "You need a tape measure and something to mark the floor with. Before each drive mark where"
+    " the robot's centre is and where the front points; after it, enter how far it has driven, or"
+    " how far it has turned past its mark. Do not push the robot or correct its course."
 )
 
 
@@ -164,4 +164,4 @@ def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
     values = [one.value for one in ratios]
     axes.errorbar(names, values, [one.value_sigma for one in ratios], fmt="o", color="tab:blue")
     axes.axhline(1.0, color="grey", lw=0.8)
-    axes.set(ylabel="true over told by odom", title="What odom has to be multiplied by")
+    axes.set(ylabel="true / reported by odom", title="Factor by which odom is multiplied")

@@ -149,15 +149,16 @@ def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
     if predicted.settled_s > goals.settled_s:
         remarks.append(
             f"The {wheel.name} wheel is in its band after {predicted.settled_s:.2f} s, not within"
-            f" the {goals.settled_s:g} s that were wanted: the plant, or the controller's"
-            f" {1 / wheel.loop.period_s:.0f} Hz, allow no sooner."
+            f" the {goals.settled_s:g} s that you asked for: the wheel, or the"
+            f" controller's rate of {1 / wheel.loop.period_s:.0f} Hz, does not allow a faster"
+            " response."
         )
     if wheel.worse:
         remarks.append(
-            f"The {wheel.name} wheel followed a step better before (error"
-            f" {wheel.before.error_s:.2f} s of it, now {wheel.after.error_s:.2f} s), so its gains"
-            " are not kept: allow more overshoot, or take more records. Gains that the driver did"
-            " not know come back when driver and board are started anew."
+            f"The {wheel.name} wheel followed a step better with its previous gains (error"
+            f" {wheel.before.error_s:.2f} s of it, now {wheel.after.error_s:.2f} s), so the new"
+            " gains are not kept: allow more overshoot, or take more records. If the driver did"
+            " not know the previous gains, restart the driver and the board to restore them."
         )
     return remarks
 

@@ -182,7 +182,7 @@ def _plant(found: PlantFit, free: Levels) -> Plant:
     if slope <= 0.0:
         raise ToolError(
             f"a wheel turns at {free.rpm:.0f} RPM with half duty and at {found.final_rpm:.0f} with"
-            " full: is something in its way, or the battery weak?"
+            " full duty; check that nothing blocks it, and charge the battery"
         )
     dead_zone = FULL_PERCENT - found.final_rpm / slope
     return Plant(slope, found.slow_s, found.fast_s, float(np.clip(dead_zone, 0.0, 50.0)))

@@ -112,7 +112,8 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
     if best is None:
         raise ToolError(
             f"no gain keeps a step to {target:.0f} RPM within {goals.overshoot:.0%} of overshoot"
-            f" and a band of {goals.band:.0%}: allow more, or another destination"
+            f" and a band of {goals.band:.0%}: allow more overshoot, or choose another"
+            " --destination"
         )
     return told(plant, PiGains(best[0], tn_s, best[1]), loop, goals)
 

@@ -74,7 +74,7 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
     """Return the findings from these speeds, to show and write; ``now``: driver's parameters."""
     by_axis = [[one for one in found if one.axis == axis] for axis in range(3)]
     if not all(by_axis):
-        raise ToolError("not every axis was measured: drive longer, by --seconds")
+        raise ToolError("not every axis was measured: increase --seconds")
     linear, angular = scale(by_axis[0] + by_axis[1]), scale(by_axis[2])
     x, y, gyro = scale(by_axis[0]), scale(by_axis[1]), scale(by_axis[2], by="gyro")
     units = ("LSB/(m/s)", "LSB/(rad/s)")

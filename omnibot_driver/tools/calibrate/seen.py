@@ -59,13 +59,13 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
     turned = [n for n in range(3) if seen[n]]
     if not turned:
         raise Contradiction(
-            f"no wheel was seen to turn, but wheel {name} was commanded: look again, and whether"
-            " the motors have power"
+            f"no wheel was seen to turn, but wheel {name} was commanded: look again, and check"
+            " that the motors have power"
         )
     if len(turned) > 1:
         raise Contradiction(
-            f"wheel {name} alone was commanded, but {in_words(seen)} was seen: each of the three"
-            " has a motor of its own"
+            f"wheel {name} alone was commanded, but {in_words(seen)} was seen: one command turns"
+            " only one wheel, so look again"
         )
     if turned != [wheel]:
         raise Contradiction(

@@ -116,7 +116,7 @@ def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[
     words = round(slow * lsb), round(fast * lsb)
     if words[0] < 1 or words[1] <= words[0]:
         raise ToolError(
-            f"--speeds {slow:g} {fast:g} are the same on the wire, whose unit is {1 / lsb:.2f}"
-            " rad/s: choose speeds further apart"
+            f"--speeds {slow:g} {fast:g} give the same command, because the board's unit is"
+            f" {1 / lsb:.2f} rad/s: choose speeds further apart"
         )
     return words[0] / lsb, words[1] / lsb

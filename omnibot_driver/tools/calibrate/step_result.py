@@ -54,9 +54,9 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
     }
     notes = [sentence for wheel in found for sentence in _remarks(wheel)]
     notes += [
-        f"With the gains that it has, {_told([behaviour(motor, now) for motor in motors])}.",
+        f"With the present gains, {_told([behaviour(motor, now) for motor in motors])}.",
         f"With the better gains, {_told([behaviour(motor, better) for motor in motors])}.",
-        "No message to the board sets the gains: they are constants of the firmware.",
+        "No message can set the gains, because they are constants in the firmware.",
     ]
     return Result(
         findings=findings,
@@ -123,8 +123,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
     if second.rms_radps > MANY * QUANTUM_RADPS:
         remarks.append(
             f"Wheel {wheel.name}: it answers differently from step to step, by more than the"
-            f" {QUANTUM_RADPS} rad/s that encoder and wire make. Is something in its way, the"
-            " battery weak, this computer too busy?"
+            f" {QUANTUM_RADPS} rad/s that encoder and line cause. Check that nothing blocks it,"
+            " charge the battery, and reduce the load of this computer."
         )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(

@@ -57,8 +57,8 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         metavar="NAME",
         help="its node name (default: %(default)s)",
     )
-    parser.add_argument("--once", action="store_true", help="print what is known and end")
-    parser.add_argument("--json", action="store_true", help="print it as JSON; means --once")
+    parser.add_argument("--once", action="store_true", help="print one snapshot and end")
+    parser.add_argument("--json", action="store_true", help="print one snapshot as JSON and end")
     parser.add_argument(
         "--teleop",
         action="store_true",
@@ -85,7 +85,10 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
     if not options.once and not has_screen():
         if options.teleop:
             raise ToolError("--teleop needs a terminal: a pipe has no keys to be held")
-        print("monitor: no terminal here, so this is a snapshot as of --once", file=sys.stderr)
+        print(
+            "monitor: this is not a terminal, so one snapshot is printed, as with --once",
+            file=sys.stderr,
+        )
         options.once = True
     if not options.once:
         need("textual")
@@ -148,8 +151,8 @@ def _print(view: View, feed: "Feed", as_json: bool) -> int:
     troubles = [namesakes] if (namesakes := feed.namesakes()) else []
     if missing := view.missing(feed.diagnoses()):
         troubles.append(
-            f"{view.driver} is {view.state}, but nothing comes on {', '.join(missing)}: is it"
-            " remapped, or lost on the network?"
+            f"{view.driver} is {view.state}, but no messages arrive on {', '.join(missing)}; check"
+            " remappings and the network"
         )
     if strange := view.not_finite():
         troubles.append(

@@ -270,7 +270,7 @@ class Feed:
             service = self._node.resolve_service_name(client.srv_name)
             self.say(f"{what}: service {service} not found; is the driver running?")
             return
-        self.say(f"{what}: asked, no answer yet")
+        self.say(f"{what}: requested, no answer yet")
         client.call_async(request).add_done_callback(partial(self._answered, what))
 
     def _answered(self, what: str, future: Any) -> None:
@@ -295,5 +295,5 @@ class Feed:
         except ExternalShutdownException:
             pass
         except Exception as error:
-            self.say(f"the monitor has stopped receiving because of a defect in it: {error!r}")
+            self.say(f"the monitor has stopped receiving because of a bug in it: {error!r}")
             raise

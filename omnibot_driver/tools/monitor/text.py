@@ -55,9 +55,9 @@ def title(view: View) -> str:
 def estop(view: View) -> str:
     """Return the state of the e-stop as text."""
     if view.estop_asked:
-        return "E-STOP ASKED FOR, NOT YET CONFIRMED"
+        return "E-STOP REQUESTED, NOT YET CONFIRMED"
     if view.estop is None or (view.silent and not view.estop):
-        return "e-stop: not known"
+        return "e-stop: unknown"
     return "E-STOP LATCHED" if view.estop else "e-stop not latched"
 
 

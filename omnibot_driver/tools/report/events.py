@@ -91,7 +91,9 @@ def _estop(log: Log) -> Iterator[Finding]:
         "E-stop",
         f"Latched {counted(len(log.latched), 'time')}, {span(length_s)} in all, first at"
         f" {log.latched[0].begin_s:.1f} s{still}.",
-        "Release it with the service ~/estop (data: false) when all is clear." if still else "",
+        "Release it with the service ~/estop (data: false) when it is safe to drive."
+        if still
+        else "",
     )
 
 
@@ -117,7 +119,7 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.BAD if worst == 2 else Level.WARN,
             "Diagnostics",
-            f"{name} ({port}) said {LEVELS[worst]} {counted(len(statuses), 'time')}, from"
+            f"{name} ({port}) reported {LEVELS[worst]} {counted(len(statuses), 'time')}, from"
             f" {statuses[0].at_s:.0f} s on: “{message}” ({times}×).",
             "docs/diagnostics.md explains each status.",
         )

@@ -10,8 +10,8 @@ from omnibot_driver.tools.report.log import Log
 
 IMU = "imu/data_raw"
 WITHOUT = {
-    IMU: "nothing can be said of the IMU",
-    "odom": "nothing can be said of where the robot went",
+    IMU: "the IMU cannot be judged",
+    "odom": "the robot's path is unknown",
 }
 
 

@@ -42,7 +42,8 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "Velocities",
         plots.velocities,
         lambda log: len(following.shown(log)[0].measured),
-        "A command counts as zero 0.5 s after it came (the default of cmd_vel_timeout).",
+        "A command expires 0.5 s after it arrived (the default of cmd_vel_timeout); after that,"
+        " zero is drawn.",
     ),
     (
         "imu",
