@@ -11,7 +11,7 @@ class ToolError(Exception):
 
 
 def need(module: str) -> ModuleType:
-    """Import a library of the extra ``tools``. Raises ToolError where it is not installed."""
+    """Import and return a library that only the tools need. Raises ToolError if it is missing."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:

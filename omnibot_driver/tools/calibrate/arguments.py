@@ -15,7 +15,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""A parameter that only drivers have whose board records ticks and takes a wheel's gains."""
+"""A parameter that a driver has only if its board records encoder ticks and accepts gains."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -29,7 +29,8 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller that it can model"),
 }
-"""By subcommand: parameters, of which the driver must have at least one, and what they show."""
+"""By subcommand: parameters of which the driver must have at least one, and the words for the user
+if it has none."""
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:

@@ -114,7 +114,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Set parameters of the kind that may change while the driver runs."""
+        """Set those parameters that may change while the driver runs; leave out the others."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }

@@ -39,7 +39,10 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
 
 
 def picture_file(given: str | None, subcommand: str) -> Path:
-    """Return the file to draw into; a folder, or None, gets ``calibrate_<subcommand>.png``."""
+    """Return the picture file; for a folder or None, ``calibrate_<subcommand>.png`` in it or here.
+
+    Raises ToolError if the file cannot be written, or has another suffix than ``PICTURES``.
+    """
     path = Path(given or ".").expanduser()
     if path.is_dir():
         path = path / f"calibrate_{subcommand}.png"

@@ -79,7 +79,7 @@ def driven(
 ) -> Column:
     """Drive by this law, and return the poses of the odometry. Raises ToolError.
 
-    ``turn_rad``: the heading at the end; ``seconds``: the expected duration.
+    ``turn_rad``: the size of the turn from start to end; ``seconds``: the expected duration.
     """
     speed, turning = speeds(robot, arguments)
     bounds = Bounds(

@@ -49,7 +49,7 @@ class Geometry:
 
     ``wheels``: mean radius; ``base``: base radius; ``unlike``: (3,), relative excess of each wheel
     over the mean. ``covariance``: (4, 4), of wheels, base and the first two of ``unlike``;
-    ``excess``: misfit divided by the expected misfit.
+    ``excess``: ratio of the residuals to the expected ones, at least 1.
     """
 
     wheels: float

@@ -79,7 +79,7 @@ def require_motion(odometry: Odometry) -> None:
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
-    """Return whether the board commands velocity or position, from the motion at two commands.
+    """Return whether the board controls velocity or position, from the motion at two commands.
 
     ``slow``: the motion with the command for ``slow_mps``; ``fast``: with twice that command. A
     velocity is held, and doubles. In positional control the same command is a place a few

@@ -40,10 +40,11 @@ PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 class Bounds:
     """Limits of one motion. Linear in m and m/s, turning in rad and rad/s.
 
-    ``speed``, ``turning``: largest ones of commands (for wheels, ``speed`` is the fastest wheel's,
-    in rad/s); ``way``, ``turn``: largest ones from the start, by the odometry; ``seconds``: the
-    duration; ``acceleration``, ``angular_acceleration``: how fast a command is changed (for wheels,
-    the first one). An infinite acceleration changes commands at once.
+    ``speed``, ``turning``: largest commanded speed and yaw rate (for wheels, ``speed`` is that of
+    the fastest wheel, in rad/s); ``way``, ``turn``: largest distance and turn from the start, by
+    the odometry; ``seconds``: longest duration; ``acceleration``, ``angular_acceleration``: largest
+    change of a command per s (for wheels, ``acceleration`` in rad/s²). If they are infinite,
+    commands change at once.
     """
 
     speed: float

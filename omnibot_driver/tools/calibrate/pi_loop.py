@@ -139,7 +139,8 @@ class Traits:
     """Characteristics of a step response; scalars or arrays.
 
     ``overshoot``: as a fraction of the final speed, or of the target if that is higher.
-    ``settled_s``: time after which the speed stays in the tolerance band, infinite if it does not.
+    ``settled_s``: time after which the speed stays in the band around its final value; infinite if
+    it does not, or if the final value is not the target.
     ``error_s``: integral of the absolute error, as a fraction of the target, in s.
     """
 

@@ -2,10 +2,11 @@
 
 """``calibrate step`` for a board that records ticks and takes gains: encoders, plant, controller.
 
-First the wheels turn freely at a constant duty, which shows the levels of their encoders. Then they
-start at full duty, which shows the plant. Then they make a step of their set-point with the present
-gains, and with the gains found; these steps yield the dead time. With the dead time the gains are
-found again, and a last step measures their effect.
+First the wheels make steps of their set-point with the present gains, for comparison. Then they
+turn freely at a constant duty, which shows the levels of their encoders, and start at full duty,
+which shows the plant. Then gains are computed and steps are made with them, ``ROUNDS`` times. The
+steps of each round show the dead time, with which the next round computes its gains. The steps of
+the last round are compared with the first ones.
 """
 
 import argparse

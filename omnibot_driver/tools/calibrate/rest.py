@@ -28,7 +28,7 @@ class Rest:
     """The evaluation of a rest; arrays are of x, y, z of the sensor.
 
     ``bias_radps``: mean rate; ``force_mps2``: mean force; ``…_sigma``: their standard deviations
-    (of a wandering bias: from its value at the end); ``…_noise``: rms of one reading.
+    (that of the bias: from its value at the end of the rest); ``…_noise``: rms of one reading.
     """
 
     bias_radps: Column

@@ -38,8 +38,8 @@ Together they count as one measurement.
 class Speed:
     """One steady speed along an axis (0, 1, 2: x, y, yaw), in m/s or rad/s.
 
-    ``counts``: as commanded; ``measured``: by the odometry; ``gyro``: yaw rate by the gyro, NaN if
-    the robot did not turn.
+    ``counts``: as commanded; ``measured``: by the odometry; ``gyro``: yaw rate by the gyro, NaN for
+    x and y.
     """
 
     axis: int
@@ -110,7 +110,10 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 
 
 def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
-    """Return the scale that fits the speeds best, weighted by uncertainty; speed 0 is 0 counts."""
+    """Return the scale that fits the speeds best, weighted by uncertainty; speed 0 is 0 counts.
+
+    Raises ToolError if the robot moves against its commands.
+    """
     counts = np.array([one.counts for one in found], dtype=float)
     measured = np.array([one.measured if by == "odometry" else one.gyro for one in found])
     sigma = np.array([one.sigma if by == "odometry" else one.gyro_sigma for one in found])

@@ -29,7 +29,10 @@ A single mark may be displaced, but a sum of intervals has no larger error than 
 
 
 def read(path: Path) -> dict[str, Column]:
-    """Return the times between ticks in s, by side. Raises ToolError if the file has too few."""
+    """Return the times between ticks in s, by side; NaN where the record has no time.
+
+    Raises ToolError if the file cannot be read, or if too many times are missing.
+    """
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))

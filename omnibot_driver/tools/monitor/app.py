@@ -207,7 +207,7 @@ class Monitor(App[None]):
         return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:
-        """Keys do not steer while the terminal is not in focus."""
+        """Stop the robot that the keys steer when the terminal loses the focus."""
         if self._robot.dead_man:
             self._robot.dead_man.stop()
 

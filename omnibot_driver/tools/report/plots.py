@@ -249,7 +249,7 @@ def timeline(log: Log) -> Figure:
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
     """Yield a span and a colour for each status.
 
-    A span lasts until the next status, or about a second if the next one is late.
+    A span lasts until the next status, or 1 s if the next one is late.
     """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0

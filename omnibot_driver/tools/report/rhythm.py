@@ -278,7 +278,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return the growth of this robot's counts in /diagnostics; None where they are not reported.
 
-    A count that fell began anew with another driver.
+    If a count falls, another driver has begun to count at zero, and its count is added.
     """
     if not log.alone:
         return None
