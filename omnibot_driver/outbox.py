@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of waiting calls at which each thread that delivers waits for the listener."""
+"""Number of queued calls at which a thread that delivers must wait for the listener."""
 
 Delivery = Callable[[], object]
 

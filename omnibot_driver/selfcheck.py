@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on surroundings of the driver that can be observed and should be set differently.
+"""Advice on settings of the computer and of other nodes that disturb the driver.
 
 This module checks the adapter of an open port, the clock, and nodes of the same name. It reads
 sysfs, and knows no pyserial, no ROS and no board. Obstacles to opening a port, such as its

@@ -2,7 +2,8 @@
 
 """The parameters that the LOIS ECU has and other boards need not have. Knows no ROS.
 
-What the board keeps by itself is unset by default: it is written only if the user gives a value.
+Settings that the board stores are unset by default: the driver writes them only if the user gives a
+value.
 """
 
 from collections.abc import Mapping
@@ -16,8 +17,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest rate of commands in a terminal mode, in Hz: lines of 14 characters, of which the compass
-takes 34 in a second."""
+"""Largest rate of commands in a terminal mode, in Hz. A command is a line of 14 characters, and the
+line to the compass carries 34 such lines per second."""
 
 WHEELS: Final = (
     Parameter(

@@ -55,7 +55,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""Conditions on a board's traits under which a common parameter has a meaning, by parameter."""
+"""By common parameter: the condition on a board's traits under which the board has this
+parameter."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",

@@ -23,8 +23,8 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""Increases of the distance in m and the angle in rad to a goal that show that the robot drives
-away; they are larger than the overshoot of any controller."""
+"""Limits for the growth of the distance (m) and angle (rad) to a goal. Beyond them the robot drives
+away from the goal, because no controller overshoots that far."""
 
 
 class Authority(Enum):

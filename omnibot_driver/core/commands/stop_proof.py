@@ -24,7 +24,7 @@ AT_LEAST: Final = 2
 """Fewest displacements of a proof, even if one is long enough: one alone may be damaged, or be from
 before the wheels turned."""
 PROOFS: Final = 2.0
-"""Factor on the duration of standstill; the product is the time to wait for the proof."""
+"""Factor by which the duration of standstill is multiplied to get the time to wait for a proof."""
 RAREST_S: Final = 1.0
 """Longest period of displacements, in s; a longer one spans lost displacements."""
 UNDER_WAY_S: Final = 0.05

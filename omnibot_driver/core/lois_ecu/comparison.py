@@ -2,10 +2,11 @@
 
 """Corrections of the motion filter: each report of a LOIS ECU is compared with what it expects.
 
-Ticks are exact where they count. The heading of 0x20 is compared wherever ticks are missing. Its
-distance is compared only where both speeds differ, because the public firmware's position does not
-change at equal ones. Its speeds are compared only if the wheel has ticked since, because a wheel at
-rest keeps its speed. Works on counts and changes of 0x20, without the robot's pose.
+If the board counts the ticks of a wheel, they are exact. Otherwise the heading in 0x20 is compared.
+The distance in 0x20 is compared only while the two wheel speeds differ: the public firmware does
+not change its position while they are equal. The speeds in 0x20 are compared only after a new tick,
+because a wheel at rest keeps its last speed. Works on counts and changes of 0x20, without the
+robot's pose.
 """
 
 import math

@@ -30,7 +30,7 @@ ONE_BYTE: Final = 5.5
 TWO_BYTES: Final = 8.5
 """Cost of a frame that lost or gained two bytes; less than twice one byte, as losses cluster."""
 BROKEN_OFF: Final = 9.0
-"""Cost of a frame whose last three or more bytes are missing because a burst was lost."""
+"""Cost of a frame whose last three or more bytes were lost in a burst."""
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes, out of 9 to 15 bytes."""
 HEADER_IN_PLACE: Final = 4.0

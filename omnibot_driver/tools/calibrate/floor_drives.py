@@ -101,6 +101,9 @@ def turned_past_mark(console: Console) -> float:
     """Ask how far the robot's front points past its mark; return rad, positive to the left."""
     return math.radians(
         console.number(
-            "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0
+            "By how much did the robot turn past the mark of its front (left +, right -)",
+            "degrees",
+            -170.0,
+            170.0,
         )
     )

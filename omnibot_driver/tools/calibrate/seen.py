@@ -69,9 +69,10 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
         )
     if turned != [wheel]:
         raise Contradiction(
-            f"wheel {name} was commanded and wheel {WHEELS[turned[0]]} was seen to turn. By the"
-            " manual A is front right, B front left, C at the back: if another side may be the"
-            " front, look from there; if none is, no parameter corrects the order of the wheels"
+            f"wheel {name} was commanded, but wheel {WHEELS[turned[0]]} was seen to turn. By the"
+            " manual A is front right, B front left, C at the back. Perhaps another side of the"
+            " robot is the front: look again from there. No parameter corrects the order of the"
+            " wheels"
         )
     return seen[wheel]
 
