@@ -83,7 +83,8 @@ def play(tape: Tape) -> Heard:
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:
-    """Return what a moving board would have sent, with their times; silent ticks are left out."""
+    """Return the bytes that a moving board sends, with their times; the ``silent`` ticks are left
+    out."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     board.receive(bytes.fromhex("FF FE 01 00 0E 00 07 00 32"))
     found = []

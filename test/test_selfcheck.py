@@ -11,7 +11,7 @@ from omnibot_driver import selfcheck
 
 
 def adapter(root: Path, device: str, latency: str) -> Path:
-    """Create a sysfs with one adapter; return its root."""
+    """Create a copy of sysfs with one adapter in this folder; return the root of the copy."""
     folder = root / "class/tty" / device / "device"
     folder.mkdir(parents=True)
     (folder / "latency_timer").write_text(latency)

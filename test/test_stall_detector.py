@@ -92,7 +92,8 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """The offset of its sender's clock is known only as exactly as its fastest message."""
+    """The offset of its sender's clock is only as certain as the transit time of the fastest
+    message."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(103.001), 103.4)

@@ -188,7 +188,7 @@ def test_two_senders_with_clocks_of_their_own_are_both_heard(
 
 
 def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
-    """Their clocks agree, since both run on one host."""
+    """The clocks of both senders agree, since both run on one host."""
     receiver, old, new = Receiver(), Sender(sent=1000), Sender()
     for number in range(20):
         receiver.hear(old, 100.0 + 0.1 * number, 0.01)
@@ -235,7 +235,8 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """The sender's clock alone may claim anything."""
+    """After ten messages of a sender, the send time has one estimate, by our clock; an offset of
+    the sender's clock has no effect on it."""
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):
         delay = receiver.hear(sender, 100.0 + number, 0.01)

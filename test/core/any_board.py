@@ -76,9 +76,9 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    late_s: the time that a start costs, in s: the controller integrates for 0.5 s until a wheel
-    turns, and as long again until it is fast. Of a commanded 1.2 m (4 s at 0.3 m/s) the robot
-    drives 0.97 m (firmware) or 0.96 m (documented).
+    late_s: time in s that the robot loses at a start. The controller integrates for 0.5 s before a
+    wheel turns, and the wheel needs as long again to reach its speed. If 1.2 m are commanded (4 s
+    at 0.3 m/s), the robot drives 0.97 m (firmware) or 0.96 m (documented).
     """
 
     late_s = 0.75

@@ -57,11 +57,11 @@ class Command:
 class Scene:
     """One script of the driver's actions; times in s.
 
-    begins: what the board shows at first; run: whether the driver starts it. control: position of
-    the board's switch. linear_scale: LSB per m/s. faults_from_s: the line has faults from then on.
-    still_by_s: the robot must be at rest by then. exits_s, killed_s: when the driver ends, or is
-    killed; on_exit: what it does to the board. guard_after_s: time from that end until the guard
-    acts.
+    begins: state that the board shows at first. run: whether the driver starts the board. control:
+    position of the board's switch. linear_scale: LSB per m/s. faults_from_s: time from which the
+    line has faults. still_by_s: time at which the robot must be at rest. exits_s, killed_s: time at
+    which the driver ends or is killed. on_exit: the parameter of that name. guard_after_s: delay
+    from the end of the driver until the guard acts.
     """
 
     kind: str

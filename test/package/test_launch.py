@@ -113,7 +113,8 @@ def launch(tmp_path: Path) -> Callable[..., Started]:
 
 
 def parameters(record: dict[str, Any]) -> dict[str, Any]:
-    """Return the parameters of all files of a process, for any node; later files override."""
+    """Return the parameters from all files of a process; values of later files replace earlier
+    ones."""
     merged: dict[str, Any] = {}
     for text in record["files"]:
         for node in yaml.safe_load(text).values():

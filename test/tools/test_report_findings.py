@@ -115,7 +115,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
-    """Every other reading is missing in the complete log."""
+    """In the complete log every second reading is missing."""
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.imu, name, getattr(drive.imu, name)[::2])
     found = [finding.text for finding in troubles(drive) if finding.subject in ("Timing", "Gaps")]

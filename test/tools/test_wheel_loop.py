@@ -63,7 +63,8 @@ def test_the_loop_is_the_simulated_boards(delay: int) -> None:
 
 
 def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
-    """A delay of 1.4 ticks is between 1 and 2 at every tick of the rise."""
+    """The response with a delay of 1.4 ticks lies between those with 1 and 2 ticks, at every tick
+    of the rise."""
     sooner, between, later = (
         answer(Motor(46.0, 6.0, delay), MANUAL, 8).speed for delay in (1.0, 1.4, 2.0)
     )

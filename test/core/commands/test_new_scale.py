@@ -88,7 +88,7 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """Zeros in mode 1 would be a command of another meaning than Stop."""
+    """Zeros in mode 1 have another meaning than Stop."""
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)

@@ -136,7 +136,7 @@ def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str,
 
 
 def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
-    """Motion that was lost on the line moves odom and the board's frame by the same error."""
+    """Motion that was lost on the line puts odom and the board's frame off by the same amount."""
     bench.go_to(1.0, 0.0, 0.0)
     bench.run(0.5)
     bench.speaks = False

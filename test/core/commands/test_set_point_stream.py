@@ -52,7 +52,7 @@ def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> 
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """Each frame more on the line would be more bytes that can be corrupted."""
+    """Each additional frame adds bytes that the line can corrupt."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)

@@ -91,11 +91,11 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     ],
 )
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """Any line may be damaged; a group that has come before its last line comes again is kept.
+    """Any line may be damaged; a group stays valid if only its last line arrives a second time.
 
-    A GPS fix waits for what follows it, so that copy costs it.
-    A line of another odometry group could pass for one of this group. Damage does not move lines,
-    so this case is left out.
+    A GPS fix is different: it waits for the next line, and a second copy of its last line discards
+    it. A line of another odometry group could pass for one of this group. Damage does not move
+    lines, so this case is left out.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]

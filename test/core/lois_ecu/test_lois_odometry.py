@@ -85,7 +85,8 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
     """With the boot gains the firmware's right wheel swings, rests, and keeps its last speed.
 
-    Half of all honest drives are below 2.4, and a few of these far beyond it.
+    The normalized squared error of half of the drives is below 2.4 if the covariance is right; a
+    few of these drives are far above.
     """
     seeds = range(1000, 1005)
     drives = [motion(wrong("firmware", seed), name, LoisEcuSettings()) for seed in seeds]
@@ -97,14 +98,16 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> Non
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again(
     seed: int,
 ) -> None:
-    """It fell from 41 to 20 RPM at a set-point of -19: not noticed, that was 600° in 15 s."""
+    """The wheel falls from 41 to 20 RPM at a set-point of -19. When this was not noticed, odometry
+    turned by 600° in 15 s."""
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
     assert one.sigmas < 3.5
 
 
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
-    """It kept 12 RPM at a set-point of -7, which is too fast for a wheel that rolls."""
+    """The board keeps reporting 12 RPM at a set-point of -7, which is too fast for a wheel that
+    rolls: it is at rest."""
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
     assert one.sigmas < 3.5
@@ -114,7 +117,8 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     ("name", "seed"), [("straight back", 9001), ("straight back", 9025), ("curve back", 9013)]
 )
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
-    """A wheel at 46 RPM for 34, and wheels that overshoot and then roll at a steady speed."""
+    """The drives have a wheel that rolls at 46 RPM instead of 34, and wheels that overshoot and
+    then roll at a steady speed."""
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
     assert one.sigmas < 3.0

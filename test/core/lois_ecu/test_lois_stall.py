@@ -95,7 +95,8 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """It kept a speed near its set-point when it fell to standstill, so it gets no power."""
+    """The board kept reporting a speed near the set-point when the wheel came to rest, so the wheel
+    gets no power."""
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
     assert not looks_stalled(still, targets=(-19, -19))

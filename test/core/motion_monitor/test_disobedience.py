@@ -75,7 +75,8 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """Two displacements are needed, and the one that began before, at any phase."""
+    """The monitor needs two displacements after the one in which the deviation began, at any
+    phase."""
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
         bench.run(phase * TICK_S)
@@ -87,7 +88,8 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """The loss in the long displacement must not explain the driving back as wind-up."""
+    """The distance lost in the long displacement must not count as wind-up that explains the motion
+    back."""
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)

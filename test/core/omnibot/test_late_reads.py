@@ -17,8 +17,8 @@ from omnibot_driver.core.omnibot.frames import Frame
 Reads = Iterator[tuple[bytes, float]]
 
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
-"""Durations of a stop in s: a line is idle for 8.8 ms, or seems idle for multiples of 10 ms where
-frames are lost."""
+"""Durations of a stop in s. A line is idle for 8.8 ms between two ticks; lost frames make that
+longer by multiples of 10 ms."""
 
 
 def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:

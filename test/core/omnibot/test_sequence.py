@@ -54,7 +54,8 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """As a gap, a count of 0 would take (255 - count) x 40 ms, which is not two seconds."""
+    """If the count of 0 ended a gap, the gap would last (255 - count) x 40 ms, which is not two
+    seconds."""
     assert begun(count).delta(0, 102.0).restarted
 
 
@@ -107,7 +108,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_no_gap() -> None:
-    """As a gap it would be longer than the time since the last delta."""
+    """If it were a gap, the gap would be longer than the time since the last delta."""
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)

@@ -66,7 +66,7 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """All reads were late for some seconds, each by too little to be noticed."""
+    """For some seconds every read is late, each by too little to be noticed."""
     _, late_s = followed(
         0.0,
         lambda tick: 0.9e-3 if tick in late else 0.0,

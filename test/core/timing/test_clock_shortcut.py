@@ -85,7 +85,8 @@ surprises = st.tuples(
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """They follow a normal start, which enables the shortcut; everything after them is late."""
+    """The surprises follow a normal start, which enables the shortcut; all reads after them are
+    late."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:

@@ -30,7 +30,7 @@ def test_every_quirk_has_its_sight() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """All other quirks are on, as in the public firmware."""
+    """The detector finds the quirk if it is on, and not if only this quirk is off."""
     assert SEEN[name](FIRMWARE)
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
@@ -38,7 +38,7 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
 def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
-    """All other quirks are off, as well."""
+    """The detector finds nothing on a board as documented, which has none of the quirks."""
     assert not SEEN[name](DOCUMENTED)
 
 

@@ -37,7 +37,7 @@ class Ecu:
             return action(self.served.board)
 
     def stands_for_good(self) -> None:
-        """For a second and a half."""
+        """Wait until the robot has been at rest for 1.5 s."""
         since: list[int] = []
 
         def stood(board: SimulatedLois) -> bool:
@@ -57,7 +57,7 @@ def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
 
 @contextmanager
 def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Commanded ten times a second; begins when it moves."""
+    """Command this motion at 10 Hz inside the context, which begins when the robot moves."""
     with probe.commanding(vx, yaw):
         ecu.wait_for(lambda board: not board.standing)
         yield

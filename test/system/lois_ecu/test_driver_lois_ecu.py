@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a LOIS ECU on a real pseudo-terminal: it drives, and what should stop it does."""
+"""The driver with a LOIS ECU on a real pseudo-terminal: how the robot is driven and stopped."""
 
 import math
 import signal
@@ -38,14 +38,14 @@ GAINS: Final = {
     "right_tn": 0.232542,
     "right_td": 0.60868,
 }
-"""Of docs/boards/lois_ecu.md: with them no wheel swings."""
+"""Gains of docs/boards/lois_ecu.md, with which the wheels do not swing."""
 
 
 def test_it_drives_and_odometry_tells_how_far(
     ecu: Ecu, start_driver: Start, probe_of: Start
 ) -> None:
-    """A metre on, within 4 cm; commands that cease stop it. With the gains of the boot it swerves:
-    what that does to the odometry is measured in simulated time."""
+    """Odometry is within 4 cm after 1 m, and the robot stops when the commands cease. With the
+    board's own gains the robot swerves; other tests measure that in simulated time."""
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
     probe.wait_for_state("nominal")
     ecu.wait_for(lambda board: board.wheels[1].controller.gains.kp == pytest.approx(0.470583))
@@ -68,7 +68,7 @@ def test_it_drives_and_odometry_tells_how_far(
 
 
 def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None:
-    """Although commands go on."""
+    """The robot stays at rest although commands continue to arrive."""
     with driven(probe, ecu):
         assert probe.call(SetBool, "estop", data=True).success
         ecu.stands_for_good()
@@ -80,7 +80,7 @@ def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     ecu: Ecu, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """Its own exit, or the guard."""
+    """Either the exit of the driver stops the robot, or the guard process does."""
     with driven(probe, ecu):
         driver.process.send_signal(number)
         ecu.stands_for_good()
@@ -92,7 +92,8 @@ def test_whatever_ends_the_driver_stops_it(
 def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """Only the service releases it. Before the first press nothing is said of the button."""
+    """Only the service releases the e-stop. The driver publishes no button state before the first
+    press."""
     button = probe.listen(Bool, "estop_button", latched=True)
     latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)
     with driven(probe, ecu):
@@ -111,7 +112,7 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """It forgets its low-pass; odometry goes on."""
+    """The board forgets its low-pass, which the driver writes again; odometry continues."""
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.4)
@@ -128,7 +129,7 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 
 
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
-    """After it the robot drives again; odometry goes on."""
+    """After the reset the robot can be driven again, and odometry continues."""
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.6)
@@ -141,7 +142,7 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 
 
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
-    """Nothing else is written that the user did not set."""
+    """The driver does not write settings that the user has not set."""
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.5)
@@ -158,7 +159,7 @@ def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, pr
 
 @pytest.mark.parametrize("firmware", QUIRKS)
 def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe_of: Start) -> None:
-    """``sim://`` is this board's simulator."""
+    """The port ``sim://`` selects the simulator of this board."""
     driver = start_driver(f"sim://?firmware={firmware}", board="lois_ecu")
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -178,7 +179,7 @@ def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe
 def test_a_record_is_a_file_and_an_estop_ends_one(
     start_driver: Start, probe_of: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The answer is its path; what was not recorded whole leaves nothing."""
+    """The service answers with the path of the file; an incomplete record leaves no file."""
     ecu = ecu_of("firmware", stack, running=True)
     folder = tmp_path / "records"
     driver = start_driver(

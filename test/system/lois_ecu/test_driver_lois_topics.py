@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a LOIS ECU on a real pseudo-terminal: what this board alone has."""
+"""The driver with a LOIS ECU on a real pseudo-terminal: topics and services that only this board
+has."""
 
 import math
 from collections.abc import Callable
@@ -26,7 +27,7 @@ NODE: Final = "omnibot_driver"
 
 
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
-    """A ball is asked for once."""
+    """The driver sends the ball command only once."""
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
     assert probe.call(SetBool, "led", data=False).success
@@ -38,7 +39,8 @@ def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
 def test_gps_time_and_heading_are_published_where_the_board_tells_them(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """In ENU: the robot looks east, and magnetic north is ahead by the declination."""
+    """By the compass the robot points east; a declination of 0.1 rad turns the heading in ENU by
+    -0.1 rad."""
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
         ecu.path, board="lois_ecu", date_period=0.5, time_period=0.5, magnetic_declination=0.1
@@ -61,7 +63,7 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 def test_a_fix_of_the_public_firmware_is_none(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """It sends zeros."""
+    """This firmware sends zeros in place of a position."""
     probe: Probe = probe_of(start_driver(ecu_of("firmware", stack).path, board="lois_ecu"))
     fixes = probe.listen(NavSatFix, "fix")
     probe.wait_for(lambda: fixes)
@@ -71,7 +73,7 @@ def test_a_fix_of_the_public_firmware_is_none(
 def test_duties_are_commanded_in_duty_mode_alone(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """Limited by max_duty, and they expire like other commands."""
+    """Duties are limited by max_duty, and expire like other commands."""
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
     probe: Probe = probe_of(driver)
@@ -89,9 +91,9 @@ def test_duties_are_commanded_in_duty_mode_alone(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """Both are parameters of a driver that runs; what they need is there and goes with them.
+    """Both modes can be set while the driver runs; their topics appear and disappear with them.
 
-    The public firmware passes on both sensors in either mode, and here they speak at once.
+    The public firmware forwards both sensors in either mode; here both send at the same time.
     """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
@@ -112,7 +114,8 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 
 
 def recorded(robot: Any) -> Path:
-    """A busy machine may stop the robot, and the tool then says that the user should call again."""
+    """Return the path of a record; request it again if the robot was stopped because this computer
+    is busy."""
     for _ in range(10):
         try:
             return Path(robot.record("record_rpm", "wheel_cmd", [3.0, 3.0]))
@@ -125,8 +128,8 @@ def recorded(robot: Any) -> Path:
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     start_driver: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The file has the ticks of both wheels from their start on; a refusal is passed on as it
-    is."""
+    """The file has the ticks of both wheels from the start of the motion; the driver's refusal is
+    shown unchanged."""
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(
         ecu.path,
