@@ -118,7 +118,10 @@ def _said(command: Command) -> tuple[int, int]:
             return setting, from_float(number)
         case SetPeriod(stream, period_ms):
             if not 0 < period_ms <= PERIOD_OFF:
-                raise FrameError(f"{period_ms} ms is not a period: 1 to 65533, 0xfffe or 0xffff")
+                raise FrameError(
+                    f"a period of {period_ms} ms is not possible: it must be 1 to"
+                    " 65533, 0xfffe (once) or 0xffff (off)"
+                )
             return stream, period_ms
     form = _BY_KIND[type(command)]
     fields: Any = (getattr(command, name) for name in command.__match_args__)
@@ -129,7 +132,7 @@ def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
     """Decode one line from a host. Raises FrameError if it is not a command."""
     line = line_of(data, sum_required=with_sum)
     if line is None or (not with_sum and len(data.replace(b"\r", b"")) != 12):
-        raise FrameError(f"not one whole line: {data!r}")
+        raise FrameError(f"not exactly one line: {data!r}")
     form = _BY_CODE.get(line.command)
     try:
         if form is not None:
@@ -139,8 +142,8 @@ def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
         if line.command in Stream.__members__.values():
             return SetPeriod(Stream(line.command), line.payload & 0xFFFF)
     except ValueError as error:
-        raise FrameError(f"no value of this command: {data!r}") from error
-    raise FrameError(f"no command that a host sends: {data!r}")
+        raise FrameError(f"not a valid value for this command: {data!r}") from error
+    raise FrameError(f"not a command that a host sends: {data!r}")
 
 
 def encode_report(report: Report) -> bytes:

@@ -193,4 +193,4 @@ def decode(data: bytes, pose_byte_order: ByteOrder = "big") -> Frame | CommandFr
     if data[:2] == COMMAND_HEADER and len(data) == _COMMAND.size:
         _, mode, a, b, c = _COMMAND.unpack(data)
         return CommandFrame(mode, (a, b, c))
-    raise FrameError(f"not one whole frame of this board: {data.hex(' ') or 'no bytes'}")
+    raise FrameError(f"not exactly one frame of this board: {data.hex(' ') or 'no bytes'}")

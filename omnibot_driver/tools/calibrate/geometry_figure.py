@@ -31,7 +31,7 @@ def draw(
         left.plot(was[:, 0], was[:, 1], ":", color=colour)
         left.plot(now[:, 0], now[:, 1], color=colour, label=one.name)
         left.errorbar(*one.end[:2], *one.sigma[:2], fmt="x", ms=9, mew=2, color=colour)
-    left.plot([], [], ":", color="grey", label="as odom had it")
+    left.plot([], [], ":", color="grey", label="by odom before")
     left.plot([], [], "x", color="grey", label="by the tape")
     left.set(title="Drives, with the geometry found", xlabel="forward, m", ylabel="left, m")
     left.set_aspect("equal")

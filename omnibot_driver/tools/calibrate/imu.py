@@ -139,7 +139,7 @@ def draw(figure: "Figure", found: Rest, imu: Imu) -> None:
         forces.plot(seconds[::step], off, ".", ms=1, color=colour)
     rates.set(title="Gyro at rest, and its bias", ylabel="°/s")
     rates.legend(loc="upper right")
-    forces.set(title="Accelerometer less its mean", ylabel="m/s²", xlabel="s")
+    forces.set(title="Accelerometer minus its mean", ylabel="m/s²", xlabel="s")
     right = figure.add_subplot(grid[:, 1])
     for axis, colour, curve, noise in zip(AXES, COLOURS, found.curves, found.noises, strict=True):
         right.errorbar(
@@ -151,7 +151,7 @@ def draw(figure: "Figure", found: Rest, imu: Imu) -> None:
             label=f"{axis}: {math.degrees(noise.density):.4f} °/s/√Hz",
         )
         right.plot(curve.tau_s, np.degrees(noise.deviation(curve.tau_s)), color=colour)
-    right.set(title="Allan deviation of the gyro", xlabel="averaged over, s", ylabel="°/s")
+    right.set(title="Allan deviation of the gyro", xlabel="averaging time, s", ylabel="°/s")
     right.set(xscale="log", yscale="log")
     right.grid(which="both", alpha=0.3)
     right.legend()

@@ -42,8 +42,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     for _seconds, (x, y, yaw) in steps:
         if max(abs(x), abs(y)) > linear or abs(yaw) > turning:
             raise ToolError(
-                "one count of the board is faster than allowed: raise --speed or --turning, and"
-                " max_linear_speed or max_angular_speed"
+                "the smallest command of the board is faster than allowed: raise --speed or"
+                " --turning, and max_linear_speed or max_angular_speed"
             )
     way_m = linear * step_s
     console.confirm(
@@ -141,5 +141,5 @@ def draw(
     ):
         axes[0, column].set(title=f"{name}: {one.value:.2f} ± {one.sigma:.2f}", ylabel=unit)
         axes[0, column].legend()
-        axes[1, column].set(xlabel="commanded, LSB", ylabel=f"left over, m{unit}")
+        axes[1, column].set(xlabel="commanded, LSB", ylabel=f"residual, m{unit}")
         axes[1, column].axhline(0.0, color="grey", lw=0.8)

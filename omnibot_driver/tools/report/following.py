@@ -213,11 +213,11 @@ def _stalled(stalls: list[Span]) -> Iterator[Finding]:
         yield Finding(
             Level.BAD,
             "Commands",
-            f"Commanded to move, the robot stood still {counted(len(stalls), 'time')},"
-            f" {span(sum(item.length_s for item in stalls))} in all, first at"
-            f" {stalls[0].begin_s:.1f} s.",
-            "Check the motors' power, the board's own e-stop and its switch (velocity control), and"
-            " whether something blocks the wheels.",
+            "The robot stood still although it was commanded to move:"
+            f" {counted(len(stalls), 'time')}, {span(sum(item.length_s for item in stalls))} in"
+            f" all, first at {stalls[0].begin_s:.1f} s.",
+            "Check the motors' power, the board's own e-stop and its switch (velocity control),"
+            " and that nothing blocks the wheels.",
         )
 
 
@@ -229,8 +229,8 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
         f"{pair.axes[axis]} {found.gains[axis]:.2f} (±{found.error[axis]:.2g})" for axis in told
     )
     figure = (
-        f"{pair.topic} is followed {1e3 * found.lag_s:.0f} ms late; measured over commanded:"
-        f" {figures}"
+        f"{pair.topic} is followed with a lag of {1e3 * found.lag_s:.0f} ms; measured divided by"
+        f" commanded: {figures}"
     )
     off = [axis for axis in told if abs(found.gains[axis] - 1.0) > TOLERANCE]
     if not off:
@@ -241,8 +241,8 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
     else:
         scales = sorted({pair.scales[axis] for axis in off})
         advice = (
-            f"If the commands are within the limits max_…, divide {' and '.join(scales)} by that,"
-            " and check with a tape measure."
+            f"If the commands are within the limits max_…, divide {' and '.join(scales)} by these"
+            " ratios, and check with a tape measure."
         )
     yield Finding(Level.WARN, "Commands", f"{figure}.", advice)
 
@@ -270,5 +270,6 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
             "Commands",
             f"The robot moved {counted(len(untold), 'time')} without a command, first at"
             f" {untold[0].begin_s:.1f} s.",
-            "Was it pushed or driven by a topic that was not recorded? If not, see docs/safety.md.",
+            "If it was not pushed, nor driven by a topic that was not recorded, see"
+            " docs/safety.md.",
         )

@@ -120,7 +120,7 @@ def inertia(log: Log) -> Figure:
     middle = np.median(imu.values, axis=0) * ([0.0] * 3 + [1.0] * 3)
     for axes, first, unit, title in (
         (rows[0], 0, "rad/s", "Angular velocity, in the sensor's axes"),
-        (rows[1], 3, "m/s²", "Specific force, less the median"),
+        (rows[1], 3, "m/s²", "Specific force minus its median"),
     ):
         shade(axes, log)
         for column, colour in zip(range(first, first + 3), (X, Y, Z), strict=True):
@@ -189,8 +189,8 @@ def timing(log: Log) -> Figure:
                 values, bins, orientation="horizontal", color=colour, alpha=0.55, density=True
             )
         grid[row, 0].set_ylim(low - 0.04 * (high - low), high + 0.18 * (high - low))
-    dress(grid[0, 0], "ms", "Step between stamps, less the usual one")
-    dress(grid[1, 0], "ms", "Arrival after the stamp, over the least delay")
+    dress(grid[0, 0], "ms", "Step between stamps minus the median step")
+    dress(grid[1, 0], "ms", "Delay of arrival above the smallest delay")
     for axes in grid[:, 1]:
         dress(axes, "", "Distribution")
         axes.set_xticks([])

@@ -160,7 +160,7 @@ def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
             Level.BAD,
             "Timing",
             f"{counted(unstamped, 'message')} of {stream.name} without a stamp.",
-            "Find out who publishes it: this driver stamps all.",
+            "Find out who publishes it: this driver stamps all its messages.",
         )
     if len(rhythm.steps_s) < FEWEST:
         yield Finding(
@@ -203,7 +203,10 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         Level.WARN if off else Level.GOOD,
         "Timing",
         f"{stream.name} comes at {rate_hz:.2f} Hz; it should be {stream.rate_hz:g}.",
-        "Two publishers, a filter in between or a recorder that drops many would do this."
+        (
+            "Possible causes are two publishers, a filter in between, or a recorder that drops many"
+            " messages."
+        )
         if off
         else "",
     )
@@ -258,7 +261,8 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         yield Finding(
             Level.WARN,
             "Timing",
-            f"{stream.name} arrives {middle_s:.3g} s after its stamp, at least {least_s:.3g} s.",
+            f"{stream.name} arrives {middle_s:.3g} s after its stamp (median), and never sooner"
+            f" than {least_s:.3g} s.",
             "The recorder's clock is not the driver's: synchronise them (chrony), or record there.",
         )
     over_s, most_s = mean_s - least_s, float(np.quantile(rhythm.late_s, 0.99)) - least_s
@@ -266,8 +270,8 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     yield Finding(
         Level.WARN if late else Level.GOOD,
         "Timing",
-        f"{stream.name} arrives {1e3 * over_s:.2f} ms later than at best on average,"
-        f" and by less than {1e3 * most_s:.1f} ms in 99 of 100 cases.",
+        f"{stream.name} arrives {1e3 * over_s:.2f} ms later than at best on average, and less than"
+        f" {1e3 * most_s:.1f} ms later in 99 of 100 cases.",
         "Set the adapter's latency_timer to 1 (udev/99-omnibot.rules), or reduce the load of the"
         " computer."
         if late

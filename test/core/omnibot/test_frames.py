@@ -224,7 +224,7 @@ def test_a_value_that_does_not_fit_its_field_is_refused(frame: Frame | CommandFr
 def test_a_part_of_a_frame_is_not_a_frame(frame: Frame | CommandFrame, length: int) -> None:
     """A frame that is cut anywhere is refused."""
     data = encode(frame)
-    with pytest.raises(FrameError, match="not one whole frame"):
+    with pytest.raises(FrameError, match="not exactly one frame"):
         decode(data[: min(length, len(data) - 1)])
 
 
@@ -234,7 +234,7 @@ def test_a_frame_and_something_more_is_not_a_frame(
 ) -> None:
     """The extra bytes may be in front or behind."""
     data = encode(frame)
-    with pytest.raises(FrameError, match="not one whole frame"):
+    with pytest.raises(FrameError, match="not exactly one frame"):
         decode(data + more)
 
 
