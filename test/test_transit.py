@@ -147,7 +147,7 @@ def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
 
 @given(st.floats(1.0, 1e6))
 def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
-    """Its next late command is refused by the new clock."""
+    """A later late command is refused: its age is judged by the new clock."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(100):
         now_s += 0.1

@@ -17,7 +17,7 @@ def bench() -> Bench:
 
 
 def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
-    """A booting board ignores its first bytes; the sequence must not cut a command."""
+    """A booting board ignores the first bytes; it must not act on the rest of a cut command."""
     bench = Bench(BoardSettings(boot_time_s=2.0))
     bench.open()
     bench.run(1.25)

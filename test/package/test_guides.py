@@ -67,7 +67,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 @pytest.mark.parametrize("template", sorted(set(told())))
 def test_what_the_driver_tells_is_explained(template: str) -> None:
-    """A sentence of the guide is contained in the message, or has the same beginning."""
+    """A sentence of the guide has the message's beginning, or all its parts are in the message."""
     begin = next((part for part in template.split(GAP) if len(part) > 9), template)
     assert any(
         begin in sentence or all(part.strip() in template for part in GAPS.split(sentence))

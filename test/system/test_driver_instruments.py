@@ -182,9 +182,9 @@ def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> No
 def test_who_does_not_want_transforms_hears_nothing_of_tf(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """An EKF, which publishes its own transforms, is one example.
+    """With ``publish_tf: false`` the driver does not warn that tf2_ros is missing.
 
-    Simulated time on a real port is reported separately.
+    It still warns of simulated time on a real port.
     """
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but the board on /dev/null runs in real time")

@@ -66,7 +66,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
     ("what", "sentence"),
     [
         ("estop", "the e-stop is latched"),
-        ("reboot", "the driver's state is or was"),
+        ("reboot", "the driver reported the state"),
         ("other", "another node commands the robot on cmd_vel"),
         ("wheels", "another node commands the robot on wheel_cmd"),
         ("signal", "interrupted; the robot is stopped"),

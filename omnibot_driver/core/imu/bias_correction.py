@@ -13,7 +13,7 @@ from omnibot_driver.core.values import value
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuCorrection:
-    """Biases in rad/s and m/s²; ``auto_gyro_bias``: standstills may refine the gyro's."""
+    """Biases in rad/s and m/s²; ``auto_gyro_bias``: whether standstills refine the gyro's bias."""
 
     gyro_bias: Vector3 = (0.0, 0.0, 0.0)
     accel_bias: Vector3 = (0.0, 0.0, 0.0)

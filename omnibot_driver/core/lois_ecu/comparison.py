@@ -151,7 +151,7 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Take back what a wheel seemed to roll since its reported speed changed last."""
+        """Take back the wheel's distance since its reported speed last changed: it stood still."""
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:

@@ -234,11 +234,11 @@ class LoisConversation:
             self._translation.odometry.wrote(command, now)
 
     def stop(self) -> bytes:
-        """Return duty 0/0."""
+        """Return the Stop command, which is duty 0/0."""
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """Return RPM 0/0, which alternates with Stop, as the board does not latch an e-stop.
+        """Return RPM 0/0, sent in turn with Stop, as the board does not latch an e-stop.
 
         In a terminal mode the result is empty and only Stop is sent: the public firmware passes all
         characters that it receives on to the sensor, and reads at most 480 characters a second.

@@ -61,7 +61,7 @@ class ReportedSpeed:
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """The wheel is at rest since its reported speed changed last: take back its way."""
+        """Take back the distance since the reported speed last changed, when the wheel stopped."""
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
             return

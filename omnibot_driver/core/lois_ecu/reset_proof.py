@@ -44,7 +44,8 @@ class ResetProof:
             self._waits_since_s, self._seen = math.inf, None
 
     def look(self, ticks: Ticks, now: float) -> bool:
-        """Return whether the counts are near zero, with a proof or after the wait for one."""
+        """Return whether the counts are near zero, and the reset is proven or the wait for that
+        over."""
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks
         if _largest(ticks) > FEW_TICKS:

@@ -96,9 +96,10 @@ class StallWatch:
         return left, right
 
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
-        """Return whether this wheel's reported speed is one that the board keeps.
+        """Return whether the board keeps reporting an old speed for this wheel.
 
-        It is if it repeats, and the other wheel's speed has changed or this one is far too fast.
+        It does if the speed repeats, and either the other wheel's speed has changed or this speed
+        is far above the set-point.
         """
         if told is None or self._told is None:
             return False

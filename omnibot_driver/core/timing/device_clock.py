@@ -106,7 +106,7 @@ class DeviceClock:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None = WHOLE
     ) -> list[float]:
-        """Return the sampling time in s of each of the readings that one read at ``now`` completed.
+        """Return the sampling times in s of the readings that a read at ``now`` completed.
 
         ``edge``: where the read ended among the samples, None if unknown. From tick to tick stamps
         increase, and none is later than ``now``; a displacement has the stamp of its tick's

@@ -104,8 +104,8 @@ class Listener(Client):
         for state in self._states:
             if state not in states:
                 raise ToolError(
-                    f"the driver's state is or was {state}, not {' or '.join(states)}: see what it"
-                    " logs; ~/start starts a paused board"
+                    f"the driver reported the state {state}, but {' or '.join(states)} is needed:"
+                    " see what it logs; ~/start starts a paused board"
                 )
         if lost := self._lost():
             raise ToolError(

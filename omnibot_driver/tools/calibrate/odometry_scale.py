@@ -119,7 +119,7 @@ def _measure(console: Console, drive: Drive, path: Column, arguments: argparse.N
         sigma = math.radians(arguments.angle)
         return Ratio(drive, last.yaw_rad - first.yaw_rad, true, sigma)
     come_mm = console.number(
-        "How far has the robot's centre come", "mm", 1.0, 3000.0 * arguments.side
+        "How far did the robot's centre move", "mm", 1.0, 3000.0 * arguments.side
     )
     return Ratio(drive, first.way_to(last).way_m, come_mm / 1000.0, arguments.tape / 1000.0)
 

@@ -94,8 +94,8 @@ def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damag
     """Any line may be damaged; a group stays valid if only its last line arrives a second time.
 
     A GPS fix is different: it waits for the next line, and a second copy of its last line discards
-    it. A line of another odometry group could pass for one of this group. Damage does not move
-    lines, so this case is left out.
+    it. A line of another odometry group in place of one of this group could not be noticed. Damage
+    does not move lines, so this is not tested.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]

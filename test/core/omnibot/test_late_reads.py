@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Late readers: a read is not an arrival, so a late read loses nothing of a good line."""
+"""Late reads: bytes wait in the computer until they are read, so none of them is lost."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence

@@ -134,7 +134,7 @@ def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
 
 
 def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
-    """Read in the wrong byte order, poses are useless while deltas come for days."""
+    """Deltas may arrive for days while no pose is valid: the stored data must not grow."""
     suspicion = MisconfigurationChecks()
     zero, absurd = PoseFrame(0.0, 0.0, 0.0, 1), PoseFrame(1e-30, 1e-30, 1e-30, 1)
     suspicion.posed(zero, PoseReading(0.0, 0.0, 0.0), "big")

@@ -217,7 +217,8 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """After two bytes during the boot, one or three more are consumed afterwards."""
+    """After two bytes during the boot, the wake-up takes one more, or three if those are not
+    counted."""
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()
