@@ -10,7 +10,7 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
 STANDS_AFTER_S: Final = 0.6
-"""Time in s without a tick that shows a wheel at rest; the slowest, at 2 RPM, ticks each 0.5 s."""
+"""Time in s without a tick that shows a wheel at rest; the slowest, at 2 RPM, ticks every 0.5 s."""
 TRAITS: Final = Traits(
     imu_period_s=None,
     authorities=frozenset({Authority.BASE, Authority.WHEELS}),

@@ -17,7 +17,7 @@ def pose(x_m: float) -> BoardOdometry:
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
     """Return the times in s, out of six seconds, at which a wheel looked stalled.
 
-    ``ticks``, ``ways_m``: ticks of both wheels, and distance in m by 0x20, in each 0.2 s.
+    ``ticks``, ``ways_m``: ticks of both wheels, and distance in m by 0x20, for every 0.2 s.
     """
     watch = StallWatch()
     watch.wrote(command, 0.0)
