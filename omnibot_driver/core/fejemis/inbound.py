@@ -48,6 +48,7 @@ class Inbound:
         """Begin new connections: forget the mode, the angle to relay, and all timeouts."""
         self.mode = Mode.UNKNOWN
         self.relay_rad: float | None = None
+        self._front_unheard = True
         self.watch.begin()
 
     def take_relay(self) -> float | None:
@@ -77,13 +78,16 @@ class Inbound:
     def look(self, now: float, *, driving: bool) -> None:
         """Act on elapsed time, and update the mode; ``driving``: a motion is commanded."""
         machine = self._upkeep.machine
+        was_unheard, self._front_unheard = self._front_unheard, now >= self.watch.front_unheard_at
         if self.watch.look(now, driving=driving):
             machine.off()
-        elif machine.active and now >= self.watch.front_unheard_at:
+        elif machine.active and self._front_unheard:
             machine.off()
             self._told.tell(
                 "no data from the front board for 0.25 s; brush and lift switched off", now
             )
+        elif was_unheard and not self._front_unheard:
+            machine.off()  # the board may not have received it before
         if not self._ports.ready:
             self.mode = Mode.UNKNOWN
         else:

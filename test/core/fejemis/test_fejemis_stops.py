@@ -314,6 +314,21 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
     assert any("brush and lift switched off" in text for text in bench.notices)
 
 
+@pytest.mark.parametrize("seconds", [0.7, 3.0])
+def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(seconds: float) -> None:
+    """A board that neither obeys nor sends for a time continues with its last commands."""
+    bench = nominal()
+    bench.board.services.set_brush(True, bench.now)
+    bench.settle()
+    bench.run(0.5)
+    bench.robot.front.hung = True
+    bench.run(seconds)
+    assert bench.robot.vehicle.brush
+    bench.robot.front.hung = False
+    bench.run(0.5)
+    assert not bench.robot.vehicle.brush
+
+
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
     """One line may be lost, and the driver cannot repeat it after the exit."""
     bench = nominal()
