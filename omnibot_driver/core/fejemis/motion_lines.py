@@ -24,7 +24,9 @@ SLOWEST_MPS: Final = 2e-4
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Relative speed error of a line that is tolerated."""
-ANGLE_WITHIN_RAD: Final = 0.003
+ANGLE_COST: Final = 1e4
+"""Cost of an angle that is wrong by 1 rad, if numbers that are e times too large have a cost of 1.
+"""
 SLOWEST: Final = 30.0
 """Largest ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
 SCALES: Final = 4.0
@@ -56,8 +58,8 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
     for number, text in around(speed):
         turn_number, turn_text = nearest(turn_deg * number / speed, negative=negative)
         told_rad = math.atan2(wheelbase_m * math.radians(turn_number), number)
-        off_rad = max(0.0, abs(told_rad - angle_rad) - ANGLE_WITHIN_RAD)
-        found.append((off_rad * 1e3 + _far(number, speed), text, turn_text))
+        off_rad = abs(told_rad - angle_rad)
+        found.append((ANGLE_COST * off_rad + _far(number, speed), text, turn_text))
     return _best(signs, found)
 
 
