@@ -37,6 +37,7 @@ WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
 """Shortest time between two published steering angles, in ns. The angle comes 66 times a second;
 joint states are for display."""
+NOT_CONNECTED: Final = "the boards are not connected; check their cables and ports"
 RANGES: Final = {
     "tof": Range.INFRARED,
     "sonar": Range.ULTRASOUND,
@@ -194,7 +195,7 @@ class FejemisTopics:
 
     def _on_brush(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         on = bool(request.data)
-        trouble = self._say("brush", lambda services, now: services.set_brush(on, now), needed=on)
+        trouble = self._say("brush", lambda services, now: services.set_brush(on, now), off=not on)
         response.success = not trouble
         sent = f"brush {'on' if on else 'off'} sent; the board does not confirm it"
         response.message = trouble or sent
@@ -205,7 +206,7 @@ class FejemisTopics:
         if not math.isfinite(volts):
             self._warn("lift_cmd rejected: contains NaN or infinity; fix the publishing node")
             return
-        self._try("lift_cmd", lambda services, now: services.lift(volts, now), needed=volts != 0.0)
+        self._try("lift_cmd", lambda services, now: services.lift(volts, now), off=volts == 0.0)
 
     def _on_led(self, message: ColorRGBA) -> None:
         parts = (message.r, message.g, message.b)
@@ -213,29 +214,26 @@ class FejemisTopics:
             self._warn("led_cmd rejected: contains NaN or infinity; fix the publishing node")
             return
         red, green, blue = (round(255 * max(0.0, min(1.0, part * message.a))) for part in parts)
-        self._try(
-            "led_cmd", lambda services, now: services.set_led(red, green, blue, now), needed=False
-        )
+        self._try("led_cmd", lambda services, now: services.set_led(red, green, blue, now))
 
-    def _try(self, what: str, action: Callable[[Services, float], None], *, needed: bool) -> None:
-        if trouble := self._say(what, action, needed=needed):
+    def _try(
+        self, what: str, action: Callable[[Services, float], None], *, off: bool = False
+    ) -> None:
+        if trouble := self._say(what, action, off=off):
             self._warn(trouble)
 
-    def _say(self, what: str, action: Callable[[Services, float], None], *, needed: bool) -> str:
+    def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
-        ``needed``: the action moves something, so the robot has to be nominal and without e-stop.
+        ``off``: the action switches something off, which is always possible.
         """
 
         def say(session: Session, now: float) -> str:
-            if session.state in ("disconnected", "connecting"):
-                return f"{what} refused: no data from the front board; connect it, then try again"
-            if needed and session.estop_active:
-                return f"{what} refused: the emergency stop is active; release it first (~/estop)"
-            if needed and session.state != "nominal":
-                return f"{what} refused: the robot is paused; call ~/start first"
+            board = cast(FejemisBoard, session.board)
+            if not off and session.state in ("disconnected", "connecting"):
+                return f"{what} refused: {board.refusal or NOT_CONNECTED}"
             try:
-                action(cast(FejemisBoard, session.board).services, now)
+                action(board.services, now)
             except (CommandRefused, RequestRefused) as error:
                 return str(error)
             return ""

@@ -51,6 +51,8 @@ class Interlocks:
         tripped = self._interlock.arrive(now, self._policy.settings.timeout_s, stands=stands)
         if self._policy.latched:
             return "the e-stop is latched; release it with the service ~/estop (data: false)"
+        if mode is Mode.UNKNOWN and (refusal := self._board.refusal):
+            return refusal
         if phase is not Phase.SETTLED:
             hint = "; call ~/start to run it" if phase is Phase.PAUSING else ""
             return f"the board is {phase.value}{hint}"

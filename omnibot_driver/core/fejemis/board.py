@@ -108,12 +108,8 @@ class FejemisBoard(Board):
             return "power is about to be cut"
         if job := self._upkeep.jobs.at_rest:
             return job
-        return (
-            self._ports.trouble
-            or self._upkeep.pending
-            or self._inbound.watch.refusal
-            or self._encoder.follower.refusal
-        )
+        watch, follower = self._inbound.watch, self._encoder.follower
+        return watch.refusal or self._upkeep.pending or follower.refusal
 
     @property
     def advice(self) -> str | None:

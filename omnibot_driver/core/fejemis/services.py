@@ -28,6 +28,10 @@ class Robot(Protocol):
         """The mode: nominal while both boards send data and the drive board obeys."""
 
     @property
+    def refusal(self) -> str:
+        """The reason why the robot must not be driven; empty if it may be."""
+
+    @property
     def driving(self) -> bool:
         """Whether a motion is commanded."""
 
@@ -48,7 +52,7 @@ class Services:
     def set_brush(self, on: bool, now: float) -> None:
         """Switch the brush on or off. Raises RequestRefused while the brush must not run."""
         if on and (reason := self._why_not_turn()):
-            raise RequestRefused(f"brush not switched on: {reason}")
+            raise RequestRefused(f"brush refused: {reason}")
         self._upkeep.machine.set_brush(on)
 
     def lift(self, volts: float, now: float) -> None:
@@ -72,9 +76,8 @@ class Services:
         """
         robot, moving = self._robot, self._odometry.moving
         if robot.mode is Mode.UNKNOWN:
-            raise RequestRefused(
-                f"{job.value} refused: no data from one of the boards; check both cables"
-            )
+            reason = robot.refusal or "no data from the boards; check both cables"
+            raise RequestRefused(f"{job.value} refused: {reason}")
         if robot.driving and job is not Job.LOAD:
             raise RequestRefused(
                 f"{job.value} refused: the robot is commanded; stop the sender, then call again"
@@ -98,7 +101,9 @@ class Services:
 
     def _why_not_turn(self) -> str:
         if self._obedience.estopped:
-            return "the e-stop is latched; release it first"
-        if self._robot.mode is not Mode.NOMINAL:
-            return f"the board is {self._robot.mode.value}"
+            return "the e-stop is latched; release it first (~/estop)"
+        if self._robot.mode is Mode.PAUSED:
+            return "the robot is paused; call ~/start first"
+        if self._robot.mode is Mode.UNKNOWN:
+            return self._robot.refusal or "no data from the boards; check both cables"
         return ""

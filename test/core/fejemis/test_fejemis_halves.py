@@ -5,7 +5,8 @@
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
-from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.fejemis.readings import Job
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware, SimulatedFejemis
 
@@ -52,6 +53,12 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
     bench.run(2.0)
     assert bench.session.state == "connecting"
     assert any(f"the {half} board is silent" in text for text in bench.notices)
+    with pytest.raises(CommandRefused, match=f"check the {half} board"):
+        bench.drive()
+    with pytest.raises(RequestRefused, match=f"check the {half} board"):
+        bench.board.services.set_brush(True, bench.now)
+    with pytest.raises(RequestRefused, match=f"check the {half} board"):
+        bench.board.services.ask(Job.SAVE, None, bench.now)
     assert_stands(bench)
     bench.speaks = {DRIVE, FRONT}
     bench.run_until(lambda: bench.session.state == "nominal")
@@ -122,7 +129,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
     bench.run(6.0)
     assert sum(sentence in text for text in bench.notices) == 1
     assert bench.session.state == "connecting"
-    with pytest.raises(CommandRefused):
+    with pytest.raises(CommandRefused, match=sentence):
         bench.drive()
 
 
