@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from omnibot_driver.core.fejemis.half import Role
-from omnibot_driver.core.fejemis.messages import Message, Status, Words
+from omnibot_driver.core.fejemis.messages import Battery, Message, Status, Words
 
 ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
     "drive": (
@@ -69,3 +69,5 @@ class Polls:
             self.told[message.keyword] = " ".join(f"{number:g}" for number in message.numbers)
         elif isinstance(message, Words):
             self.told[message.keyword] = message.text
+        elif isinstance(message, Battery):
+            self.told["bat"] = f"{message.volts:g} {message.amps:g} {message.cells}"

@@ -85,7 +85,7 @@ HEARD: dict[str, str] = {
     "time": "diagnostics time",
     "amp": "diagnostics amp",
     "cur": "diagnostics cur",
-    "bat": "topic battery_state",
+    "bat": "topic battery_state of drive, diagnostics bat of both",
     "cvdrive": "diagnostics cvdrive",
     "cpdrive": "diagnostics cpdrive",
     "cvsteer": "diagnostics cvsteer",
@@ -157,6 +157,16 @@ def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
         t.decode()[:-1] for table in (CONFIGURED, POLLED) for ts in table.values() for t in ts
     }
     assert keyword in asked
+
+
+def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
+    """The front board's ``bat``, for example, has no topic, so diagnostics show it."""
+    bench = nominal()
+    bench.run(6.5)
+    shown = bench.board.figures.own
+    for half, text in (("drive", DRIVE_HELP), ("front", FRONT_HELP)):
+        for keyword in listed(text)[1] - STREAMS[half].keys():
+            assert f"{half.capitalize()} {keyword}" in shown
 
 
 def said_by_the_driver() -> set[str]:
