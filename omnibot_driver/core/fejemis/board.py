@@ -169,7 +169,11 @@ class FejemisBoard(Board):
         self._upkeep.machine.off()
 
     def stalled(self) -> None:
-        """Switch brush and lift off after a stall, as the guard process may have done so."""
+        """Switch brush and lift off after a stall, as the guard process may have done so.
+
+        Do not regard the boards as silent during the stall.
+        """
+        self._inbound.watch.stalled()
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 

@@ -32,8 +32,13 @@ class Watch:
 
     def begin(self) -> None:
         """Forget earlier timeouts, as new connections begin."""
-        self.blind = self.unposed = False
+        self.blind = self.unposed = self._stalled = False
         self._begun_at = math.inf
+        self._patient_until = -math.inf
+
+    def stalled(self) -> None:
+        """Note that this process stalled, so that boards are not regarded as silent for it."""
+        self._stalled = True
 
     def open(self, now: float) -> None:
         """Note that the ports are open at ``now``; only the first call counts."""
@@ -41,6 +46,8 @@ class Watch:
 
     def look(self, now: float, *, driving: bool) -> bool:
         """Add notices of timeouts that stop the robot; return whether a board was lost."""
+        if self._stalled:
+            self._stalled, self._patient_until = False, now + SILENT_S
         lost = [self._look_at(channel, now) for channel in (0, 1)]
         self._look_at_age(now, driving=driving)
         return any(lost)
@@ -78,7 +85,7 @@ class Watch:
         unheard_s = now - half.came_at(NEEDED[role])
         if unheard_s < FLOWS_S:
             half.ready = half.heartbeat is not None
-        elif half.ready and unheard_s > SILENT_S:
+        elif half.ready and unheard_s > SILENT_S and now >= self._patient_until:
             what = "is silent" if silent else f"no longer sends `{NEEDED[role]}`"
             self._told.halt(
                 f"the {role} board {what}; robot stopped. Check its power and the cable at"

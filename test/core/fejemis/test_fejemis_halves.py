@@ -67,6 +67,21 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
     assert not bench.robot.standing
 
 
+@pytest.mark.parametrize("lost", [(), (DRIVE,), (FRONT,)])
+def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]) -> None:
+    """A board that is really silent is reported when it sends nothing after the stall either."""
+    bench = nominal()
+    bench.drive_on()
+    bench.now += 3.0
+    bench.session.stood_still(3.0, bench.now)
+    bench.settle()
+    bench.speaks = {DRIVE, FRONT} - set(lost)
+    bench.run(2.5)
+    named = [half for half in HALVES if any(f"{half} board is silent" in t for t in bench.notices)]
+    assert named == [half for half, channel in HALVES.items() if channel in lost]
+    assert_stands(bench)
+
+
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
     """Until then the robot stands still; it moves again only on a new command."""
