@@ -20,7 +20,7 @@ from omnibot_driver.core.fejemis.inbound import Inbound
 from omnibot_driver.core.fejemis.machine import OFF
 from omnibot_driver.core.fejemis.motion_lines import STOP
 from omnibot_driver.core.fejemis.obedience import Obedience
-from omnibot_driver.core.fejemis.ports import ROLES, Ports
+from omnibot_driver.core.fejemis.ports import Ports
 from omnibot_driver.core.fejemis.services import Services
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.shown import own_figures
@@ -239,15 +239,15 @@ class FejemisBoard(Board):
 
         The front board does not have a ``stop`` command.
         """
-        return self._ports.line("drive", b"stop") + self._all_off()
+        return self._ports.ending("drive", b"stop") + self._all_off()
 
     def _all_off(self) -> Packets:
         """Return the lines that switch lift and brush off."""
-        return self._ports.line("front", *OFF)
+        return self._ports.ending("front", *OFF)
 
     def switch_off(self) -> Packets:
         """Return the lines that switch lift and brush off and restore the lights."""
-        return self._ports.line("front", *self._upkeep.machine.switch_off())
+        return self._ports.ending("front", *self._upkeep.machine.switch_off())
 
     def wake(self) -> Packets:
         """Return Stop for both boards, with lift and brush off."""
@@ -300,8 +300,4 @@ class FejemisBoard(Board):
             packets = self._ports.line("drive", text)
         if self._obedience.start_due(now):
             packets += self._ports.line("drive", b"start")
-        texts = self._upkeep.due(now, stands=not self.driving)
-        for role in ROLES:
-            if texts[role]:
-                packets += self._ports.line(role, *texts[role])
-        return packets
+        return packets + self._upkeep.due(now, stands=not self.driving)

@@ -109,7 +109,7 @@ def numbers(fields: list[str], *ranges: Range) -> list[float] | None:
 
 
 def _heartbeat(fields: list[str]) -> Message | None:
-    found = numbers(fields, TIME, (0, 999), (0, 99999), VOLTS, (-1, 1000))
+    found = numbers(fields, TIME, (0, 99999), (0, 99999), VOLTS, (-1, 1000))
     if found is None or not (found[1].is_integer() and found[2].is_integer()):
         return None
     time_s, identity, version, volts, state = found

@@ -2,8 +2,9 @@
 
 """Finds which of the two boards (halves) is at which port, and addresses lines to them.
 
-The heartbeats identify the boards, whatever the order of the ports. Until both are identified,
-lines that stop the robot go to both ports. The module knows identities, not the lines' meaning.
+The heartbeats identify the boards, whatever the order of the ports. Until a board is identified,
+lines that end something go to both ports, and no other lines are sent to that board. The module
+knows identities, not the lines' meaning.
 """
 
 from dataclasses import replace
@@ -13,7 +14,7 @@ from omnibot_driver.core.fejemis import outbound
 from omnibot_driver.core.fejemis.half import Half, Role
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.traits import TRAITS
-from omnibot_driver.core.packets import Packets
+from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.traits import Traits
 
 ROLES: Final[tuple[Role, Role]] = ("drive", "front")
@@ -27,7 +28,7 @@ class Ports:
 
     def __init__(self, settings: FejemisSettings) -> None:
         self.halves = Half(settings.line_sums), Half(settings.line_sums)
-        self.swapped = False
+        self.swapped = self._known_swapped = False
 
     @property
     def traits(self) -> Traits:
@@ -67,13 +68,15 @@ class Ports:
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
-        """Find the order of the ports after a heartbeat; return whether ``swapped`` changed."""
+        """Find the order of the ports after a heartbeat; return whether it is known to be new."""
         first, second = (half.role for half in self.halves)
         if first == second:
             return False
-        swapped = first == "front" or (first is None and second == "drive")
-        changed, self.swapped = swapped is not self.swapped, swapped
-        return changed
+        self.swapped = first == "front" or (first is None and second == "drive")
+        if first is None or second is None:
+            return False
+        before, self._known_swapped = self._known_swapped, self.swapped
+        return before is not self.swapped
 
     @property
     def trouble(self) -> str:
@@ -94,15 +97,24 @@ class Ports:
         return ""
 
     def line(self, role: Role, *texts: bytes) -> Packets:
-        """Return lines for one board; for both ports while its port is unknown."""
-        channels = (0, 1) if self.half(role) is None else (ROLES.index(role) ^ self.swapped,)
-        return tuple(self._at(channel, *texts) for channel in channels)
+        """Return lines for one board; nothing while its port is unknown."""
+        half = self.half(role)
+        return NO_PACKETS if half is None else self.at(self.halves.index(half), *texts)
+
+    def ending(self, role: Role, *texts: bytes) -> Packets:
+        """Return lines that end something, for one board; for both ports while it is unknown."""
+        if self.half(role) is None:
+            return self.at(0, *texts) + self.at(1, *texts)
+        return self.line(role, *texts)
 
     def both(self, text: bytes) -> Packets:
         """Return a line for each board, behind a line end that closes any incomplete line."""
         return tuple(
-            (channel, b"\n" + self._at(channel, text)[1].lstrip(b"\n")) for channel in (0, 1)
+            (channel, b"\n" + data.lstrip(b"\n"))
+            for channel, data in self.at(0, text) + self.at(1, text)
         )
 
-    def _at(self, channel: int, *texts: bytes) -> tuple[int, bytes]:
-        return channel, outbound.lines(*texts, sums=self.halves[channel].sums)
+    def at(self, channel: int, *texts: bytes) -> Packets:
+        """Return lines for the board at this channel; nothing without ``texts``."""
+        data = outbound.lines(*texts, sums=self.halves[channel].sums)
+        return ((channel, data),) if data else NO_PACKETS

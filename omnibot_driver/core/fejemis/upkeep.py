@@ -17,6 +17,7 @@ from omnibot_driver.core.fejemis.polls import Polls
 from omnibot_driver.core.fejemis.ports import ROLES, Ports
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.fejemis.steering import Geometry
+from omnibot_driver.core.packets import Packets
 
 GEOMETRIES_DIFFER_M: Final = 0.002
 
@@ -86,14 +87,14 @@ class Upkeep:
                 times += (self.configurations[half.role].wake_at, self.polls[half.role].wake_at)
         return min(times)
 
-    def due(self, now: float, *, stands: bool) -> dict[Role, list[bytes]]:
-        """Return the lines to send now, by board; ``stands``: motion is not commanded."""
-        texts: dict[Role, list[bytes]] = {"drive": [], "front": self.machine.due(now)}
-        for role, more in self.jobs.due(now).items():
-            texts[role] += more
+    def due(self, now: float, *, stands: bool) -> Packets:
+        """Return the packets to send now; ``stands``: motion is not commanded."""
+        packets = self._ports.ending("front", *self.machine.due(now))
+        for role, texts in self.jobs.due(now).items():
+            packets += self._ports.line(role, *texts)
         for channel, half in enumerate(self._ports.halves):
-            texts[self._ports.role(channel)] += self._of_half(half, now, stands=stands)
-        return texts
+            packets += self._ports.at(channel, *self._of_half(half, now, stands=stands))
+        return packets
 
     def _of_half(self, half: Half, now: float, *, stands: bool) -> list[bytes]:
         texts = half.due(now)

@@ -135,6 +135,7 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
         ((91, 91), "both ports lead to a front board"),
         ((90, 7), "has the id 7"),
         ((0, 91), "has the id 0"),
+        ((90, 1234), "has the id 1234"),
     ],
 )
 def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
@@ -144,8 +145,19 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
     bench.run(6.0)
     assert sum(sentence in text for text in bench.notices) == 1
     assert bench.session.state == "connecting"
+    assert not any("swapped" in text for text in bench.notices)
     with pytest.raises(CommandRefused, match=sentence):
         bench.drive()
+
+
+@pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
+def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
+    """A ``start`` could release a robot that its own user has stopped."""
+    bench = Bench(Simulated(ids=ids))
+    bench.open()
+    bench.run(6.0)
+    received = set(bench.lines(ids.index(7)))
+    assert received == {"rc 2 0 0", "motv 0 0", "brush 0", "hbti"}
 
 
 @pytest.mark.parametrize("half", HALVES)
