@@ -25,10 +25,10 @@ from omnibot_driver.core.fejemis.settings import Written
 from omnibot_driver.core.fejemis.steering import Geometry
 
 ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
-    "drive": (b"confsi", b"confi", b"gyrooi", b"accoi", b"magoi", b"cpdrivei"),
-    "front": (b"confsi", b"fwoi", b"cpsteeri", b"iri"),
+    "drive": (b"confi", b"gyrooi", b"accoi", b"magoi", b"cpdrivei"),
+    "front": (b"fwoi", b"cpsteeri", b"iri"),
 }
-"""Requests for the configuration, by board."""
+"""Requests for the configuration, by board; both boards send ``confs`` by subscription."""
 ON: Final[Mapping[Role, tuple[Written, ...]]] = {
     "drive": (Written.WHEELS, Written.STEERING, Written.MAGNETOMETER, Written.ACCELEROMETER),
     "front": (Written.STEERING, Written.FRONT_WHEEL, Written.INFRARED, Written.STEERING_GAINS),
@@ -61,14 +61,12 @@ class Configuration:
         self._next_at = -math.inf
         self._tries = 0
         self._new = True
-        self.failed: list[Written] = []
-        """Settings that could not be read back."""
 
     def configure(self, written: Mapping[Written, tuple[float, ...]]) -> None:
         """Replace the settings that are written to the board."""
         if written != self.written:
             self.written, self._new = written, False
-            self._next_at, self._tries, self.failed = -math.inf, 0, []
+            self._next_at, self._tries = -math.inf, 0
 
     @property
     def wake_at(self) -> float:
@@ -76,9 +74,9 @@ class Configuration:
         return self._next_at
 
     @property
-    def known(self) -> bool:
-        """Whether every number was read, and every written setting was read back."""
-        return not self._missing() and not self._unwritten()
+    def failed(self) -> list[Written]:
+        """Settings that could not be read back; empty while they are still being written."""
+        return self._unwritten() if self._next_at == math.inf else []
 
     @property
     def pending(self) -> bool:
@@ -93,7 +91,6 @@ class Configuration:
             return []
         missing, unwritten = self._missing(), self._unwritten()
         if not (missing or unwritten) or self._tries >= TRIES:
-            self.failed = unwritten
             self._next_at = math.inf
             return []
         self._next_at = now + EVERY_S
@@ -105,8 +102,8 @@ class Configuration:
             for setting in unwritten
             if not self._agrees(setting, self._once)
         ]
-        asked = [_ASKS[setting] for setting in unwritten]
-        return [*texts, *dict.fromkeys([*missing, *asked])]
+        keys = {_KEY[text] for text in missing} | {_REPORT[setting] for setting in unwritten}
+        return [*texts, *(text for text in ASKED[self.role] if _KEY[text] in keys)]
 
     def hear(self, message: Message) -> None:
         """Take a message that may report part of the configuration."""
@@ -157,7 +154,7 @@ class Configuration:
         ]
 
     def _agrees(self, setting: Written, readings: Mapping[str, tuple[float, ...]]) -> bool:
-        told = readings.get(_KEY[_ASKS[setting]])
+        told = readings.get(_REPORT[setting])
         wanted = self.written[setting]
         if told is None:
             return False
@@ -186,13 +183,14 @@ _KEY: Final[Mapping[bytes, str]] = {
     text: text.decode("ascii")[:-1] for texts in ASKED.values() for text in texts
 }
 """Keyword of the answer, by the line that requests it."""
-_ASKS: Final[Mapping[Written, bytes]] = {
-    Written.WHEELS: b"confi",
-    Written.STEERING: b"confsi",
-    Written.FRONT_WHEEL: b"fwoi",
-    Written.INFRARED: b"iri",
-    Written.MAGNETOMETER: b"magoi",
-    Written.ACCELEROMETER: b"accoi",
-    Written.STEERING_GAINS: b"cpsteeri",
+_REPORT: Final[Mapping[Written, str]] = {
+    Written.WHEELS: "conf",
+    Written.STEERING: "confs",
+    Written.FRONT_WHEEL: "fwo",
+    Written.INFRARED: "ir",
+    Written.MAGNETOMETER: "mago",
+    Written.ACCELEROMETER: "acco",
+    Written.STEERING_GAINS: "cpsteer",
 }
+"""Keyword of the line that reports a setting."""
 _SHOWN: Final = frozenset(_KEY.values())

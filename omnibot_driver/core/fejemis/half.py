@@ -29,11 +29,13 @@ ROLES: Final[Mapping[int, Role]] = {90: "drive", 91: "front"}
 STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
     "drive": {
         "hbt": 400, "pose": 20, "vel": 20, "gyro": 10, "acc": 10, "imupose": 20, "mag": 100,
-        "bat": 500, "tofd": 100, "sr04": 100,
+        "bat": 500, "tofd": 100, "sr04": 100, "confs": 200,
     },
-    "front": {"hbt": 400, "fwl": 15, "ir": 100},
+    "front": {"hbt": 400, "fwl": 15, "ir": 100, "confs": 200},
 }  # fmt: skip
-"""Subscribed streams of each board, with their periods in ms."""
+"""Subscribed streams of each board, with their periods in ms.
+
+``confs`` is subscribed because ``confsi`` without its last letter sets the geometry to zero."""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """The stream of each board without which the robot must not be driven."""
 TOGETHER: Final = ("gyro", "acc")
@@ -217,4 +219,5 @@ _KEYWORDS: Final = {
     "Attitude": "imupose",
     "Battery": "bat",
     "Infrared": "ir",
+    "SteeringConfiguration": "confs",
 }
