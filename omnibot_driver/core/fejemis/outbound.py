@@ -9,7 +9,9 @@ sum, so the digits of a motion line are chosen to get a suitable sum:
 
 * A lost line end joins two lines. The result passes if the sum of the second line, with its prefix,
   equals the code of a character that was lost as well. So that sum must not be the code of a
-  character of a number. Other lines with such a sum follow an empty line, which the boards ignore.
+  character of a number, nor of the ``;`` (without it, the digits of the sum would continue the last
+  number of the first line). Other lines with such a sum follow an empty line, which the boards
+  ignore.
 * A lost digit of the sum leaves a sum that fits only if a certain character is lost as well.
 
 Characters are never added to a line itself: a board may compare the complete line with ``stop``.
@@ -58,4 +60,4 @@ def robust(text: bytes) -> bool:
     tens, ones = divmod(total, 10)
     as_second = (ord(";") + 2 * ord("0") + tens + ones + total - 1) % MODULUS
     without_tens, without_ones = (total - ones) % MODULUS, (total - tens) % MODULUS
-    return not {as_second, without_tens, without_ones} & IN_NUMBERS
+    return as_second != ord(";") and not {as_second, without_tens, without_ones} & IN_NUMBERS

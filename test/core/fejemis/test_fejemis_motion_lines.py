@@ -94,6 +94,19 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
             assert all(v == w == 0.0 for _, v, w in motions(without(data, lost)))
 
 
+@pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
+def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
+    """``rc 2 0 0`` that lost its line end and the next ``;`` was ``rc 2 0 092``: 92 degrees/s.
+
+    The characters that a sum of 02 or 92 adds to the line before it do not change that line's sum.
+    """
+    assert sum_of(text) in (2, 92)
+    data = line(STOP, sums=True) + line(text, sums=True)
+    right = set(motions(data))
+    for lost in itertools.combinations(range(len(data)), 2):
+        assert set(motions(without(data, lost))) <= right, lost
+
+
 def test_what_three_lost_characters_leave() -> None:
     """Less than 1 % of such losses make another motion; see docs/boards/fejemis.md."""
     passed = total = 0
