@@ -60,7 +60,7 @@ class LoisConversation:
         self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
         self._decoder.statistics = self._statistics
         self._points.connect()
-        self._stall = StallWatch(self._settings.track_m, self._settings.rim_mps_per_rpm)
+        self._stall = StallWatch(self._settings)
 
     @property
     def settings(self) -> LoisEcuSettings:
@@ -70,6 +70,7 @@ class LoisConversation:
     @settings.setter
     def settings(self, settings: LoisEcuSettings) -> None:
         self._settings = self._translation.settings = self._points.settings = settings
+        self._stall.settings = settings
         self._upkeep.configure(settings)
         self._decoder.sum_required = settings.with_sum
 

@@ -8,7 +8,8 @@ new, slower set-point, the motor gets no power. RPM 0/0 clears it.
 Ticks show a wheel that turns forward; 0x20 shows one that should turn backward. If that wheel is at
 rest, the pose of 0x20 does not change while nothing ticks, and while the other wheel ticks its
 velocity repeats the same speed of this one. A wheel that rolls steadily repeats a speed too, but
-not far above its set-point: there the controller gives it no power, so it would become slower.
+not far above its set-point: there the controller gives it no power, so it would become slower. That
+is not so with a feed-forward, which is power that does not depend on the speed.
 Works on set-points, reports and times.
 """
 
@@ -16,7 +17,8 @@ import math
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.board_odometry import rim_speeds
-from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Setting, Ticks
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 STALLED_S: Final = 2.0
 """Time in s without a sign of motion; with the firmware's own gains a wheel starts in half of
@@ -29,15 +31,19 @@ TOO_FAST_RPM: Final = 3
 wheel that rolls backward is up to 10 % and one RPM faster than its set-point."""
 UNLIKE: Final = 1.15
 """Greatest ratio of the speeds, each over its set-point, of two wheels that roll backward."""
+FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 """Number of groups that must agree, because few arrive on a bad line."""
 
 
 class StallWatch:
-    """Watch of both wheels; ``stalled`` once for each ``STALLED_S`` that one is at rest."""
+    """Watch of both wheels; ``stalled`` once for each ``STALLED_S`` that one is at rest.
 
-    def __init__(self, track_m: float = 0.47, rim_mps_per_rpm: float = 0.0136) -> None:
-        self._track_m, self._rpm_mps = track_m, rim_mps_per_rpm
+    ``settings`` may be replaced at any time.
+    """
+
+    def __init__(self, settings: LoisEcuSettings) -> None:
+        self.settings = settings
         self._targets = [0, 0]
         self._seen_at = [math.inf, math.inf]
         self._quiet = [0, 0]
@@ -67,7 +73,7 @@ class StallWatch:
         """Process a report: ticks show a forward wheel's motion, and odometry a backward one's."""
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
-            told = rim_speeds(report, self._track_m)
+            told = rim_speeds(report, self.settings.track_m)
             for wheel in (0, 1):
                 if self._targets[wheel] < 0:
                     turns = pose != self._pose and not self._repeats(wheel, told)
@@ -104,18 +110,24 @@ class StallWatch:
         if told is None or self._told is None:
             return False
         same = [abs(a - b) < SAME_MPS for a, b in zip(told, self._told, strict=True)]
+        kept = not same[1 - wheel] or self._too_fast(wheel, told)
+        return abs(told[wheel]) > SAME_MPS and same[wheel] and kept
+
+    def _too_fast(self, wheel: int, told: tuple[float, float]) -> bool:
+        """Return whether no wheel can roll steadily at this reported speed."""
+        if self.settings.written.get(FEED_FORWARD[wheel]):
+            return False
         target = abs(self._targets[wheel])
-        most_mps = max(TOO_FAST * target, target + TOO_FAST_RPM) * self._rpm_mps
+        most_mps = max(TOO_FAST * target, target + TOO_FAST_RPM) * self.settings.rim_mps_per_rpm
         if self._targets[1 - wheel] < 0:
             gain_mps = abs(told[1 - wheel] / self._targets[1 - wheel])
             most_mps = max(most_mps, UNLIKE * gain_mps * target)
-        too_fast = abs(told[wheel]) > most_mps - SAME_MPS
-        return abs(told[wheel]) > SAME_MPS and same[wheel] and (too_fast or not same[1 - wheel])
+        return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
         """Return whether the reported speed is that of the set-point or more."""
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
-        return told_mps > abs(self._targets[wheel]) * self._rpm_mps - SAME_MPS
+        return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS
 
     def _note(self, wheel: int, now: float, *, turns: bool) -> None:
         self._quiet[wheel] += 1

@@ -4,7 +4,10 @@
 
 import math
 
+from lois_drives import HOST_GAINS
+
 from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.stall import StallWatch
 
 UNIT_MPS = 0.13 * math.tau / 60
@@ -19,7 +22,7 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
 
     ``ticks``, ``ways_m``: ticks of both wheels, and distance in m by 0x20, for every 0.2 s.
     """
-    watch = StallWatch()
+    watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
     found = []
     for step in range(31):
@@ -53,9 +56,10 @@ def looks_stalled(
     *,
     targets: tuple[int, int] = (-9, 9),
     resting: tuple[bool, bool] = (False, False),
+    settings: LoisEcuSettings | None = None,
 ) -> bool:
     """Return whether a wheel with these set-points stalls at these speeds, one pair in 0.2 s."""
-    watch, unit = StallWatch(0.47, UNIT_MPS), UNIT_MPS
+    watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
     found = False
     for step, (left_rpm, right_rpm) in enumerate(rpm, 1):
@@ -80,6 +84,13 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
     """The controller gives it no power, so it would slow down if it rolled."""
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
+
+
+def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
+    """Its power does not end at the set-point. A speed that it keeps beside a changing one shows."""
+    assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
+    assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
+    assert looks_stalled([(-10, 8 + step % 3) for step in range(14)], settings=HOST_GAINS)
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
