@@ -21,6 +21,7 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
     BIAS,
     COUNT,
+    EXCESS,
     HELD,
     PER_WHEEL,
     PUSH,
@@ -48,11 +49,19 @@ LATE_PART: Final = 0.6
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
 """Mean and standard deviation of the ticks that the measured speed misses when a wheel starts."""
+FAST_RPM: Final = 50.0
+LOST_TICKS: Final = 3.0
+"""Variance in squared ticks per s by which 0x20 misses the motion of a wheel beyond ``FAST_RPM``: a
+tick that comes soon after one that waited while the board sent has no speed."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
 """Mean and standard deviation of the fraction of an RPM that the firmware drops."""
-GAIN_PART: Final = 0.05
-GREATEST_GAIN: Final = 1.5
+EXCESS_MEAN: Final = (0.1, 0.1)
+EXCESS_STDDEV: Final = (0.02, 0.3)
+EXCESS_CHANGE: Final = (0.0, 0.15)
+"""Excess of the speed of a wheel that rolls backward, with the board's own gains and with gains
+that are set: the firmware lowers its target with each tick until the controller's next step, and a
+feed-forward may drive the wheel much faster. ``EXCESS_CHANGE``: after a change of the set-point."""
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
 
@@ -73,8 +82,6 @@ class MotionFilter:
         self.filter = SparseFilter(STATES)
         self.wheels = (Wheel(0), Wheel(PER_WHEEL))
         self.tick_m = self.rpm_mps = self.track_m = self.turn_sign = 1.0
-        self.reverse_gain = 1.0
-        """Ratio of speed to target for a wheel that rolls backward steadily."""
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
@@ -191,14 +198,6 @@ class MotionFilter:
         counts = self.wheels[index].counts(self.speed_mps(index), signed=self.signed)
         return [*terms, (base + COUNT, counts)] if counts else terms
 
-    def learn_gain(self, index: int, speed_mps: float) -> None:
-        """Update ``reverse_gain`` by a reported speed, if the wheel rolls backward steadily."""
-        wheel = self.wheels[index]
-        target_mps = wheel.course.target_mps
-        if self.tuned and target_mps < 0 and wheel.steady:
-            change = GAIN_PART * (speed_mps / -target_mps - self.reverse_gain)
-            self.reverse_gain = min(max(self.reverse_gain + change, 1.0), GREATEST_GAIN)
-
     # Commands
 
     def _take_effect(self, now: float) -> None:
@@ -219,6 +218,10 @@ class MotionFilter:
             step = abs(wheel.course.target_mps - speed)
             wheel.restless_mps = max(wheel.restless_mps, step)
             wheel.unsettled_mps = step if changed and wheel.course.target_mps else 0.0
+            if wheel.course.target_mps < 0 and wheel.course.kind == "rpm":
+                part = min(step / -wheel.course.target_mps, 1.0)
+                variance = (EXCESS_CHANGE[self.tuned] * part) ** 2
+                self.filter.disturb([(EXCESS + index, 1.0)], variance)
             late_m = LATE_PART * wheel.course.step_s * speed
             self.filter.disturb(max(before, self._way_terms(index), key=len), late_m**2)
         kinds = (self.wheels[0].course.kind, self.wheels[1].course.kind)
@@ -234,13 +237,21 @@ class MotionFilter:
             else:
                 spread = ROUNDED_STDDEV * self.rpm_mps
                 self.filter.forget(BIAS + index, ROUNDED * self.rpm_mps, spread**2)
+            self.begin_excess()
+
+    def begin_excess(self) -> None:
+        """Reset the part by which each wheel rolls backward faster than its set-point."""
+        for index in (0, 1):
+            mean = EXCESS_MEAN[self.tuned] if self.holds else 0.0
+            stddev = EXCESS_STDDEV[self.tuned] if self.holds else 0.0
+            self.filter.forget(EXCESS + index, mean, stddev**2)
 
     def _target(self, wheel: Wheel) -> float:
         target = wheel.course.target_mps
         if wheel.course.kind == "duty" or not target:
             return target
         if target < 0 and self.filter.mean[wheel.base + SPEED]:
-            target *= self.reverse_gain  # ticks lower the target; without them it stays
+            target *= 1.0 + self.filter.mean[EXCESS + wheel.base // PER_WHEEL]
         return target + math.copysign(ROUNDED * self.rpm_mps, target)
 
     # Time
@@ -287,6 +298,9 @@ class MotionFilter:
                 new[ALONG] -= lost / 2
                 spread = START_STDDEV_TICKS * self.tick_m
                 step.noises.append(([(TURN, side), (ALONG, 0.5)], spread**2))
+            if speed > FAST_RPM * self.rpm_mps:
+                variance = LOST_TICKS * self.tick_m**2 * dt
+                step.noises.append(([(TURN, side), (ALONG, 0.5)], variance))
             fresh = speed / (abs(before[0]) + abs(before[1]))
             shown = fresh * speed + (1 - fresh) * new[base + HELD] - self.rounded_mps(index)
             if shown > 0.0:

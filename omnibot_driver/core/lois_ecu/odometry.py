@@ -29,9 +29,6 @@ from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, U
 
 __all__ = ["FusedOdometry", "LoisOdometry", "LoisOdometrySettings", "Source"]
 
-FIRMWARE_GAIN: Final = 1.1
-"""Speed over target, backwards: the firmware lowers its target with each tick, until the
-controller's next step."""
 LONE_TICKS: Final = 2
 """Number of groups of ticks without odometry behind them that show a board like the manual's."""
 UNCOUNTED_M: Final = 0.06
@@ -80,7 +77,10 @@ class LoisOdometry:
         self._unheard_s = max(UNHEARD_S, UNHEARD_GROUPS * period_s)
         motion.tick_m, motion.rpm_mps = settings.tick_m, settings.rim_mps_per_rpm
         motion.track_m = settings.track_m
-        motion.tuned = not own_gains(settings)
+        tuned = not own_gains(settings)
+        if tuned is not motion.tuned:
+            motion.tuned = tuned
+            motion.begin_excess()
         motion.turn_sign = -1.0 if settings.inverted else 1.0
         motion.yaw0_rad += yaw_rad - motion.yaw_rad
         self._board = OdometryReader(settings.track_m, settings.rim_mps_per_rpm)
@@ -257,7 +257,8 @@ class LoisOdometry:
     def _is_firmware(self) -> None:
         motion = self._motion
         self.appends, motion.holds = True, True
-        motion.signed, motion.reverse_gain = self._seen_signed, FIRMWARE_GAIN
+        motion.signed = self._seen_signed
+        motion.begin_excess()
         for wheel in motion.wheels:
             wheel.course.step_s = FIRMWARE_STEP_S
 

@@ -109,7 +109,6 @@ class ReportedSpeed:
         shown = abs(speed_mps) + (motion.rounded_mps(self._index) if speed_mps else 0.5 * rpm_mps)
         fast = shown > FASTER_RPM * rpm_mps and wheel.course.kind == "rpm"
         if ticked and fast and not wheel.rolls_on:
-            motion.learn_gain(self._index, shown)
             self._rolls_at(math.copysign(shown, sign), duration_s)
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
@@ -120,7 +119,10 @@ class ReportedSpeed:
         if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:
             return True
         expected_rpm = abs(motion.speed_mps(self._index)) / motion.rpm_mps
-        strays = abs(told_rpm - expected_rpm) > STRAY_RPM + STRAY_PART * expected_rpm
+        unsure_rpm = (
+            math.sqrt(motion.filter.variance_of([(wheel.base + SPEED, 1.0)])) / motion.rpm_mps
+        )
+        strays = abs(told_rpm - expected_rpm) > STRAY_RPM + STRAY_PART * expected_rpm + unsure_rpm
         return motion.tuned and wheel.steady and strays
 
     def _rest(self, told_mps: float, duration_s: float, *, repeated: bool) -> None:

@@ -18,10 +18,10 @@ WAY, SPEED, PUSH, COUNT, HELD = range(5)
 PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², counted ticks in
 m, and the speed in m/s that was measured last."""
-X, Y, TURN, ALONG, BIAS = 10, 11, 12, 13, 14
-"""States of the body: position, and the turn and distance that 0x20 should show; then a bias of
-each wheel."""
-STATES: Final = 16
+X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
+"""States of the body: position, and the turn and distance that 0x20 should show; then of each wheel
+a bias, and the part by which it rolls backward faster than its set-point."""
+STATES: Final = 18
 
 CONTROL_RATE: Final = 2.0
 """Rate in 1/s at which the controller reaches its target, as a critically damped system."""
@@ -199,8 +199,11 @@ class Wheel:
         kept = 1 - 2 * CONTROL_RATE * dt
         new[push] = kept * new[push] + sign * pull * lacking
         new[v] += dt * new[push]
-        step.rows[push] = [(push, kept), (seen, -pull * factor)]
-        step.rows[v] = [(v, 1.0), (push, dt * kept), (seen, -dt * pull * factor)]
+        pulls: Terms = [(seen, -pull * factor)]
+        if sign < 0 and wound == 1.0:
+            pulls.append((EXCESS + self.base // PER_WHEEL, pull * self.course.target_mps))
+        step.rows[push] = [(push, kept), *pulls]
+        step.rows[v] = [(v, 1.0), (push, dt * kept), *((state, dt * one) for state, one in pulls)]
         jerk = 4 * CONTROL_RATE * (PUSH_PER_SPEED * self.restless_mps * wound) ** 2
         step.noises.append(([(push, 1.0), (v, dt)], jerk * dt))
         step.noises.append(([(v, 1.0)], ROUGH * dt * wound))

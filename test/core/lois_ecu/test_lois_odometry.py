@@ -21,11 +21,13 @@ from omnibot_driver.core.lois_ecu import (
     Ticks,
     encode_command,
     encode_report,
+    motion_filter,
 )
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import Firmware, LoisSettings
+from omnibot_driver.simulator.lois_ecu.settings import MotorSettings
 
 pytestmark = pytest.mark.slow
 
@@ -122,6 +124,33 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
     assert one.sigmas < 3.0
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
+    """A feed-forward that is too much for the motor; ticks do not show it, 0x20 does."""
+    motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
+    one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
+    assert one.way_m > 11.0
+    way_m, true_m = (math.hypot(place.x_m, place.y_m) for place in (one.last.pose, one.true))
+    assert way_m == pytest.approx(true_m, rel=0.03)
+
+
+def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ticks come so soon after each other that the firmware gives some of them no speed."""
+    usual = nominal("firmware", 2)
+    fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)
+
+    def variances() -> list[float]:
+        """Return the yaw variances in rad² after a drive at 62 RPM, and at 32 RPM."""
+        drives = [drive(settings, [(6.0, (-25, -25))]) for settings in (fast, usual)]
+        return [one.last.covariance.yaw_yaw for one in drives]
+
+    ours = variances()
+    monkeypatch.setattr(motion_filter, "LOST_TICKS", 0.0)
+    grown = [one / before for one, before in zip(ours, variances(), strict=True)]
+    assert grown[0] > 1.05
+    assert grown[1] == 1.0
 
 
 @BOTH

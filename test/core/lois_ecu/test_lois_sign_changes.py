@@ -5,7 +5,7 @@
 import pytest
 from lois_drives import HOST_GAINS
 
-from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks, motion_filter
 from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
@@ -33,7 +33,12 @@ def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 
 
-def test_a_wheel_that_has_settled_is_not_doubted() -> None:
-    """The motion of a settled wheel is known, so the covariance does not grow with the gains."""
-    own, host = variance(LoisEcuSettings(), 15.0), variance(HOST_GAINS, 15.0)
-    assert own == pytest.approx(host, rel=0.02)
+@pytest.mark.parametrize("settings", [LoisEcuSettings(), HOST_GAINS], ids=["own", "set"])
+def test_a_wheel_that_has_settled_is_not_doubted(
+    settings: LoisEcuSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A change of sign adds an error only if it comes soon after another one."""
+    soon, late = variance(settings, 0.6), variance(settings, 15.0)
+    monkeypatch.setattr(motion_filter, "UNSETTLED_S", (0.0, 0.0))
+    assert soon > 1.02 * variance(settings, 0.6)
+    assert late == pytest.approx(variance(settings, 15.0), rel=1e-3)

@@ -87,7 +87,7 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """Its power does not end at the set-point. A speed that it keeps beside a changing one shows."""
+    """Its power does not end at the set-point. A changing speed beside it still shows a rest."""
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)], settings=HOST_GAINS)
