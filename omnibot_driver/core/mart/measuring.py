@@ -69,7 +69,7 @@ class Measuring(Starts):
             self._spin_seen_radps = rate
         else:
             self._fresh = True
-            self._learn(reading.dyaw_rad, now)
+            self._learn(reading, now)
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """Stop a robot whose counts change although it should be at rest.

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The speed of two motors as a learned straight line over their command units.
+"""The speed of a motor as a learned straight line over its command units.
 
 A motor without a regulator needs some units before it turns, so its speed is not proportional to
-its units. A gain that was learned while driving would make a slow turn on the spot too slow. Speeds
+its units. With a mere gain that was learned at a high speed, a slow wheel would be too slow. Speeds
 are given in nominal units: the units that an ideal motor would need for the speed. This module
 knows neither wheels nor time.
 """
@@ -30,20 +30,33 @@ class MotorLine:
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
         """Correct the line by a measured speed; ``doubt`` multiplies its standard deviation."""
-        self._ss += SLOPE_DRIFT**2
-        self._oo += OFFSET_DRIFT**2
+        if self._ss < SLOPE_SD**2:
+            self._ss += SLOPE_DRIFT**2
+        if self._oo < OFFSET_SD**2:
+            self._oo += OFFSET_DRIFT**2
         to_slope = self._ss * units + self._so
         to_offset = self._so * units + self._oo
         noise = (NOISE + NOISE_PART * units) * doubt
         variance = to_slope * units + to_offset + noise * noise
-        error = speed - (self.slope * units + self.offset)
+        error = speed - self.speed(units)
         slope = self.slope + to_slope / variance * error
         offset = self.offset + to_offset / variance * error
         self._ss -= to_slope * to_slope / variance
         self._so -= to_slope * to_offset / variance
         self._oo -= to_offset * to_offset / variance
+        self._set(slope, offset)
+
+    def move(self, slope: float, offset: float) -> None:
+        """Change the line by these differences, as the line of a like motor has changed."""
+        self._set(self.slope + slope, self.offset + offset)
+
+    def _set(self, slope: float, offset: float) -> None:
         self.slope = min(HIGHEST_SLOPE, max(LOWEST_SLOPE, slope))
         self.offset = min(0.0, max(-MOST_DEAD * self.slope, offset))
+
+    def speed(self, units: float) -> float:
+        """Return the speed at these command units, in nominal units; negative for no motion."""
+        return self.slope * units + self.offset
 
     def units(self, speed: float) -> float:
         """Return the command units that a positive speed, in nominal units, needs."""

@@ -3,16 +3,16 @@
 """The conversion of speed and turn rate to command units of two motors, with feedback.
 
 The controller takes changes of its units and applies them without a regulator, so the effect of a
-unit depends on voltage, motor and floor. Each side has a gain that is learned from windows of
-steady driving. The heading is held by the integral of the turn rate error. This module knows units,
-m/s and rad; it knows no commands. Time is an argument.
+unit depends on voltage, motor and floor. Each side has a line (``MotorLine``) that is learned from
+windows of steady driving and from turns on the spot. The heading is held by the integral of the
+turn rate error. This module knows units, m/s and rad; it knows no commands. Time is an argument.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
-from omnibot_driver.core.mart.motor_line import MotorLine
+from omnibot_driver.core.mart.motor_line import MOST_DEAD, MotorLine
 from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_UNITS: Final = 127
@@ -23,16 +23,16 @@ MOST_BACKWARD: Final = 5
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s: pause in learning after a large change, and shortest window of learning."""
 LARGE_UNITS: Final = 3
-LEARNED: Final = 0.7
-"""Part of the difference to a window's gain by which the learned gain is corrected."""
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""Effect of the exchange duration: it lengthens the window and reduces LEARNED.
+"""Effect of the exchange duration: it lengthens the window, and makes it less certain.
 
-The window grows by LEARN_TRIPS durations; LEARNED is divided by 1 + LESS_PER_S * duration in s.
+The window grows by LEARN_TRIPS durations. The standard deviation of its speeds is multiplied by
+1 + LESS_PER_S * duration in s.
 """
-LOWEST_GAIN, HIGHEST_GAIN = 0.4, 2.5
-SLOWEST_MPS: Final = 0.03
-"""Slowest speed of a wheel at which its gain can be learned, in m/s."""
+SLOWEST_MPS: Final = 0.015
+"""Slowest speed of a wheel that certainly turns, in m/s."""
+SLOWEST_START_MPS: Final = 0.03
+"""Slowest speed of a wheel for which a motion begins, in m/s, as the server awaits a movement."""
 SLOWEST_TURN_RADPS: Final = 0.05
 """Slowest turn on the spot from which anything is learned, in rad/s."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
@@ -49,32 +49,26 @@ COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 A change may come twice where an exchange takes longer than SLOW_TRIP_S (s). The variances are
 larger than is probable, as a wrong guess stays for the complete motion.
 """
-LONGEST_STEP_S: Final = 0.2
+BALANCE_UNITS: Final = 20
+"""Fewest units at which the two motors are compared: below, an error of a line weighs too much."""
 
 
 @dataclass(slots=True)
 class _Side:
     """One motor.
 
-    ``units``: commanded units; ``gain``: measured speed divided by the nominal one;
+    ``units``: commanded units; ``line``: the learned speed for each number of units;
     ``window_units_s``, ``window_m``: units and distance summed over the present window.
     """
 
     units: int = 0
-    gain: float = 1.0
+    line: MotorLine = field(default_factory=MotorLine)
     window_units_s: float = 0.0
     window_m: float = 0.0
 
-    def learn(self, per_unit_mps: float, part: float) -> None:
-        """Correct the gain by this part of its difference from the gain measured in the window."""
-        nominal_m = self.window_units_s * per_unit_mps
-        if nominal_m > 0.0 and self.window_m > 0.0:
-            seen = min(HIGHEST_GAIN, max(LOWEST_GAIN, self.window_m / nominal_m))
-            self.gain += part * (seen - self.gain)
-
-    def wanted_units(self, speed_mps: float, per_unit_mps: float) -> int:
-        """Return the units that this speed needs with the learned gain."""
-        return round(min(MOST_UNITS, max(0.0, speed_mps / (per_unit_mps * self.gain))))
+    def wanted_units(self, speed: float) -> int:
+        """Return the units for a speed in nominal units; zero for a wheel that must not turn."""
+        return round(min(MOST_UNITS, max(0.0, self.line.units(speed)))) if speed > 0.0 else 0
 
 
 class SpeedLoop:
@@ -90,7 +84,6 @@ class SpeedLoop:
         self.volts = settings.nominal_volts
         self.trip_s = 0.0
         self._right, self._left = _Side(), _Side()
-        self._line = MotorLine()
         self.begin(0, False, 0.0)
 
     def begin(self, units: int, reverse: bool, now: float) -> None:
@@ -99,7 +92,6 @@ class SpeedLoop:
         self._direction = -1.0 if reverse else 1.0
         self._rate_radps = self._error_rad = 0.0
         self._rate_changed_s = now
-        self._measured_s = now
         self._unsure = 0.0
         self.part = 0.0
         self._clear(now + SETTLE_S)
@@ -110,25 +102,35 @@ class SpeedLoop:
         The units suit the slower side.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
-        slower = min(right_mps, left_mps, key=abs)
-        return max(4, min(60, self._right.wanted_units(max(slower, 0.0), self._per_unit_mps)))
+        slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
+        return max(4, min(60, self._right.wanted_units(slower_mps / self._per_unit_mps)))
 
     def spin_units(self, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at this rate."""
-        rim_mps = abs(rate_radps) * self.settings.track_m / 2
-        return max(2, min(MOST_UNITS, round(self._line.units(rim_mps / self._per_unit_mps))))
+        speed = abs(rate_radps) * self.settings.track_m / 2 / self._per_unit_mps
+        units = (self._right.line.units(speed) + self._left.line.units(speed)) / 2
+        return max(2, min(MOST_UNITS, round(units)))
 
     def spun(self, units: int, rate_radps: float) -> None:
         """Learn from a turn on the spot with these units and this mean rate."""
         if abs(rate_radps) > SLOWEST_TURN_RADPS:
-            rim_mps = abs(rate_radps) * self.settings.track_m / 2
-            self._line.learn(units, rim_mps / self._per_unit_mps)
+            speed = abs(rate_radps) * self.settings.track_m / 2 / self._per_unit_mps
+            lines = self._right.line, self._left.line
+            error = speed - sum(line.speed(units) for line in lines) / 2
+            for line in lines:
+                line.learn(units, line.speed(units) + error)
 
     @property
     def left_over_right(self) -> float:
-        """Ratio of left to right wheel speed, from the units and ``balance``."""
-        right = self._right.units
-        return self._left.units * self.balance / right if right else 1.0
+        """Ratio of left to right wheel speed, by the units and the learned lines.
+
+        It differs from the ratio of two equal motors by MOST_UNEQUAL at most.
+        """
+        right, left = self._right, self._left
+        if not right.units:
+            return 1.0
+        equal = self._mean_speed(left.units) / max(1.0, self._mean_speed(right.units))
+        return equal * self.balance
 
     @property
     def bend(self) -> float:
@@ -137,12 +139,17 @@ class SpeedLoop:
 
     @property
     def balance(self) -> float:
-        """Ratio of the left motor's gain to the right motor's gain, limited to 1 ± MOST_UNEQUAL.
+        """Ratio of the left to the right motor's speed at equal units, limited to 1 ± MOST_UNEQUAL.
 
-        A change of units that was lost or duplicated while learning falsifies the gains.
+        A change of units that was lost or duplicated while learning falsifies the lines.
         """
-        ratio = self._left.gain / self._right.gain
+        units = max(self._right.units, self._left.units, BALANCE_UNITS)
+        ratio = self._left.line.speed(units) / max(1.0, self._right.line.speed(units))
         return min(1.0 + MOST_UNEQUAL, max(1.0 - MOST_UNEQUAL, ratio))
+
+    def _mean_speed(self, units: float) -> float:
+        """Return the mean speed of both motors at these units, in nominal units; not negative."""
+        return max(0.0, (self._right.line.speed(units) + self._left.line.speed(units)) / 2)
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
         """Return the speeds of the right and left wheel, in m/s.
@@ -154,50 +161,49 @@ class SpeedLoop:
 
     def measured(
         self,
-        speed_mps: float,
-        rate_radps: float,
+        way_m: float,
         turned_rad: float,
+        seconds: float,
         now: float,
         *,
         right_only: bool = False,
     ) -> None:
-        """Learn from the measured motion, and hold the heading.
+        """Learn from a measured displacement of this duration, and hold the heading.
 
-        ``turned_rad``: turn since the last call; ``right_only``: only the right wheel was measured,
-        so the left motor's gain is changed by the same factor as the right motor's.
+        ``right_only``: only the right wheel was measured, so the left motor's line is moved as the
+        right motor's.
         """
-        seconds = min(max(0.0, now - self._measured_s), LONGEST_STEP_S)
-        self._measured_s = now
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
             self._error_rad = max(-HOLD_MOST_RAD, min(HOLD_MOST_RAD, error_rad))
-        if now < self._window_from_s:
+        if now - seconds < self._window_from_s:
             return
         self._window_s += seconds
-        half = self._direction * rate_radps * self.settings.track_m / 2
-        along_mps = self._direction * speed_mps
-        for side, rim_mps in ((self._right, along_mps + half), (self._left, along_mps - half)):
-            if rim_mps > SLOWEST_MPS:
-                side.window_units_s += side.units * seconds
-                side.window_m += rim_mps * seconds
-        if now - self._window_from_s >= LEARN_S + LEARN_TRIPS * self.trip_s:
-            before = self._right.gain
-            part = LEARNED / (1.0 + LESS_PER_S * self.trip_s)
-            self._right.learn(self._per_unit_mps, part)
+        for side, out_m in (
+            (self._right, self.settings.track_m / 2),
+            (self._left, -self.settings.track_m / 2),
+        ):
+            side.window_units_s += side.units * seconds
+            side.window_m += self._direction * (way_m + turned_rad * out_m)
+        if self._window_s >= LEARN_S + LEARN_TRIPS * self.trip_s:
+            before = self._right.line.slope, self._right.line.offset
+            self._learn(self._right)
             if right_only:
-                self._left.gain *= self._right.gain / before
+                self._left.line.move(
+                    self._right.line.slope - before[0], self._right.line.offset - before[1]
+                )
             else:
-                self._left.learn(self._per_unit_mps, part)
-                self._learn_line()
+                self._learn(self._left)
             self._clear(now)
 
-    def _learn_line(self) -> None:
-        """Learn the line for turns on the spot, if both motors turned in the finished window."""
-        seconds = self._window_s
-        if min(self._right.window_m, self._left.window_m) > SLOWEST_MPS * seconds:
-            units = (self._right.window_units_s + self._left.window_units_s) / (2 * seconds)
-            speed_mps = (self._right.window_m + self._left.window_m) / (2 * seconds)
-            self._line.learn(units, speed_mps / self._per_unit_mps, 1.0 + LESS_PER_S * self.trip_s)
+    def _learn(self, side: _Side) -> None:
+        """Learn a side's line from the finished window."""
+        units = side.window_units_s / self._window_s
+        speed = side.window_m / self._window_s / self._per_unit_mps
+        slowest = SLOWEST_MPS / self._per_unit_mps
+        should_turn = units < MOST_DEAD and side.line.speed(units) > slowest
+        if speed > slowest or should_turn:  # else it stands, as it should
+            side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
         """Return the changes of right and left in units, positive along the motion; None if zero.
@@ -212,7 +218,7 @@ class SpeedLoop:
         most = MOST_BACKWARD if self._direction < 0.0 and self._is_slow else MOST_CHANGE
         steps = []
         for side, rim_mps in ((self._right, right_mps), (self._left, left_mps)):
-            wanted = side.wanted_units(rim_mps, self._per_unit_mps)
+            wanted = side.wanted_units(rim_mps / self._per_unit_mps)
             steps.append(max(-most, min(most, wanted - side.units)))
         right, left = steps
         if self._right.units + right <= 0 and self._left.units + left <= 0:

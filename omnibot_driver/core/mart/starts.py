@@ -25,6 +25,7 @@ from omnibot_driver.core.mart.states import (
 )
 from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
+from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
 """Time in s after which a constant heading is made to change, and the motor units used for that.
@@ -204,12 +205,12 @@ class Starts(Moves):
         self._predict_turn()
         return self.conversation.ask(start, now, takes_s=_longest_s(start))
 
-    def _learn(self, turned_rad: float, now: float) -> None:
-        """Learn from the last measurement how fast the motors turn per unit."""
-        speed, rate = self.odometry.speeds
-        blind = self.odometry.left_over_right is not None
+    def _learn(self, moved: DisplacementReading, now: float) -> None:
+        """Learn from the last measurement how fast the motors turn with their units."""
         self.loop.trip_s = self.conversation.trip_s
-        self.loop.measured(speed, rate, turned_rad, now, right_only=blind)
+        if moved.duration_s is not None:
+            blind = self.odometry.left_over_right is not None
+            self.loop.measured(moved.dx_m, moved.dyaw_rad, moved.duration_s, now, right_only=blind)
         self._predict_turn()
 
     def _predict_turn(self) -> None:

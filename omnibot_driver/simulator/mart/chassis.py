@@ -139,7 +139,9 @@ class Chassis:
                 applied = min(applied + slew, wanted)
             else:
                 applied = max(applied - slew, wanted)
-        aim_mps = 0.0 if -self._dead_units < applied < self._dead_units else applied * gain
+        dead = self._dead_units
+        beyond = applied - dead if applied > dead else min(0.0, applied + dead)
+        aim_mps = beyond * gain
         speed_mps += (aim_mps - speed_mps) * self._alpha
         if not aim_mps and -STANDS_MPS < speed_mps < STANDS_MPS:
             speed_mps = 0.0

@@ -98,16 +98,16 @@ class MartSettings:
     """Settings of the controller, its robot and its surroundings.
 
     speed_mps_per_unit: wheel speed per register unit at nominal_volts; it grows with the voltage.
-    dead_zone_units: effort below which a motor does not turn. motor_inequality: how much faster the
-    left motor is than the right one, as a fraction of the speed. encoder_sign: -1 if the count
-    decreases forward. gyro_bias_dps: bias that the server does not know until it measures it.
-    gyro_noise_dps: standard deviation of a sample while a wheel turns. imu_dies_s, imu_returns_s:
-    times since construction when the IMU fails and when it works again. stuck: wheels that do not
-    turn. motor_board_silent: its serial line is cut. motor_status: bits of MCSTAT, besides those of
-    the voltage; a tripped or short-circuited motor stops. front_m, rear_m: distances from the start
-    to walls across the x axis. dock_m: distance forward from the start to the dock.
-    reference_start_fails: a build that answers ``fail`` to RM, although the robot moves. clock_s:
-    initial wall clock in Unix time.
+    dead_zone_units: effort that is needed before a motor turns; only the rest gives speed.
+    motor_inequality: how much faster the left motor is than the right one, as a fraction of the
+    speed. encoder_sign: -1 if the count decreases forward. gyro_bias_dps: bias that the server does
+    not know until it measures it. gyro_noise_dps: standard deviation of a sample while a wheel
+    turns. imu_dies_s, imu_returns_s: times since construction when the IMU fails and when it works
+    again. stuck: wheels that do not turn. motor_board_silent: its serial line is cut. motor_status:
+    bits of MCSTAT, besides those of the voltage; a tripped or short-circuited motor stops. front_m,
+    rear_m: distances from the start to walls across the x axis. dock_m: distance forward from the
+    start to the dock. reference_start_fails: a build that answers ``fail`` to RM, although the
+    robot moves. clock_s: initial wall clock in Unix time.
     """
 
     quirks: Quirks = FIRMWARE

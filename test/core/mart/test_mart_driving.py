@@ -43,6 +43,28 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     assert bench.notices == []
 
 
+@pytest.mark.parametrize("dead_units", [0.0, 2.0, 6.0])
+def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: float) -> None:
+    """The inner wheel turns at 0.01 m/s to 0.02 m/s, by units of which most do not turn it.
+
+    The last curve leads backward, where the heading is unknown.
+    """
+    bench = MartBench(
+        "source", volts=22.0, motor_inequality=0.05, dead_zone_units=dead_units
+    ).ready()
+    for vx, yaw_rate in ((0.3, 0.0), (0.12, 0.5), (0.11, -0.5), (0.1, 0.45), (-0.2, 0.2)):
+        bench.command(vx, yaw_rate, 2.0)
+        speeds, rates = [], []
+        for _ in range(40):
+            bench.command(vx, yaw_rate, 0.1)
+            facts = bench.robot.board.facts
+            speeds.append(facts["speed_mps"])
+            rates.append(facts["yaw_rate_radps"])
+        assert mean(speeds) == pytest.approx(vx, rel=0.05), (vx, yaw_rate)
+        assert mean(rates) == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
+    assert bench.notices == []
+
+
 @pytest.mark.parametrize(("left", "firmware"), [(True, "source"), (False, "firmware")])
 def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmware) -> None:
     """The robot returns to within 5 % of the side, to the left as to the right.

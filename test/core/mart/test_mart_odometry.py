@@ -244,7 +244,7 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)
     for tick in range(100):
-        loop.measured(0.2, -0.3, -0.015, tick * 0.05)
+        loop.measured(0.01, -0.015, 0.05, tick * 0.05)
     assert loop.balance == pytest.approx(1.0 + 0.08)
     assert loop.left_over_right == pytest.approx(1.0 + 0.08)
 

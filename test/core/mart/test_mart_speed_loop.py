@@ -2,6 +2,8 @@
 
 """Tests of what is learned about motors that do not have a speed regulator."""
 
+from random import Random
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -39,7 +41,7 @@ def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
     loop.begin(45, False, now)
     for _ in range(30):
         now += STEP_S
-        loop.measured((45 - dead) * per_unit_mps, 0.0, 0.0, now)
+        loop.measured((45 - dead) * per_unit_mps * STEP_S, 0.0, STEP_S, now)
     for wanted_radps in (0.5, rate_radps):
         units = loop.spin_units(wanted_radps)
         turned_radps = 2 * max(0.0, units - dead) * per_unit_mps / settings.track_m
@@ -57,3 +59,29 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
     for units, speed in measured:
         line.learn(units, speed)
     assert 0.0 < line.units(5.0) < line.units(50.0) < 200.0
+
+
+@given(SLOPES, DEAD, st.integers(0, 1000))
+def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
+    slope: float, dead: float, seed: int
+) -> None:
+    """Noise at one speed says nothing about another speed, however long it lasts."""
+    random, line = Random(seed), MotorLine()
+    for units in (40.0, 12.0, 40.0, 12.0):
+        line.learn(units, slope * max(0.0, units - dead))
+    for _ in range(3000):
+        line.learn(40.0, slope * (40.0 - dead) + random.gauss(0.0, 0.3))
+    assert line.units(slope * (15.0 - dead)) == pytest.approx(15.0, abs=3.0)
+
+
+def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
+    """It stands at 6 units. In a second, it gets enough units to turn."""
+    loop, now = SpeedLoop(MartSettings()), 0.0
+    loop.begin(4, False, now)
+    loop.changed(30, 2, now)
+    for _ in range(10):
+        now += STEP_S
+        loop.measured(0.133 * STEP_S, 0.66 * STEP_S, STEP_S, now)
+    change = loop.change(0.14, 0.5, now)
+    assert change is not None
+    assert change[1] >= 3
