@@ -89,7 +89,8 @@ class Conversation:
     """The exchange of requests and replies with one server.
 
     ``delay_s``: longest time that a datagram may be on its way, in s; ``discarded``: number of late
-    replies so far; ``trip_s``: average duration of a query in s.
+    replies so far; ``trip_s``: average duration of a query in s; ``missed_s``: when a reply was
+    last given up.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -104,7 +105,7 @@ class Conversation:
         self._copies_until_s: dict[Form, float] = {}
         self._answers: dict[Word, tuple[Ok | Fail, float]] = {}
         self.trip_s = 0.0
-        self._disturbed_s = self._doubled_s = -math.inf
+        self._disturbed_s = self._doubled_s = self.missed_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now.
@@ -177,6 +178,7 @@ class Conversation:
         """Give up the pending request if its reply is overdue; return its command, else None."""
         if self.pending is None or now < self.pending.until_s:
             return None
+        self.missed_s = now
         if self.pending.word.kind is Kind.QUERY:
             self.trip_s = min(self.delay_s, LOSS * self.trip_s + LOSS_S)
             self._disturbed_s = now

@@ -24,6 +24,7 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.states import (
     HARMFUL_LATE,
+    ROLLING,
     Motion,
     State,
     may_say,
@@ -34,6 +35,16 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
+STARTS_UP_S: Final = 1.5
+"""Time in s from the first reply after an absence within which no motion is started.
+
+The server opens its ports before it is complete. A server that has just started crashes by VOLTS
+and by most motions, RM with the motors on.
+"""
+ABSENT_S, ABSENT_TRIPS = 0.5, 3
+"""Time in s, plus a number of exchange durations, without a reply that shows an absence."""
+ABSENT_BUSY_S: Final = 2.5
+"""The same while the server is busy or may be busy, as with a stop."""
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which stops are sent while the e-stop is latched.
 
@@ -111,7 +122,7 @@ class Ground:
         self._asked_count: tuple[int, float] | None = None
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
-        self.heard_s = -math.inf
+        self.heard_s = self.appeared_s = -math.inf
         self.greeted = False
         self.began_s: float | None = None
         self._next_s = -math.inf
@@ -135,6 +146,16 @@ class Ground:
     def told(self, now: float) -> OdometryReading:
         """Return the odometry, predicted to ``now``."""
         return self.odometry.told(now, blind_since_s=self.blind_since_s)
+
+    def _hears(self, now: float) -> None:
+        """Note a reply, and whether it is the first one after an absence of the server."""
+        if self.state in (State.STILL, *ROLLING):
+            most_s = ABSENT_S + ABSENT_TRIPS * self.conversation.trip_s
+        else:
+            most_s = ABSENT_BUSY_S
+        if now - self.heard_s > most_s and self.state not in (State.MOVING, State.SERVING):
+            self.appeared_s = now
+        self.heard_s = now
 
     def take(self) -> list[Reading]:
         """Return the readings and the results of jobs that came since the last call."""

@@ -14,7 +14,7 @@ from omnibot_driver.core.commands.actuator import Wanted
 from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
-from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
+from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, STARTS_UP_S
 from omnibot_driver.core.mart.measuring import Measuring
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.states import (
@@ -30,6 +30,10 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 STOPS_S: Final = 1.0
 """Time in s within which a stop is usually answered."""
+VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
+"""Time in s from the first reply after an absence to the first VOLTS; the first start knows it."""
+VOLTS_S: Final = 10.0
+"""Longest time in s for which VOLTS waits for a network that loses nothing."""
 COPY_S: Final = 0.25
 """Time in s after a controlled move; if ENC stays unanswered longer, a duplicate may be running."""
 BLIND_PART: Final = 0.15
@@ -171,7 +175,7 @@ class Pilot(Measuring):
             self._hear(reply, now)
 
     def _hear(self, reply: Reply, now: float) -> None:
-        self.heard_s = now
+        self._hears(now)
         if isinstance(reply, Ok) and reply.form is Form.NAME:
             self._named(reply, now)
             return
@@ -249,9 +253,21 @@ class Pilot(Measuring):
         else:
             self._polls.press(word)
 
+    def _may_ask_volts(self, now: float) -> bool:
+        """Return whether the server is certainly complete, as VOLTS crashes one that starts up.
+
+        A server that is absent for less than ABSENT_S shows it by an unanswered request at most.
+        """
+        quiet_s = min(
+            self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S
+        )
+        return now >= max(self.appeared_s + VOLTS_AFTER_S, quiet_s)
+
     def _poll(self, now: float) -> Packets:
         for word in self._polls.due(self.state, now):
             if word is words.ENC and self._heading_first:
+                continue
+            if word is words.VOLTS and not self._may_ask_volts(now):
                 continue
             if self.conversation.may_ask(word, now):
                 self._require(word)

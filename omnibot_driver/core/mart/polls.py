@@ -71,13 +71,21 @@ class Polls:
                 earliest_s = now + SONARS_APART_S - STILL[each]
                 self._asked_s[each] = max(self._asked_s.get(each, earliest_s), earliest_s)
 
+    def asked_s(self, word: Word) -> float:
+        """Return when the query was last sent; minus infinity if never."""
+        return self._asked_s.get(word, -math.inf)
+
     def press(self, word: Word) -> None:
         """Make the query due at once."""
         self._asked_s.pop(word, None)
 
     def wake_at(self, state: State) -> float:
-        """Return the time at which the next query is due in this state; infinite if none is."""
-        return min((self._at(word, state) for word in PERIODS.get(state, {})), default=math.inf)
+        """Return the time at which the next frequent query is due; infinite if none is.
+
+        The others need no wake-up of their own.
+        """
+        frequent = (word for word in (ENC, RMRA) if word in PERIODS.get(state, {}))
+        return min((self._at(word, state) for word in frequent), default=math.inf)
 
     def _at(self, word: Word, state: State) -> float:
-        return self._asked_s.get(word, -math.inf) + PERIODS[state][word]
+        return self.asked_s(word) + PERIODS[state][word]

@@ -11,7 +11,7 @@ from typing import Final
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
-from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
+from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, STARTS_UP_S
 from omnibot_driver.core.mart.moves import Moves
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import (
@@ -73,14 +73,16 @@ class Starts(Moves):
         return self._ask(words.CS.request(-right, -left), now)
 
     def _act_still(self, now: float) -> Packets:
-        if self._rescue:
-            return self._begin(words.MCR.request("SLOW", 1), now)
-        if not self._rolled_out:
+        if not self._rolled_out and not self._rescue:
             return NO_PACKETS  # the roll-out is counted before the count begins anew
         if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
             self._estop_said_s = now
             self.proof.stopped(now)
             return self._send(HALTS[Motion.UNKNOWN], now)
+        if now < self.appeared_s + STARTS_UP_S:
+            return NO_PACKETS
+        if self._rescue:
+            return self._begin(words.MCR.request("SLOW", 1), now)
         if self.imu.retries(now):
             return self._check(now)
         start = self._next_start(now)

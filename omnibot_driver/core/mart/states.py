@@ -65,6 +65,10 @@ class State(Enum):
     LOST = "lost: the server must be restarted"
 
 
+ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
+"""The states in which the robot moves and the server answers queries."""
+
+
 class Motion(Enum):
     """The command by which the server moves, or may move, the robot."""
 

@@ -20,6 +20,7 @@ from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.speed_loop import turn_is_on_the_spot
 from omnibot_driver.core.mart.states import (
     HALTS,
+    ROLLING,
     Motion,
     State,
 )
@@ -55,7 +56,6 @@ NAMES: Final = {
     Motion.UNKNOWN: "a motion of another program",
     Motion.NONE: "nothing",
 }
-ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
 
 
 class Stops(Ground, ABC):
@@ -201,6 +201,8 @@ class Stops(Ground, ABC):
             self.odometry.finish_straight()
         if isinstance(result, Fail):
             self._failed(motion, result, now)
+        elif result is None and motion is not Motion.UNKNOWN and now >= self._again_s:
+            self.appeared_s = now  # it knows of no motion: maybe it was started again meanwhile
         if motion is Motion.UNKNOWN:
             self._negative_sweep = result is None
             self._swept_s = now

@@ -22,6 +22,8 @@ Handler = Callable[["MartServer", str], str | None]
 It returns the reply, or None if the reply comes later or never.
 """
 
+NEED_ALL = ("VOLTS", "RM ", "MCF", "MCB", "TF", "PTF", "TB", "R", "L", "MCR", "MCL")
+"""Commands that need what the server creates last, after it opened its ports."""
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
 BAD_DISTANCE = "fail bad distance value"
@@ -48,6 +50,9 @@ def execute(server: "MartServer", text: str) -> str | None:
         if text.startswith(word) if begins else text == word:
             if is_motion and server.conflict:
                 return CONFLICT
+            if server.starts_up and server.quirks.crashes_early and word in NEED_ALL:
+                server.end(f"{text} before all was ready")
+                return None
             return handler(server, text)
     return NOT_SUPPORTED
 

@@ -19,6 +19,8 @@ from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then
 
 QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
 QUICK_S = 0.0005
+BOOT_S, START_UP_S = 0.3, 0.8
+"""Time until a restarted server opens its ports, and from then until all is ready, in s."""
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
 Sender = object
@@ -52,7 +54,7 @@ class MartServer(ServerState):
         self.executed: deque[str] = deque(maxlen=REMEMBERED)
         self._out: list[Reply] = []
         self._step_at_s = inf
-        self._boots_until_s = -inf
+        self._boots_until_s = self._starts_until_s = -inf
         self.begin()
 
     def begin(self) -> None:
@@ -110,14 +112,20 @@ class MartServer(ServerState):
         new._queue, new._stop_queue = self._queue.copy(), self._stop_queue.copy()
         return new
 
-    def restart(self, boot_s: float = 0.0) -> None:
+    def restart(self, boot_s: float = BOOT_S) -> None:
         """Start the server program again; the motors keep their last command.
 
-        Datagrams of the next ``boot_s`` seconds are lost.
+        Datagrams of the next ``boot_s`` seconds are lost. START_UP_S later all is ready.
         """
         self.begin()
         self.imu.restart()
         self._boots_until_s = self.now_s + boot_s
+        self._starts_until_s = self._boots_until_s + START_UP_S
+
+    @property
+    def starts_up(self) -> bool:
+        """Whether the program has opened its ports, but has not created everything yet."""
+        return self.now_s < self._starts_until_s
 
     def power_cycle(self, boot_s: float = 1.0) -> None:
         """Switch controller and motor board off and on; the robot stays where it is."""

@@ -36,6 +36,7 @@ class Quirks:
         number, drive until stopped.
     echoes_distance: TF and TB reply with the distance computed from time, not the distance driven.
     crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR with too few numbers end the server.
+    crashes_early: VOLTS and all motions but F and B end a server that has just started.
     empty_datagram_ends: an empty datagram at the command port ends the server.
     exit_is_silent: EXIT is not answered unless LOG was sent before.
     log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, which then fail.
@@ -63,6 +64,7 @@ class Quirks:
     zero_distance_is_unlimited: bool = False
     echoes_distance: bool = False
     crashes_on_missing_numbers: bool = False
+    crashes_early: bool = False
     empty_datagram_ends: bool = False
     exit_is_silent: bool = False
     log_deletes_files: bool = False

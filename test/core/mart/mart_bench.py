@@ -86,7 +86,7 @@ class MartBench(AnyBench):
         """Connect, until the session is nominal and the robot is seen to stand still."""
         self.open()
         self.run_until(lambda: self.session.state == "nominal", 30.0)
-        self.run(1.5)
+        self.run(2.0)
         return self
 
     @property

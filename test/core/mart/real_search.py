@@ -26,6 +26,7 @@ from typing import Final, Literal, NamedTuple
 
 from mart_bench import POLLS, MartBench, sleeps
 
+from omnibot_driver.core.mart import words
 from omnibot_driver.core.packets import Packet
 
 Fate = Literal["lost", "late", "twice", "the IMU dies"]
@@ -181,7 +182,9 @@ def _ready() -> MartBench:
 
 def ran(trial: Trial) -> Carrier:
     """Run the trial to its end."""
-    bench = copy.deepcopy(_ready()) if trial.wishes else MartBench("firmware", seed=3)
+    # The driver compares its words by identity, so the copy has the same words.
+    same = {id(word): word for word in vars(words).values() if isinstance(word, words.Word)}
+    bench = copy.deepcopy(_ready(), same) if trial.wishes else MartBench("firmware", seed=3)
     carrier = bench.robot = Carrier(bench, trial)
     if trial.wishes:
         carrier.counting = True

@@ -151,6 +151,25 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
     assert bench.try_command(0.3, 0.0)
 
 
+@pytest.mark.parametrize("wanted", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)])
+@pytest.mark.parametrize("boot_s", [0.3, 1.0, 4.0])
+def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
+    wanted: tuple[float, float], boot_s: float
+) -> None:
+    """They would crash it. The robot, whose motors the restart did not stop, is stopped."""
+    for offset_s in (0.0, 0.23, 0.46, 0.71):
+        bench = MartBench().ready()
+        bench.command(*wanted, 2.0 + offset_s)
+        bench.server.restart(boot_s)
+        bench.command(*wanted, 1.5)
+        bench.command(0.0, 0.0, 10.0)
+        assert not bench.server.crashed, (offset_s, bench.server.crashed)
+        assert bench.robot.stands
+        assert bench.session.state == "nominal"
+        bench.command(*(wanted if any(wanted) else (0.3, 0.0)), 3.0)
+        assert not bench.robot.stands
+
+
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,

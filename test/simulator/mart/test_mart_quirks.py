@@ -120,6 +120,17 @@ def crashes_on_missing_numbers(quirks: Quirks) -> bool:
     return rig.ask("TIME 7 4 2024 12 30") is None and bool(rig.server.crashed)
 
 
+def crashes_early(quirks: Quirks) -> bool:
+    """VOLTS ends a server that has just started; later it does not."""
+    rig = Rig(quirks)
+    rig.server.restart(boot_s=0.0)
+    early = rig.ask("VOLTS")
+    rig.server.restart(boot_s=0.0)
+    rig.run(1.0)
+    assert rig.ask("VOLTS") == "ok 24.00"
+    return early is None
+
+
 def empty_datagram_ends(quirks: Quirks) -> bool:
     """Requests after an empty datagram are not answered."""
     rig = Rig(quirks)
