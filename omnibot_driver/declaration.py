@@ -92,6 +92,10 @@ def _check(
     node: Node, table: parameters.Table, changed: list[rclpy.Parameter]
 ) -> SetParametersResult:
     """Return whether the changed values are valid, alone and together with the others."""
+    for item in changed:
+        if item.type_ is rclpy.Parameter.Type.NOT_SET and item.name in table.by_name:
+            reason = f"parameter '{item.name}' cannot be deleted; give it another value"
+            return SetParametersResult(successful=False, reason=reason)
     present = {item.name: item.value for item in node.get_parameters(list(table.by_name))}
     try:
         table.check_all({**present, **_ours(changed, table)})

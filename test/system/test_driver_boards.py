@@ -76,6 +76,20 @@ def test_what_a_board_lacks_is_not_advertised(
     assert gain.double_value == 2.0
 
 
+def test_a_deleted_parameter_does_not_block_the_others(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """A parameter that may be unset is not deleted, because every later change reads it."""
+    probe: Probe = probe_of(start_plain(start_driver, start_board().path))
+    deleted = [RosParameter(name="gain", value=ParameterValue())]
+    (result,) = probe.call(SetParameters, "set_parameters", parameters=deleted).results
+    assert not result.successful
+    assert "'gain' cannot be deleted" in result.reason
+    slow = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.1)
+    request = [RosParameter(name="max_linear_speed", value=slow)]
+    assert probe.call(SetParameters, "set_parameters", parameters=request).results[0].successful
+
+
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
     """It drives, its wheels have their names, and its own service replies."""
     board = start_board()
