@@ -19,7 +19,7 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The e-stop cannot be released then; the board itself would obey set-points."""
+    """The driver refuses to release the e-stop; the board itself would obey set-points."""
     bench = Bench(firmware)
     bench.drive_on()
     bench.presses(True)
@@ -36,7 +36,7 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """Advice names only parameters of this board, which has an e-stop release but not ~/start."""
+    """Advice names this board's parameters, and the e-stop release, since it lacks ~/start."""
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
         with pytest.raises(CommandRefused, match="motion monitor"):

@@ -42,7 +42,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The end is reported once; it is repeated on the line until the board leaves the mode."""
+    """The end is reported once, even if the first lines that end the mode are lost."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
