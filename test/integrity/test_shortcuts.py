@@ -153,7 +153,7 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few IMU frames may be weighed one by one; else comparing the two ways proves nothing."""
+    """Less than 10 % of the IMU frames are weighed one by one; the quick loop takes the others."""
     weighed = []
     weigh = decoder.Expectation.weigh
 

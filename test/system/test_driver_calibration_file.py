@@ -62,6 +62,6 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
 def test_a_home_that_nobody_has_ends_the_start(start_driver: Start) -> None:
     """The message asks for the complete path, and the exit code is 2."""
     driver = start_driver("/dev/null", calibration_file="~nosuchuser/c.yaml")
-    driver.wait_for_line("the calibration_file ~nosuchuser/c.yaml cannot be found: .*whole path")
+    driver.wait_for_line("the calibration_file ~nosuchuser/c.yaml cannot be found: .*full path")
     assert driver.end() == 2
     assert "Traceback" not in driver.output

@@ -193,10 +193,12 @@ def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver
     """The middleware would discard these commands silently."""
     reports = probe.listen(DiagnosticArray, "/diagnostics")
     probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
-    driver.wait_for_line("probe publishes another type.*enable_stamped_cmd_vel:=true")
+    driver.wait_for_line(
+        "probe publishes cmd_vel with a type other than .*enable_stamped_cmd_vel:=true"
+    )
     until = len(reports) + 4  # one a second; it looks every two
     probe.wait_for(lambda: len(reports) >= until)
-    assert driver.output.count("publishes another type") == 1
+    assert driver.output.count("publishes cmd_vel with a type other than") == 1
 
 
 def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(

@@ -31,7 +31,7 @@ Start = Callable[..., Any]
         ({"on_exit": "explode"}, "'on_exit' must be one of stop, pause, reset"),
         ({"axis_signs": "[1, 2, 1]"}, "'axis_signs' must be three numbers"),
         ({"baudrate": "fast"}, "'baudrate' must be an integer, not 'fast'"),
-        ({"on_exit": "off"}, "'on_exit' must be a string, not False .*put it in quotes"),
+        ({"on_exit": "off"}, "'on_exit' must be a string, not False .*put the word in quotes"),
         ({"odom_frame": "/odom"}, "leading slash"),
         ({"max_linear_speed": 3.0}, "'max_linear_speed' .* above 'fastest_linear_speed'"),
         ({"fastest_angular_speed": 0.4}, "'max_angular_speed' .* above 'fastest_angular_speed'"),
@@ -77,7 +77,7 @@ def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list
     command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
-    assert f"cannot start: unknown argument {' '.join(words)}; parameters are" in ended.stderr
+    assert f"cannot start: unknown argument {' '.join(words)}; give parameters" in ended.stderr
     assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
 
 
@@ -96,7 +96,7 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     assert (ended.returncode, ended.stderr) == (0, "")
     assert ended.stdout.startswith("usage: ros2 run omnibot_driver driver ")
     assert "--ros-args -p port:=/dev/ttyUSB0\n" in ended.stdout
-    assert "config/omnibot.yaml" in ended.stdout
+    assert "config/<board>.yaml" in ended.stdout
 
 
 def test_help_that_is_not_read_to_its_end_is_no_error() -> None:

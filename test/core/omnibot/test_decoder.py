@@ -204,7 +204,7 @@ def test_one_whole_text_is_enough_to_believe() -> None:
 
 
 def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
-    """They are out of step, and the bytes behind them are no frame, so both are rejected."""
+    """They are out of step, and no frame follows them, so both are rejected."""
     look_alike = encode(DeltaFrame(1, 2, 3, 4)) + encode(DeltaFrame(5, 6, 7, 8))
     assert decoded([look_alike + b"\x00" + LEAD_IN * 2]) == [REST] * 4
 

@@ -109,7 +109,7 @@ def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
 
 @every_kind
 def test_letters_within_a_control_frame_act_where_frames_are_not_obeyed(kind: ReceiverKind) -> None:
-    """While only letters are obeyed, each byte of a motion frame that is a letter acts."""
+    """A board that obeys only letters also obeys the letters P, R and S in a motion frame."""
     frame = "FF FE 01 00 50 00 52 00 53"
     assert understood(frame, kind=kind, control_frames=False) == [PAUSE, RESET, START]
 
