@@ -19,13 +19,13 @@ USAGE: Final = "give parameters like this: --ros-args -p port:=/dev/ttyUSB0"
 HELP: Final = f"""\
 usage: ros2 run omnibot_driver driver [--ros-args -p NAME:=VALUE ... --params-file FILE]
 
-The driver of a robot's motor board: publishes what it measures, and drives it as commanded.
+The driver of a robot's motor board: publishes its measurements, and sends it your commands.
 
 {USAGE[0].upper()}{USAGE[1:]}
 Without a robot: --ros-args -p port:=sim://
-The parameter `board` says which board it is (default: omnibot). config/omnibot.yaml has every
-parameter of that one, with its default and what it may be; so does docs/parameters.md. README.md
-has the topics and services."""
+The parameter `board` says which board it is (default: omnibot). config/<board>.yaml has every
+parameter of that board with its default and its permitted values; docs/parameters.md has those
+of all boards. README.md has the topics and services."""
 SETUP: Final = (
     "ROS 2 is not set up in this shell, or a library is not installed: `source"
     " /opt/ros/jazzy/setup.bash`, then `rosdep install --from-paths src`"

@@ -80,14 +80,14 @@ class Delay:
             return
         if 2 * self.waited_s > self.total_s:
             where = (
-                f"{self.waited_s:.1f} s of it in this driver's queue: check the load of this"
-                " computer"
+                f"it waited {self.waited_s:.1f} s of that in this driver's queue: check the load of"
+                " this computer"
             )
         else:
             where = "check the network, and the load and the clock of the sending computer"
         raise CommandRefused(
-            f"{topic} refused: it was sent {self.total_s:.1f} s ago, cmd_vel_timeout is"
-            f" {longest_s:g} s; {where}"
+            f"{topic} refused: it was sent {self.total_s:.1f} s ago, and commands expire after"
+            f" {longest_s:g} s (cmd_vel_timeout); {where}"
         )
 
 

@@ -151,7 +151,7 @@ def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
 def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
     """The delays are those of a USB adapter with a latency timer of 16 ms."""
     drive.imu.late_s = drive.imu.late_s + np.remainder(-drive.imu.stamp_s, 0.016)
-    late = said(drive, "Timing", "imu/data_raw arrives")
+    late = said(drive, "Timing", "The delay of imu/data_raw")
     assert late.level is Level.WARN
     assert "latency_timer" in late.advice
 

@@ -64,7 +64,7 @@ def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
 def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
     """The cause is a wrong ``base_radius``, or slip."""
     drive.imu.values[:, 2] *= 1.2
-    assert "base_radius" in said(drive, "IMU", "gyro turned 1.2").advice
+    assert "base_radius" in said(drive, "IMU", "gyro measured 1.2").advice
 
 
 @pytest.mark.parametrize("lost", [("imu",), ("odom",), ("imu", "odom")], ids="+".join)
@@ -74,7 +74,7 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     """Two seconds of a turn are lost, so the next pose contains them in a single step."""
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
-    assert said(drive, "IMU", "gyro turned 1.000 times").level is Level.GOOD
+    assert said(drive, "IMU", "gyro measured 1.000 times").level is Level.GOOD
 
 
 def test_a_gap_in_the_odometry_is_no_rest(drive: Drive) -> None:
@@ -141,7 +141,7 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
     """The driver then stops the robot, so the note explains why it stood still."""
     drive.cmd_vel.drop(10.0, 10.8)
-    assert "1 time in motion" in said(drive, "Commands", "interrupted").text
+    assert "1 time for more" in said(drive, "Commands", "paused").text
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:

@@ -94,7 +94,7 @@ class Interlocks:
             return "a calibration is under way; wait for its answer, then call again"
         if current is not None and not current.is_zero:
             return (
-                f"the robot is commanded by {current.authority.value}; stop the sender, then call"
-                " again"
+                f"the robot is commanded by {current.authority.value}; end these commands, then"
+                " call again"
             )
         return ""

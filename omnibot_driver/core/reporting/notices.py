@@ -23,7 +23,7 @@ STOP_UNSEEN: Final = (
 )
 STOP_BLIND: Final = (
     "stop unconfirmed: the board does not measure its wheels after this command; check by eye"
-    " that the robot has stopped (said once)"
+    " that the robot has stopped (reported once)"
 )
 STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
 STOP_UNMEASURED: Final = (

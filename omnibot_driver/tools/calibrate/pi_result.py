@@ -143,8 +143,8 @@ def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
     remarks = [
         f"The {wheel.name} wheel: a step to {wheel.tuned.target_rpm:.0f} RPM is predicted to"
         f" overshoot by {predicted.overshoot:.1%}, and to be in its band after"
-        f" {predicted.settled_s:.2f} s; measured {wheel.after.overshoot:.1%}, before"
-        f" {wheel.before.overshoot:.1%}."
+        f" {predicted.settled_s:.2f} s; the measured overshoot is"
+        f" {wheel.after.overshoot:.1%}, and was {wheel.before.overshoot:.1%} with the gains before."
     ]
     if predicted.settled_s > goals.settled_s:
         remarks.append(

@@ -68,7 +68,9 @@ def rest(imu: Imu) -> Rest:
     """Evaluate a rest. Raises ToolError for too few, non-finite or stuck readings, or for gaps."""
     rates, forces = imu.rate_radps, imu.force_mps2
     if len(rates) < FEWEST:
-        raise ToolError(f"{len(rates)} IMU readings are too few: rest for a second at least")
+        raise ToolError(
+            f"{len(rates)} IMU readings are too few: let the robot rest for at least a second"
+        )
     if not (np.isfinite(rates).all() and np.isfinite(forces).all()):
         raise ToolError("the IMU's readings are not all finite: see what the driver logs")
     period_s = float(np.median(np.diff(imu.stamp_s)))

@@ -42,8 +42,8 @@ def read(path: Path) -> dict[str, Column]:
     for told in columns.values():
         if not told or sum(not one for one in told[1:]) > UNTOLD * len(told):
             raise ToolError(
-                f"the record {path} has ticks that took longer than the board can tell, or its unit"
-                " is not known: with a unit of 100 ns wheels have to turn faster than 152 RPM"
+                f"the record {path} has ticks that took longer than the board can report, or its"
+                " unit is not known: with a unit of 100 ns wheels have to turn faster than 152 RPM"
             )
     return {
         side: np.array([float(one) if one else np.nan for one in told])

@@ -201,9 +201,9 @@ def _ceased(log: Log, pair: Pair) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Commands",
-            f"{pair.topic} was interrupted {counted(len(ceased), 'time')} in motion for more"
-            f" than {COMMAND_TIMEOUT_S:g} s, first at {commands.arrived_s[ceased[0]]:.1f} s: the"
-            " driver stopped the robot.",
+            f"{pair.topic} paused {counted(len(ceased), 'time')} for more than"
+            f" {COMMAND_TIMEOUT_S:g} s while the robot moved, first at"
+            f" {commands.arrived_s[ceased[0]]:.1f} s: the driver stopped the robot.",
             "If that was not meant, publish at a steady rate of 10 Hz or more.",
         )
 

@@ -35,7 +35,7 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "Path",
         plots.path,
         lambda log: int(log.odom.finite.sum()),
-        "Where the odometry says that the robot went.",
+        "The robot's path by the odometry.",
     ),
     (
         "velocities",
@@ -64,7 +64,7 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "Timing",
         plots.timing,
         lambda log: max(len(log.imu), len(log.odom)) // 10,
-        "Stamps should step by exactly a period. Arrival may be late; stamps do not depend on it.",
+        "Stamps should be exactly one period apart. Late arrival does not change a stamp.",
     ),
 )
 

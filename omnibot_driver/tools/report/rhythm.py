@@ -270,8 +270,8 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     yield Finding(
         Level.WARN if late else Level.GOOD,
         "Timing",
-        f"{stream.name} arrives {1e3 * over_s:.2f} ms later than at best on average, and less than"
-        f" {1e3 * most_s:.1f} ms later in 99 of 100 cases.",
+        f"The delay of {stream.name} above its minimum is {1e3 * over_s:.2f} ms on average, and"
+        f" less than {1e3 * most_s:.1f} ms in 99 of 100 cases.",
         "Set the adapter's latency_timer to 1 (udev/99-omnibot.rules), or reduce the load of the"
         " computer."
         if late

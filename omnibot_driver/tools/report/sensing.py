@@ -225,7 +225,8 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
         return
     ratio, total = found
     figure = (
-        f"The gyro turned {abs(ratio):.3f} times what the wheels did, over {np.degrees(total):.0f}°"
+        f"The gyro measured {abs(ratio):.3f} times the rotation by the wheels,"
+        f" over {np.degrees(total):.0f}°"
     )
     if abs(abs(ratio) - 1.0) > TURN_TOLERANCE:
         yield Finding(

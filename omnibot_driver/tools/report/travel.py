@@ -114,8 +114,8 @@ def _leaps(odom: Series, found: Steps) -> Iterator[Finding]:
     yield Finding(
         Level.BAD,
         "Odometry",
-        f"The pose jumps {counted(int(leap.sum()), 'time')} to places where the twist does not"
-        f" lead: at {at_s[worst]:.1f} s by {found.off_m[worst]:.2f} m and"
+        f"The pose jumps {counted(int(leap.sum()), 'time')} in a way that the twist does not"
+        f" explain: at {at_s[worst]:.1f} s by {found.off_m[worst]:.2f} m and"
         f" {np.degrees(found.off_rad[worst]):.0f}°.",
         "Do two nodes publish odom? If not, look at the gaps and at fastest_linear_speed.",
     )

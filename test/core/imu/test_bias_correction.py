@@ -53,7 +53,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
     """A calibration is refused during a command, and fails if a command arrives later."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.3, 0.0, 0.0), bench.now)
-    with pytest.raises(RequestRefused, match="commanded by cmd_vel; stop the sender"):
+    with pytest.raises(RequestRefused, match="commanded by cmd_vel; end these commands"):
         bench.session.calibrate_gyro("token", bench.now)
     bench.run(2.0)
     bench.session.calibrate_gyro("token", bench.now)
@@ -64,7 +64,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
     done = bench.events[-1]
     assert isinstance(done, RequestDone)
     assert not done.success
-    assert "a motion command came in" in done.message
+    assert "a motion command arrived" in done.message
 
 
 def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
