@@ -13,7 +13,7 @@ import math
 from functools import lru_cache
 from typing import Final
 
-from omnibot_driver.core.fejemis.numerals import between, nearest
+from omnibot_driver.core.fejemis.numerals import beside, between, nearest
 from omnibot_driver.core.fejemis.outbound import robust
 
 STOP: Final = b"rc 2 0 0"
@@ -81,7 +81,7 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     found = []
     for number, text in candidates:
         rest = math.degrees(math.sqrt(max(0.0, rim_mps * rim_mps - number * number)))
-        for turn_number, turn_text in ((0.0, "0"), nearest(rest, negative=negative)):
+        for turn_number, turn_text in ((0.0, "0"), *beside(rest, negative=negative)):
             turn = math.radians(turn_number)
             off = abs(math.hypot(number, turn) / rim_mps - 1.0)
             aside = abs(math.atan2(turn, number) - wanted_rad)

@@ -49,6 +49,14 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
     return numbers[at], texts[at]
 
 
+def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
+    """Return the numbers of ``numerals`` just below and just above ``number``, with their texts."""
+    numbers, texts = numerals(negative=negative)
+    at = bisect_left(numbers, number)
+    part = slice(max(0, at - 1), at + 1)
+    return list(zip(numbers[part], texts[part], strict=True))
+
+
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
     """Return the numbers of ``numerals`` from ``least`` to ``most``, with their texts."""
     numbers, texts = numerals(negative=negative)
