@@ -6,11 +6,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
-from omnibot_driver.boards.fejemis_parameters import (
-    DRIVING,
-    FRONT_PORT,
-    SENSORS,
-    WHEELS,
+from omnibot_driver.boards.fejemis_parameters import DRIVING, FRONT_PORT, SENSORS, WHEELS
+from omnibot_driver.boards.fejemis_values import (
     require_two_ports,
     require_whole_settings,
     written,

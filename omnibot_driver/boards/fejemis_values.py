@@ -1,0 +1,84 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Values of a Fejemis' parameters: what is written to the boards, and which values fit together.
+
+Knows no ROS, and not what a parameter means to the boards.
+"""
+
+import math
+import os
+from collections.abc import Mapping
+from typing import Any, Final
+
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.fejemis import Written
+
+
+def written(values: Mapping[str, Any]) -> dict[Written, tuple[float, ...]]:
+    """Return the settings that the user wants written to the boards, in the boards' units."""
+    found: dict[Written, tuple[float, ...]] = {}
+    radii_m, track_m = values["wheel_radii"], values["track"]
+    if radii_m is not None:
+        gear, ticks = values["gear"], values["encoder_ticks"]
+        found[Written.WHEELS] = (*radii_m, gear, float(ticks), track_m)
+    if values["steering_distance"] is not None:
+        found[Written.STEERING] = (track_m, values["steering_distance"])
+    if values["front_wheel_offset"] is not None:
+        found[Written.FRONT_WHEEL] = (
+            math.degrees(values["front_wheel_offset"]),
+            float(values["front_wheel_inverted"]),
+        )
+    for name, setting in _LISTS.items():
+        if values[name] is not None:
+            found[setting] = tuple(values[name])
+    return found
+
+
+_LISTS: Final[Mapping[str, Written]] = {
+    "ir_calibration": Written.INFRARED,
+    "mag_calibration": Written.MAGNETOMETER,
+    "accel_calibration": Written.ACCELEROMETER,
+    "steering_gains": Written.STEERING_GAINS,
+}
+_WHEELS: Final = ("wheel_radii", "gear", "encoder_ticks")
+
+
+def require_two_ports(values: Mapping[str, Any]) -> None:
+    """Reject one device for both Teensys, since the robot needs both of them."""
+    port, front = (str(values[name]) for name in ("port", "front_port"))
+    if port == front or (port.startswith("/") and _same(port, front)):
+        raise ParameterError(
+            f"parameter 'front_port' must not be '{front}', which is 'port': the drive and the"
+            " front Teensy have a port each; `ls /dev/serial/by-id/` shows them"
+        )
+
+
+def require_whole_settings(values: Mapping[str, Any]) -> None:
+    """Reject an incomplete set of values that a board takes together in one command."""
+    _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
+    _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")
+    offset = ("front_wheel_offset", "front_wheel_inverted")
+    _require_together(values, offset, offset, "fwoffset")
+    if values["track"] is not None and not any(
+        values[name] is not None for name in (*_WHEELS, "steering_distance")
+    ):
+        raise ParameterError(
+            "parameter 'track' must be set together with others: set 'steering_distance' too, or"
+            " 'wheel_radii', 'gear' and 'encoder_ticks', or leave 'track' unset"
+        )
+
+
+def _require_together(
+    values: Mapping[str, Any], names: tuple[str, ...], deciding: tuple[str, ...], command: str
+) -> None:
+    if not any(values[name] is not None for name in deciding):
+        return
+    if lacking := [name for name in names if values[name] is None]:
+        raise ParameterError(
+            f"parameter '{lacking[0]}' must be set too: the board takes {', '.join(names)} with"
+            f" one command ({command}); set all of them or none"
+        )
+
+
+def _same(one: str, other: str) -> bool:
+    return os.path.realpath(one) == os.path.realpath(other)
