@@ -13,6 +13,7 @@ import math
 
 from omnibot_driver.core.board import Board, BoardFigures, Mode
 from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.fejemis import shown
 from omnibot_driver.core.fejemis.actuator import PairStream
 from omnibot_driver.core.fejemis.angle_relay import AngleRelay
 from omnibot_driver.core.fejemis.encoder import Encoder
@@ -23,7 +24,6 @@ from omnibot_driver.core.fejemis.obedience import Obedience
 from omnibot_driver.core.fejemis.ports import Ports
 from omnibot_driver.core.fejemis.services import Services
 from omnibot_driver.core.fejemis.settings import FejemisSettings
-from omnibot_driver.core.fejemis.shown import own_figures
 from omnibot_driver.core.fejemis.steering import Geometry
 from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.translation import Translation
@@ -119,14 +119,8 @@ class FejemisBoard(Board):
     @property
     def figures(self) -> BoardFigures:
         """Counters and figures for diagnostics, over all connections."""
-        halves = self._ports.halves
-        return BoardFigures(
-            rates_hz={"IMU": 100.0, "Odometry": 50.0},
-            trouble=self.refusal,
-            faults=sum(half.statistics.faults for half in halves),
-            discarded_bytes=sum(half.statistics.discarded_bytes for half in halves),
-            own=own_figures(self._ports, self._upkeep, self._translation, self._obedience.source),
-        )
+        source = self._obedience.source
+        return shown.figures(self._ports, self._upkeep, self._translation, source, self.refusal)
 
     # Inbound
 
@@ -144,7 +138,7 @@ class FejemisBoard(Board):
         """Return the readings that these bytes complete."""
         self._open(now)
         self._inbound.receive(data, now, channel)
-        self._look(now)
+        self._inbound.look(now, driving=self.driving)
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
@@ -177,10 +171,14 @@ class FejemisBoard(Board):
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 
+    def leave(self) -> None:
+        """Switch brush and lift off, as the driver ends; the wheels may take longer to stop."""
+        self._upkeep.machine.off()
+
     def elapse(self, now: float) -> list[Reading]:
         """Act on timeouts, and return the readings that result."""
         self._open(now)
-        self._look(now)
+        self._inbound.look(now, driving=self.driving)
         return self._taken(now)
 
     def _open(self, now: float) -> None:
@@ -196,9 +194,6 @@ class FejemisBoard(Board):
         self._told.notices.clear()
         self._upkeep.jobs.done.clear()
         return self._translation.stamped.readings
-
-    def _look(self, now: float) -> None:
-        self._inbound.look(now, driving=self.driving)
 
     def _angle_told(self, angle_rad: float, now: float) -> bool:
         return self._actuator is not None and self._actuator.angle_told(angle_rad, now)

@@ -5,6 +5,7 @@
 import math
 from typing import Final
 
+from omnibot_driver.core.board import BoardFigures
 from omnibot_driver.core.fejemis.half import Half
 from omnibot_driver.core.fejemis.ports import ROLES, Ports
 from omnibot_driver.core.fejemis.translation import Translation
@@ -15,10 +16,25 @@ SHOWN: Final = 3
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 
-def own_figures(
+def figures(
+    ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None, trouble: str
+) -> BoardFigures:
+    """Return counters and figures for diagnostics, over all connections.
+
+    ``source``: rcSource of the drive board. ``trouble``: why the robot must not be driven.
+    """
+    return BoardFigures(
+        rates_hz={"IMU": 100.0, "Odometry": 50.0},
+        trouble=trouble,
+        faults=sum(half.statistics.faults for half in ports.halves),
+        discarded_bytes=sum(half.statistics.discarded_bytes for half in ports.halves),
+        own=_own(ports, upkeep, translation, source),
+    )
+
+
+def _own(
     ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None
 ) -> dict[str, str]:
-    """Return the diagnostics of both boards by name; ``source``: rcSource of the drive board."""
     front, machine = translation.front, upkeep.machine
     own = {"Ports": "swapped" if ports.swapped else "as configured"}
     for role in ROLES:

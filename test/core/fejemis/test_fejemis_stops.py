@@ -329,6 +329,21 @@ def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(secon
     assert not bench.robot.vehicle.brush
 
 
+def test_the_brush_is_off_as_soon_as_the_driver_begins_to_end() -> None:
+    """The driver waits until the wheels stand still before it sends its last lines."""
+    bench = nominal()
+    bench.board.services.set_brush(True, bench.now)
+    bench.settle()
+    bench.drive_on()
+    mark = bench.now
+    bench.session.shutdown.begin(bench.now)
+    bench.settle()
+    bench.run(0.05)
+    assert not bench.robot.vehicle.brush
+    bench.run(1.5)
+    assert "brush 1" not in bench.lines(FRONT, mark)
+
+
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
     """One line may be lost, and the driver cannot repeat it after the exit."""
     bench = nominal()
