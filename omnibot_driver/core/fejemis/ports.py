@@ -3,8 +3,8 @@
 """Finds which of the two boards (halves) is at which port, and addresses lines to them.
 
 The heartbeats identify the boards, whatever the order of the ports. Until a board is identified,
-lines that end something go to both ports, and no other lines are sent to that board. The module
-knows identities, not the lines' meaning.
+lines that end something go to each port where it may be, and no other lines are sent to it. The
+module knows identities, not the lines' meaning.
 """
 
 from dataclasses import replace
@@ -102,10 +102,11 @@ class Ports:
         return NO_PACKETS if half is None else self.at(self.halves.index(half), *texts)
 
     def ending(self, role: Role, *texts: bytes) -> Packets:
-        """Return lines that end something, for one board; for both ports while it is unknown."""
-        if self.half(role) is None:
-            return self.at(0, *texts) + self.at(1, *texts)
-        return self.line(role, *texts)
+        """Return lines that end something, for one board, or for each port where it may be."""
+        if self.half(role) is not None:
+            return self.line(role, *texts)
+        unknown = [channel for channel, half in enumerate(self.halves) if half.role is None]
+        return sum((self.at(channel, *texts) for channel in unknown or (0, 1)), NO_PACKETS)
 
     def both(self, text: bytes) -> Packets:
         """Return a line for each board, behind a line end that closes any incomplete line."""
