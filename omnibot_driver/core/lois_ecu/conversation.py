@@ -114,7 +114,10 @@ class LoisConversation:
                 self._stall.heard(report, at, self._translation.odometry.resting)
         stalled = self._stall.stalled(now)
         if self._translation.odometry.appends and any(stalled):
-            self._translation.odometry.stalled(stalled)
+            rolls_left, rolls_right = self._stall.saturated
+            self._translation.odometry.stalled(
+                (stalled[0] and not rolls_left, stalled[1] and not rolls_right)
+            )
             self._points.clear_again()
         found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
         if self._translation.restarts != restarts:

@@ -8,9 +8,10 @@ new, slower set-point, the motor gets no power. RPM 0/0 clears it.
 Ticks show a wheel that turns forward; 0x20 shows one that should turn backward. If that wheel is at
 rest, the pose of 0x20 does not change while nothing ticks, and while the other wheel ticks its
 velocity repeats the same speed of this one. A wheel that rolls steadily repeats a speed too, but
-not far above its set-point: there the controller gives it no power, so it would become slower. That
-is not so with a feed-forward, which is power that does not depend on the speed.
-Works on set-points, reports and times.
+not far above its set-point: there the controller gives it no power, so it would become slower. Two
+kinds of wheels are different. A feed-forward gives power at any speed. And a controller that was
+saturated may keep full power, until RPM 0/0 starts it anew: such a wheel is faster than the last
+speed of any wheel that comes to rest. Works on set-points, reports and times.
 """
 
 import math
@@ -18,6 +19,7 @@ from typing import Final
 
 from omnibot_driver.core.lois_ecu.board_odometry import rim_speeds
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Setting, Ticks
+from omnibot_driver.core.lois_ecu.resting import FASTEST_RPM
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 STALLED_S: Final = 2.0
@@ -39,13 +41,15 @@ AT_LEAST: Final = 4
 class StallWatch:
     """Watch of both wheels; ``stalled`` once for each ``STALLED_S`` that one is at rest.
 
-    ``settings`` may be replaced at any time.
+    ``settings`` may be replaced at any time. ``saturated``: whether each wheel's controller may be
+    saturated, so that the wheel rolls.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self.settings = settings
         self._targets = [0, 0]
         self._seen_at = [math.inf, math.inf]
+        self.saturated = [False, False]
         self._quiet = [0, 0]
         """Groups since then that could have shown this wheel's motion and did not."""
         self._ticks: Ticks | None = None
@@ -62,6 +66,7 @@ class StallWatch:
                 self._seen_at[wheel] = math.inf
             elif self._seen_at[wheel] == math.inf or target * self._targets[wheel] < 0:
                 self._seen_at[wheel], self._quiet[wheel] = now, 0
+                self.saturated[wheel] = False
         self._targets = targets
 
     def heard(
@@ -110,8 +115,12 @@ class StallWatch:
         if told is None or self._told is None:
             return False
         same = [abs(a - b) < SAME_MPS for a, b in zip(told, self._told, strict=True)]
-        kept = not same[1 - wheel] or self._too_fast(wheel, told)
-        return abs(told[wheel]) > SAME_MPS and same[wheel] and kept
+        if abs(told[wheel]) <= SAME_MPS or not same[wheel]:
+            return False
+        too_fast = self._too_fast(wheel, told)
+        fastest_mps = FASTEST_RPM * self.settings.rim_mps_per_rpm
+        self.saturated[wheel] |= too_fast and abs(told[wheel]) > fastest_mps
+        return too_fast or not same[1 - wheel]
 
     def _too_fast(self, wheel: int, told: tuple[float, float]) -> bool:
         """Return whether no wheel can roll steadily at this reported speed."""
@@ -133,3 +142,4 @@ class StallWatch:
         self._quiet[wheel] += 1
         if turns and self._seen_at[wheel] != math.inf:
             self._seen_at[wheel], self._quiet[wheel] = now, 0
+            self.saturated[wheel] = False

@@ -6,7 +6,16 @@ import math
 
 from lois_drives import HOST_GAINS
 
-from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu import (
+    BoardOdometry,
+    SetDuty,
+    SetRpm,
+    Ticks,
+    encode_command,
+    encode_report,
+)
+from omnibot_driver.core.lois_ecu.conversation import LoisConversation
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.stall import StallWatch
 
@@ -129,3 +138,28 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
     """A wheel may well stand still below 2 RPM, and duty bypasses the controller."""
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []
+
+
+def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
+    """A controller that was saturated keeps 68 RPM at a set-point of -31 until RPM 0/0."""
+    driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
+    rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
+    for step in range(30):
+        now = 0.2 * step
+        rpm = (-36 - step % 2, -68) if step > 3 else (0, 0)
+        left, right = (one * UNIT_MPS for one in rpm)
+        turned_rad += 0.2 * (right - left) / 0.47
+        velocity = *heading(left, right, turned_rad), (right - left) / 0.47
+        group = BoardOdometry(-0.1 * step, 0.0, turned_rad, *velocity, appended=True)
+        lines = encode_report(Ticks(200 * step, 0, 0)) + encode_report(group)
+        for reading in driver.receive(lines, now) + driver.receive(b"", now + 0.1):
+            if isinstance(reading, FusedOdometry):
+                ways_m.append(reading.wheel_ways_m[1])
+        if step > 2:
+            written = driver.wheels(rates)
+            driver.wrote(written, now + 0.1)
+            cleared |= step > 10 and written.startswith(encode_command(SetRpm(0, 0)))
+        driver.predicted(now + 0.15)
+    assert len(ways_m) > 20
+    assert max(ways_m) < 0.01, "a way was taken back"
+    assert cleared
