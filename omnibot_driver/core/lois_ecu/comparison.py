@@ -39,6 +39,8 @@ TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
 """Variances, in squared ticks, of what a count, a heading of 0x20 and a distance of 0x20 hide."""
 COUNT_READ_S: Final = 0.003
+UNFORESEEN_TICKS: Final = 1.5
+"""Residual in ticks beyond which the wheel has changed its speed although its set-point has not."""
 SAME_TICKS: Final = 0.6
 """Residual in ticks within which an unchanged count is not a measurement."""
 LEAP: Final = 5.0
@@ -77,8 +79,8 @@ class Comparison:
         for wheel in self._motion.wheels:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
-    def count(self, index: int, ticks: int, late_s: float) -> None:
-        """Correct the filter by this many more ticks of a wheel.
+    def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
+        """Correct the filter by this many more ticks of a wheel in ``duration_s``.
 
         ``late_s``: how much later than usual they came.
         """
@@ -101,6 +103,9 @@ class Comparison:
         if residual**2 > DOUBT**2 * (estimate.variance_of(terms) + variance):
             motion.doubt(index, abs(residual), counted=counted)
         estimate.measure(terms, residual, variance)
+        unforeseen_m = abs(residual) - UNFORESEEN_TICKS * tick_m
+        if unforeseen_m > 0:
+            wheel.restless_mps = max(wheel.restless_mps, unforeseen_m / max(duration_s, 0.1))
 
     # 0x20
 

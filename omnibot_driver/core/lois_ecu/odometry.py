@@ -189,7 +189,7 @@ class LoisOdometry:
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
         for index, count in enumerate(counts):
-            self._comparison.count(index, count, late_s)
+            self._comparison.count(index, count, now - from_s, late_s)
         self._keep(now)
         return [self._estimate()]
 

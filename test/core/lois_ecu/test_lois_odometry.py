@@ -19,6 +19,7 @@ from omnibot_driver.core.lois_ecu import (
     SetDuty,
     SetRpm,
     Ticks,
+    comparison,
     encode_command,
     encode_report,
     motion_filter,
@@ -405,3 +406,24 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
     estimate, true = rig.estimates[-1]
     assert true.yaw_rad < -0.15
     assert estimate.pose.yaw_rad == pytest.approx(-true.yaw_rad, abs=0.05)
+
+
+def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With the boot gains a wheel swings for good, and nothing shows how between two groups."""
+
+    def variance() -> float:
+        """Return the variance in (m/s)² that is predicted after four ticks too many."""
+        odometry, ticks = LoisOdometry(LoisEcuSettings()), 0
+        odometry.wrote(SetRpm(20, 20), 0.0)
+        for step in range(52):
+            odometry.heard_ticks(Ticks(200 * step, ticks, ticks), 0.2 * step)
+            ticks += 8 if step == 50 else 4
+        told = odometry.predict(10.4)
+        assert told is not None
+        return told.twist_covariance[0]
+
+    ours = variance()
+    monkeypatch.setattr(comparison, "UNFORESEEN_TICKS", math.inf)
+    assert ours > 1.3 * variance()
