@@ -20,7 +20,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.messages import EStopButton, RecordKind, SetLed, Ticks
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
-from omnibot_driver.core.lois_ecu.readings import LoisReading, WheelReading
+from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.reset_proof import ResetProof
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.traits import TRAITS
@@ -147,8 +147,6 @@ class LoisEcuBoard(Board):
                     readings.append(reading)
                 case FusedOdometry():
                     self._rolled = self._rolled + self._tangent(reading)
-                case WheelReading():
-                    pass
                 case EStopButton(pressed):
                     readings.append(EStopButtonReading(pressed))
                 case _:

@@ -16,6 +16,7 @@ from typing import Final
 
 from omnibot_driver.core.lois_ecu.filter_history import FilterHistory
 from omnibot_driver.core.lois_ecu.filter_variances import pose_covariance, twist_variances
+from omnibot_driver.core.lois_ecu.measured_speed import measure_speeds
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
@@ -46,13 +47,6 @@ ROLLED_OUT_S: Final = 0.15
 """Time in s for which a wheel without power rolls on, at the speed that it had."""
 LATE_PART: Final = 0.6
 """Standard deviation of the time at which a command takes effect, in controller periods."""
-START_TICKS: Final = 0.5
-START_STDDEV_TICKS: Final = 0.9
-"""Mean and standard deviation of the ticks that the measured speed misses when a wheel starts."""
-FAST_RPM: Final = 50.0
-LOST_TICKS: Final = 3.0
-"""Variance in squared ticks per s by which 0x20 misses the motion of a wheel beyond ``FAST_RPM``: a
-tick that comes soon after one that waited while the board sent has no speed."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
 """Mean and standard deviation of the fraction of an RPM that the firmware drops."""
@@ -266,7 +260,7 @@ class MotionFilter:
         for wheel in self.wheels:
             wheel.roll(step, self._target(wheel), holds=self.holds, signed=self.signed)
         if abs(before[0]) + abs(before[1]) > ROLLING_MPS:
-            self._measure_speeds(step, before)
+            measure_speeds(self, step, before)
         self._move(step)
         self.filter.propagate(step.rows)
         self.filter.mean = step.new
@@ -276,47 +270,6 @@ class MotionFilter:
             if abs(self.speed_mps(index)) < STANDS_MPS and not wheel.course.target_mps:
                 self.filter.forget(wheel.base + SPEED, 0.0, 0.0)
                 self.filter.forget(wheel.base + PUSH, 0.0, 0.0)
-
-    def _measure_speeds(self, step: Step, before: tuple[float, float]) -> None:
-        """Predict the speeds that the firmware keeps, and the resulting changes of 0x20.
-
-        The firmware measures at each tick of either wheel. So a wheel that rolls alone is measured
-        as it is, while a wheel at rest beside a rolling one keeps the speed that it had.
-        """
-        dt, new = step.dt, step.new
-        turn: Terms = [(TURN, 1.0)]
-        along: Terms = [(ALONG, 1.0)]
-        told = [0.0, 0.0]
-        for index, wheel in enumerate(self.wheels):
-            base, sign, speed = wheel.base, wheel.course.measured_sign, abs(before[index])
-            if not sign:
-                continue
-            side, forward = 2 * index - 1, math.copysign(1.0, before[index])
-            if speed < STANDS_MPS <= abs(new[base + SPEED]):
-                lost = sign * START_TICKS * self.tick_m
-                new[TURN] -= side * lost
-                new[ALONG] -= lost / 2
-                spread = START_STDDEV_TICKS * self.tick_m
-                step.noises.append(([(TURN, side), (ALONG, 0.5)], spread**2))
-            if speed > FAST_RPM * self.rpm_mps:
-                variance = LOST_TICKS * self.tick_m**2 * dt
-                step.noises.append(([(TURN, side), (ALONG, 0.5)], variance))
-            fresh = speed / (abs(before[0]) + abs(before[1]))
-            shown = fresh * speed + (1 - fresh) * new[base + HELD] - self.rounded_mps(index)
-            if shown > 0.0:
-                told[index] = sign * shown
-                for terms, factor in ((turn, side * sign * dt), (along, sign * dt / 2)):
-                    terms.append((base + SPEED, factor * fresh * forward))
-                    terms.append((base + HELD, factor * (1 - fresh)))
-                    if wheel.course.kind == "rpm":
-                        terms.append((BIAS + index, -factor))
-            renewed = 1 - math.exp(-speed * dt / self.tick_m)
-            step.rows[base + HELD] = [(base + HELD, 1 - renewed), (base + SPEED, forward * renewed)]
-            new[base + HELD] += renewed * (speed - new[base + HELD])
-        new[TURN] += (told[1] - told[0]) * dt
-        new[ALONG] += (told[1] + told[0]) / 2 * dt
-        step.rows[TURN], step.rows[ALONG] = turn, along
-        self.differing_mps = min(self.differing_mps, abs(told[1] - told[0]))
 
     def _move(self, step: Step) -> None:
         mean, new = self.filter.mean, step.new

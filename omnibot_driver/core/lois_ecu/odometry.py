@@ -14,7 +14,8 @@ from typing import Final
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.lois_ecu.board_odometry import OdometryReader, Told
+from omnibot_driver.core.lois_ecu.board_kind import BoardKind
+from omnibot_driver.core.lois_ecu.board_odometry import OdometryReader
 from omnibot_driver.core.lois_ecu.comparison import Comparison
 from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry, Source
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Stream, Ticks
@@ -22,17 +23,15 @@ from omnibot_driver.core.lois_ecu.misconfiguration import own_gains
 from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
-from omnibot_driver.core.lois_ecu.size_errors import LoisOdometrySettings, SizeErrors
-from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S, CommandKind
+from omnibot_driver.core.lois_ecu.size_errors import SizeErrors
+from omnibot_driver.core.lois_ecu.wheel_model import CommandKind
 from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, WAY, X, Y
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
 
-__all__ = ["FusedOdometry", "LoisOdometry", "LoisOdometrySettings", "Source"]
+__all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
-LONE_TICKS: Final = 2
-"""Number of groups of ticks without odometry behind them that show a board like the manual's."""
-UNCOUNTED_M: Final = 0.06
-"""Backward motion in m without a negative count which shows that ticks do not count backwards."""
+WHEEL_DRIFT: Final = 0.0035
+"""Random walk of a wheel on the ground, in m after 1 m."""
 LATE_S: Final = 0.012
 """Standard deviation of an arrival in s, where nothing better is known."""
 UNHEARD_S: Final = 0.6
@@ -46,16 +45,10 @@ FASTEST_MPS: Final = 5.0
 class LoisOdometry:
     """Odometry of a robot with a LOIS ECU, by ``settings``; wheels are in the order left, right."""
 
-    def __init__(
-        self, settings: LoisEcuSettings, noise: LoisOdometrySettings | None = None
-    ) -> None:
-        self._noise = LoisOdometrySettings() if noise is None else noise
+    def __init__(self, settings: LoisEcuSettings) -> None:
         self._motion = MotionFilter()
         self._comparison = Comparison(self._motion)
-        self.appends = False
-        """Whether this is the public firmware, or one like it."""
-        self._seen_signed = self._seen_unsigned = False
-        self._lone_ticks, self._uncounted_m = 0, 0.0
+        self._kind = BoardKind(self._motion)
         self._ticks: Ticks | None = None
         self._begun = False
         self._may_roll_mps = [0.0, 0.0]
@@ -87,7 +80,7 @@ class LoisOdometry:
         self._comparison.begin_counts()
         wheels = DifferentialKinematics(wheel_radius_m=1.0, track_m=settings.track_m)
         self._uncertainty.noise = OdometryNoise(
-            wheel_drift=self._noise.wheel_drift, wheel_scale=0.0, wheel_slip=0.0, wheels=wheels
+            wheel_drift=WHEEL_DRIFT, wheel_scale=0.0, wheel_slip=0.0, wheels=wheels
         )
 
     @property
@@ -96,14 +89,14 @@ class LoisOdometry:
         return self._pose.yaw_rad
 
     @property
-    def signed_ticks(self) -> bool:
-        """Whether ticks are taken to count in both directions."""
-        return self._motion.signed
+    def appends(self) -> bool:
+        """Whether this is the public firmware, or one like it."""
+        return self._kind.appends
 
     @property
     def counting(self) -> bool:
         """Whether this board counts the ticks of both wheels now."""
-        return self.signed_ticks or all(wheel.course.counting for wheel in self._motion.wheels)
+        return self._motion.signed or all(wheel.course.counting for wheel in self._motion.wheels)
 
     @property
     def resting(self) -> tuple[bool, bool]:
@@ -117,7 +110,7 @@ class LoisOdometry:
             self._motion.filter.forget(state, 0.0, 0.0)
         self._motion.yaw0_rad = 0.0
         self._uncertainty = Uncertainty(self._uncertainty.noise)
-        self._sizes = SizeErrors(self._noise.wheel_scale, self._noise.wheel_slip)
+        self._sizes = SizeErrors()
         self._pose, self._ways_m = Pose(), (0.0, 0.0)
         self._motion.history.forget()
 
@@ -174,8 +167,8 @@ class LoisOdometry:
             self._after_silence(now)
         self._advance(now)
         self._ticks = ticks
-        self._lone_ticks += 1
         if before is None:
+            self._kind.took_ticks((0, 0))
             self._comparison.begin_counts()
             if not self._begun:
                 self._begun = True
@@ -186,8 +179,7 @@ class LoisOdometry:
         if max(map(abs, counts)) * self._settings.tick_m > FASTEST_MPS * (now - from_s + 1.0):
             self._comparison.begin_counts()  # the counters started anew
             return [self._estimate()]
-        if min(counts) < 0:
-            self._motion.signed = self._seen_signed = True
+        self._kind.took_ticks(counts)
         for index, count in enumerate(counts):
             self._comparison.count(index, count, now - from_s, late_s)
         self._keep(now)
@@ -206,13 +198,10 @@ class LoisOdometry:
             self._after_silence(now)
             return
         self._advance(now)
-        if group.appended and not self.appends:
-            self._is_firmware()
-        elif not (group.appended or self.appends or self._seen_unsigned):
-            self._motion.signed |= self._lone_ticks >= LONE_TICKS
+        self._kind.took_odometry(appended=group.appended)
         if told is None or not self._blind:
             self._comparison.begin_odometry()
-            self._watch_motion(told)
+            self._kind.watch(told)
             return
         self._comparison.odometry(told, duration_s, late_s)
         self._keep(now)
@@ -223,7 +212,7 @@ class LoisOdometry:
         if self._ticks is None or self._at_s == -math.inf:
             return None
         self._advance(min(now, self._heard_at_s + self._unheard_s))
-        return self._fused(predicted=True, stamp_s=max(now, self._at_s))
+        return self._fused(max(now, self._at_s))
 
     def _keep(self, now: float) -> None:
         """Store the state after a report, as later predictions may have to be undone."""
@@ -252,27 +241,6 @@ class LoisOdometry:
         self._motion.advance(since_s, now)
         self._at_s = max(now, self._at_s)
 
-    # What kind of board it is
-
-    def _is_firmware(self) -> None:
-        motion = self._motion
-        self.appends, motion.holds = True, True
-        motion.signed = self._seen_signed
-        motion.begin_excess()
-        for wheel in motion.wheels:
-            wheel.course.step_s = FIRMWARE_STEP_S
-
-    def _watch_motion(self, told: Told | None) -> None:
-        """Detect that ticks do not count backwards: a wheel rolls back, but no count falls."""
-        if told is None or not self._motion.signed or self._seen_signed:
-            return
-        for index, wheel in enumerate(self._motion.wheels):
-            back_m = -told.along_m - (index - 0.5) * told.turned_m
-            if wheel.course.target_mps < 0 and back_m > 0:
-                self._uncounted_m += back_m
-        if self._uncounted_m > UNCOUNTED_M:
-            self._motion.signed, self._seen_unsigned = False, True
-
     # Estimates
 
     @property
@@ -292,7 +260,7 @@ class LoisOdometry:
         self._heading_compared = False
         for wheel in motion.wheels:
             wheel.blind = False
-        fused = self._fused(predicted=False)
+        fused = self._fused(self._at_s)
         self._uncertainty.move(self._pose.yaw_rad, self._tangent(fused.wheel_ways_m))
         self._sizes.move(*fused.wheel_ways_m, motion.turn_sign * motion.track_m)
         # The error within a tick has another direction after a turn: the next does not cancel it.
@@ -303,26 +271,17 @@ class LoisOdometry:
         self._pose, self._ways_m = fused.pose, ways_m
         return fused
 
-    def _fused(self, *, predicted: bool, stamp_s: float | None = None) -> FusedOdometry:
+    def _fused(self, stamp_s: float) -> FusedOdometry:
         motion = self._motion
         mean = motion.filter.mean
         pose = Pose(mean[X], mean[Y], motion.yaw_rad)
         ways_m = motion.way_m(0) - self._ways_m[0], motion.way_m(1) - self._ways_m[1]
         speeds = self._tangent((motion.speed_mps(0), motion.speed_mps(1)))
         twist = BodyTwist(speeds.x_m, 0.0, speeds.yaw_rad)
-        stamp_s = self._at_s if stamp_s is None else stamp_s
         covariance = self._covariance(pose.yaw_rad, twist, stamp_s - self._at_s)
-        displacement = self._pose.way_to(pose)
+        variances, displacement = motion.twist_variances(), self._pose.way_to(pose)
         return FusedOdometry(
-            stamp_s,
-            pose,
-            twist,
-            covariance,
-            motion.twist_variances(),
-            displacement,
-            ways_m,
-            self._source,
-            predicted,
+            stamp_s, pose, twist, covariance, variances, displacement, ways_m, self._source
         )
 
     def _tangent(self, ways_m: tuple[float, float]) -> Pose:

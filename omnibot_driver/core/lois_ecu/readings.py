@@ -61,22 +61,9 @@ class TerminalLeft:
     """Notice that a terminal mode has ended, in which presses of the e-stop button are unknown."""
 
 
-@dataclass(frozen=True, slots=True)
-class WheelReading:
-    """Rotation of both wheels since the last reading, in rad.
-
-    ``measured``: the rotation is known from ticks or a standstill, and not from commands.
-    """
-
-    left_rad: float
-    right_rad: float
-    measured: bool
-
-
 LoisReading = (
     DisplacementReading
     | FusedOdometry
-    | WheelReading
     | FixReading
     | TimeReading
     | HeadingReading

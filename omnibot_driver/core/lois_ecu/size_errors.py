@@ -8,7 +8,6 @@ the spread of the resulting poses is the covariance. Works on distances of the w
 """
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose
@@ -16,33 +15,23 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 KINDS: Final = 3
 """Number of kinds of errors: size of the left wheel, size of the right wheel, slip of both."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoisOdometrySettings:
-    """Errors of the wheels on the ground.
-
-    ``wheel_drift``: random walk in m after 1 m. ``wheel_scale``: standard deviation of a wheel's
-    relative size. ``wheel_slip``: standard deviation of the part that slip takes from both.
-    """
-
-    wheel_drift: float = 0.0035
-    wheel_scale: float = 0.01
-    wheel_slip: float = 0.005
+WHEEL_SCALE: Final = 0.01
+WHEEL_SLIP: Final = 0.005
+"""Standard deviations of a wheel's relative size, and of the part that slip takes from both."""
 
 
 class SizeErrors:
-    """Drives with errors of the wheels' sizes and slip.
+    """Drives with errors of the wheels' sizes and slip."""
 
-    ``scale``, ``slip``: standard deviations of a wheel's relative size, and of the part that slip
-    takes from both.
-    """
-
-    def __init__(self, scale: float, slip: float) -> None:
+    def __init__(self) -> None:
         spread = math.sqrt(KINDS)
         self._factors = [
             (1 + sign * spread * left, 1 + sign * spread * right)
-            for left, right in ((scale, 0.0), (0.0, scale), (slip, slip))
+            for left, right in (
+                (WHEEL_SCALE, 0.0),
+                (0.0, WHEEL_SCALE),
+                (WHEEL_SLIP, WHEEL_SLIP),
+            )
             for sign in (-1.0, 1.0)
         ]
         self._places = [(0.0, 0.0, 0.0)] * len(self._factors)

@@ -30,7 +30,6 @@ from omnibot_driver.core.lois_ecu.readings import (
     HeadingReading,
     LoisReading,
     TimeReading,
-    WheelReading,
 )
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.readings import DisplacementReading
@@ -167,10 +166,6 @@ class Translation:
     def _of(self, fused: FusedOdometry) -> list[LoisReading]:
         before, self._stamp_s = self._stamp_s, fused.stamp_s
         way = fused.displacement
-        radius_m = self.settings.wheel_radius_m
-        left_m, right_m = fused.wheel_ways_m
-        if self.settings.inverted:
-            left_m, right_m = right_m, left_m
         return [
             DisplacementReading(
                 way.x_m,
@@ -181,7 +176,6 @@ class Translation:
                 0,
                 measured=self.odometry.counting and fused.source in ("ticks", "standing"),
             ),
-            WheelReading(left_m / radius_m, right_m / radius_m, not fused.blind),
             fused,
         ]
 

@@ -22,7 +22,7 @@ from omnibot_driver.core.lois_ecu import (
     comparison,
     encode_command,
     encode_report,
-    motion_filter,
+    measured_speed,
 )
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
@@ -148,7 +148,7 @@ def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.Mon
         return [one.last.covariance.yaw_yaw for one in drives]
 
     ours = variances()
-    monkeypatch.setattr(motion_filter, "LOST_TICKS", 0.0)
+    monkeypatch.setattr(measured_speed, "LOST_TICKS", 0.0)
     grown = [one / before for one, before in zip(ours, variances(), strict=True)]
     assert grown[0] > 1.05
     assert grown[1] == 1.0

@@ -1,0 +1,61 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Detection of the kind of board: the public firmware, or a board as in the manual.
+
+The public firmware sends odometry after each group of ticks, under the same number. Ticks of the
+manual's board count in both directions; a negative count proves that they do. Works on counts and
+on the order of groups.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.board_odometry import Told
+from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
+from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
+
+LONE_TICKS: Final = 2
+"""Number of groups of ticks without odometry behind them that show a board like the manual's."""
+UNCOUNTED_M: Final = 0.06
+"""Backward motion in m without a negative count which shows that ticks do not count backwards."""
+
+
+class BoardKind:
+    """Kind of the board, which sets how ``motion`` models it.
+
+    ``appends``: this is the public firmware, or one like it.
+    """
+
+    def __init__(self, motion: MotionFilter) -> None:
+        self._motion = motion
+        self.appends = False
+        self._seen_signed = self._seen_unsigned = False
+        self._lone_ticks, self._uncounted_m = 0, 0.0
+
+    def took_ticks(self, counts: tuple[int, int]) -> None:
+        """Note a group of ticks with these new counts."""
+        self._lone_ticks += 1
+        if min(counts) < 0:
+            self._motion.signed = self._seen_signed = True
+
+    def took_odometry(self, *, appended: bool) -> None:
+        """Note a group of odometry; ``appended``: it came under the number of the ticks."""
+        motion = self._motion
+        if appended and not self.appends:
+            self.appends, motion.holds = True, True
+            motion.signed = self._seen_signed
+            motion.begin_excess()
+            for wheel in motion.wheels:
+                wheel.course.step_s = FIRMWARE_STEP_S
+        elif not (appended or self.appends or self._seen_unsigned):
+            motion.signed |= self._lone_ticks >= LONE_TICKS
+
+    def watch(self, told: Told | None) -> None:
+        """Detect that ticks do not count backwards: a wheel rolls back, but no count falls."""
+        if told is None or not self._motion.signed or self._seen_signed:
+            return
+        for index, wheel in enumerate(self._motion.wheels):
+            back_m = -told.along_m - (index - 0.5) * told.turned_m
+            if wheel.course.target_mps < 0 and back_m > 0:
+                self._uncounted_m += back_m
+        if self._uncounted_m > UNCOUNTED_M:
+            self._motion.signed, self._seen_unsigned = False, True

@@ -1,0 +1,73 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Speeds that the public firmware measures and keeps, and what 0x20 shows because of them.
+
+A part of each step of the motion filter. Works on its states, without reports.
+"""
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from omnibot_driver.core.lois_ecu.wheel_motion import (
+    ALONG,
+    BIAS,
+    HELD,
+    SPEED,
+    STANDS_MPS,
+    TURN,
+    Step,
+    Terms,
+)
+
+if TYPE_CHECKING:
+    from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
+
+START_TICKS: Final = 0.5
+START_STDDEV_TICKS: Final = 0.9
+"""Mean and standard deviation of the ticks that the measured speed misses when a wheel starts."""
+FAST_RPM: Final = 50.0
+LOST_TICKS: Final = 3.0
+"""Variance in squared ticks per s by which 0x20 misses the motion of a wheel beyond ``FAST_RPM``: a
+tick that comes soon after one that waited while the board sent has no speed."""
+
+
+def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
+    """Predict the speeds that the firmware keeps, and the resulting changes of 0x20.
+
+    The firmware measures at each tick of either wheel. So a wheel that rolls alone is measured
+    as it is, while a wheel at rest beside a rolling one keeps the speed that it had.
+    """
+    dt, new = step.dt, step.new
+    turn: Terms = [(TURN, 1.0)]
+    along: Terms = [(ALONG, 1.0)]
+    told = [0.0, 0.0]
+    for index, wheel in enumerate(motion.wheels):
+        base, sign, speed = wheel.base, wheel.course.measured_sign, abs(before[index])
+        if not sign:
+            continue
+        side, forward = 2 * index - 1, math.copysign(1.0, before[index])
+        if speed < STANDS_MPS <= abs(new[base + SPEED]):
+            lost = sign * START_TICKS * motion.tick_m
+            new[TURN] -= side * lost
+            new[ALONG] -= lost / 2
+            spread = START_STDDEV_TICKS * motion.tick_m
+            step.noises.append(([(TURN, side), (ALONG, 0.5)], spread**2))
+        if speed > FAST_RPM * motion.rpm_mps:
+            variance = LOST_TICKS * motion.tick_m**2 * dt
+            step.noises.append(([(TURN, side), (ALONG, 0.5)], variance))
+        fresh = speed / (abs(before[0]) + abs(before[1]))
+        shown = fresh * speed + (1 - fresh) * new[base + HELD] - motion.rounded_mps(index)
+        if shown > 0.0:
+            told[index] = sign * shown
+            for terms, factor in ((turn, side * sign * dt), (along, sign * dt / 2)):
+                terms.append((base + SPEED, factor * fresh * forward))
+                terms.append((base + HELD, factor * (1 - fresh)))
+                if wheel.course.kind == "rpm":
+                    terms.append((BIAS + index, -factor))
+        renewed = 1 - math.exp(-speed * dt / motion.tick_m)
+        step.rows[base + HELD] = [(base + HELD, 1 - renewed), (base + SPEED, forward * renewed)]
+        new[base + HELD] += renewed * (speed - new[base + HELD])
+    new[TURN] += (told[1] - told[0]) * dt
+    new[ALONG] += (told[1] + told[0]) / 2 * dt
+    step.rows[TURN], step.rows[ALONG] = turn, along
+    motion.differing_mps = min(motion.differing_mps, abs(told[1] - told[0]))
