@@ -262,10 +262,6 @@ class LoisConversation:
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
         return self._lines(*self._points.wheels(rates_radps))
 
-    def duty(self, percents: Sequence[float]) -> bytes:
-        """Encode left and right duty in percent, open loop. Raises CommandRefused in RPM mode."""
-        return self._lines(self._points.duty(percents))
-
     def meaning(self, data: bytes) -> BodyTwist:
         """Return the body velocity that the last set-point in these bytes commands."""
         return self._points.meaning(data)

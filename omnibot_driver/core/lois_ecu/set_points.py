@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import outbound
@@ -90,7 +89,7 @@ class SetPoints:
         left, right = rates_radps
         if settings.drive_mode == "duty":
             percent = settings.wheel_radius_m * settings.duty_scale
-            return [self.duty((left * percent, right * percent))]
+            return [self._duty(left * percent, right * percent)]
         rpm = 60 / math.tau
         pair, was_saturated = outbound.saturated((left * rpm, right * rpm), outbound.MOST_RPM)
         self.saturated += was_saturated
@@ -99,14 +98,8 @@ class SetPoints:
         command = SetRpm(*self._board_order(pair))
         return [outbound.EMERGENCY_STOP, command] if self._clears_left else [command]
 
-    def duty(self, percents: Sequence[float]) -> SetDuty:
-        """Encode left and right duty in percent, open loop. Raises CommandRefused in RPM mode."""
-        if self.settings.drive_mode != "duty":
-            raise CommandRefused(
-                "duty_cmd refused: drive_mode is rpm; set it to duty to drive without the"
-                " speed controller"
-            )
-        left, right = percents
+    def _duty(self, left: float, right: float) -> SetDuty:
+        """Encode left and right duty in percent, open loop."""
         most = min(self.settings.max_duty, outbound.MOST_PERCENT)
         pair, was_saturated = outbound.saturated((left, right), most)
         self.saturated += was_saturated

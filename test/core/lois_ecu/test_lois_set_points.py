@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, encode_command
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
@@ -72,13 +72,12 @@ def test_an_inverted_board_has_its_wheels_exchanged() -> None:
     assert ecu.meaning(left).yaw_rate_radps > 0
 
 
-def test_duty_is_limited_and_belongs_to_its_mode() -> None:
+def test_duty_is_limited() -> None:
     """Duty is in percent; above the limit both wheels are slowed by the same factor."""
-    with pytest.raises(CommandRefused, match="drive_mode is rpm"):
-        started().duty((10, 10))
     ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
-    assert ecu.duty((50, 50)) == b":01003200323b\n"
-    assert ecu.duty((120, 60)) == encode_command_duty(60, 30)
+    percent_radps = 1 / (130.0 * 0.13)
+    assert ecu.wheels([50 * percent_radps] * 2) == b":01003200323b\n"
+    assert ecu.wheels([120 * percent_radps, 60 * percent_radps]) == encode_command_duty(60, 30)
     assert ecu.velocity(BodyTwist(0.2, 0.0, 0.0)) == encode_command_duty(26, 26)
     assert ecu.meaning(encode_command_duty(26, 26)).vx_mps == pytest.approx(0.2)
 
