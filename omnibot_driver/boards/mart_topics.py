@@ -34,7 +34,9 @@ from omnibot_driver.core.session import Session
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 NAN: Final = float("nan")
-TIME_EVERY_S: Final = 5.0
+TIME_EVERY_S: Final = 1.0
+MINUTE_BEGINS_S: Final = 3
+"""Seconds at the beginning of a minute in which TIME does not set a correct clock back."""
 NOT_READY: Final = (
     "the standstill is not proved, or there is no data from the controller; stop the sender, wait"
     " a second, then call again"
@@ -186,14 +188,16 @@ class MartTopics:
     def _set_time(self) -> None:
         """Set the controller's clock once, at a proved standstill.
 
-        The controller integrates its gyro by this clock.
+        The controller integrates its gyro by this clock, and sets it to the full minute. A clock
+        that was set before may not jump back after an RM, so the minute must have just begun.
         """
         utc = time.gmtime()
         fields = (utc.tm_mon, utc.tm_mday, utc.tm_year, utc.tm_hour, utc.tm_min, utc.tm_sec)
 
         def ask(session: Session, now: float) -> None:
             board = cast(MartBoard, session.board)
-            if session.state == "nominal" and board.resting:
+            in_time = board.is_fresh or utc.tm_sec < MINUTE_BEGINS_S
+            if session.state == "nominal" and board.resting and in_time:
                 try:
                     board.ask(Job.TIME, None, now, *fields)
                 except RequestRefused:

@@ -195,6 +195,14 @@ class MartBoard(Board):
         """Whether measurements show that the robot is at rest, and the server is free."""
         return self._pilot.state is State.STILL and self._pilot.proof.proved
 
+    @property
+    def is_fresh(self) -> bool:
+        """Whether the server has not driven by RM since its start, so that its clock may jump.
+
+        The first sample of RM covers the time since the last sample of the previous RM.
+        """
+        return self._pilot.odometry.heading.is_zero
+
 
 class Conductor:
     """The actuator: passes commands to the pilot, which sends one request at a time."""

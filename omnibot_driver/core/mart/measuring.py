@@ -6,11 +6,13 @@ This module knows answers and their recipients; it does not know when a query is
 argument.
 """
 
+import math
 from typing import Final
 
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.moment import Moment
+from omnibot_driver.core.mart.relative_heading import MOST_RAD
 from omnibot_driver.core.mart.replies import Fail, signed
 from omnibot_driver.core.mart.starts import Starts
 from omnibot_driver.core.mart.states import Motion, State
@@ -33,7 +35,7 @@ class Measuring(Starts):
         elif word is words.RMRA:
             if answer.when.is_uncertain and self.health.is_voltage(reply.number):
                 return
-            changed = self.odometry.turned(reply.number, answer.when)
+            changed = self._turned(reply.number, answer.when, now)
             certain = answer.when.from_s >= self._begun_s and not answer.when.doubtful
             if changed and certain and self.state in (State.REVERSING, State.TURNING):
                 self.health.heading_changed(self.motion)
@@ -43,6 +45,13 @@ class Measuring(Starts):
             uncertain = answer.when.is_uncertain
             self.readings += self.health.measured(word, reply, now, uncertain=uncertain)
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
+
+    def _turned(self, degrees: float, when: Moment, now: float) -> bool:
+        """Process a reported heading; return whether it is plausible and has changed."""
+        changed = self.odometry.turned(degrees, when)
+        if self.state is State.DRIVING and not abs(math.radians(degrees)) < MOST_RAD:
+            self._halt(now, "the relative heading is useless, as the controller's clock was set")
+        return changed
 
     def _counted(self, count: int, when: Moment, now: float) -> None:
         spun = self.state is State.STILL and self.odometry.motion is Motion.SPIN

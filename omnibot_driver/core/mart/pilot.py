@@ -223,7 +223,7 @@ class Pilot(Measuring):
             if isinstance(reply, Fail):
                 self._halt(now, self._obstacle(reply, self.motion))
             elif reply.form is Form.DECIMAL:
-                self.odometry.turned(reply.number, answer.when)
+                self._turned(reply.number, answer.when, now)
         elif word.kind is Kind.MOVE:
             self._moved(reply, now)
         elif word is words.SSP:

@@ -18,6 +18,12 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest turn acceleration (rad/s²) and rate (rad/s) with which a heading is plausible."""
 OLD_RAD: Final = 0.01
 """Difference to the last heading before RM below which a heading is from before RM, in rad."""
+MOST_RAD: Final = 1e7
+"""Largest heading in rad that still resolves small turns.
+
+The server integrates by its wall clock in unsigned milliseconds. If that clock was set back, the
+heading is about 1e15 degrees.
+"""
 AHEAD_S: Final = 0.3
 """Longest prediction of the heading to the time of a count, in s."""
 ODD_TIMES: Final = 3
@@ -48,6 +54,11 @@ class RelativeHeading:
         """Whether a heading is known from which turns can be measured."""
         return self._angle_rad is not None
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether the heading is exactly zero, as before the first RM of a server."""
+        return self._angle_rad == 0.0
+
     def forget(self) -> None:
         """Forget the heading, as the next reported heading may have another zero."""
         self._angle_rad = None
@@ -65,6 +76,10 @@ class RelativeHeading:
 
         ``stood_s``: time at which the robot was stopped, infinite while it is driven.
         """
+        if not abs(angle_rad) < MOST_RAD:
+            self.forget()
+            self.told_s, self.from_s, self.rate_radps = when.at_s, when.from_s, 0.0
+            return False
         before_rad, before_s, at_s = self._angle_rad, self.told_s, when.at_s
         if before_rad is None:
             old = abs(angle_rad - self._before_rad) < OLD_RAD < abs(self._before_rad)

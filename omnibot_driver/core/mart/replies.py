@@ -16,7 +16,7 @@ LONGEST_REPLY: Final = 300
 _FORMS: Final = (
     (Form.NOTHING, re.compile(r"")),
     (Form.INTEGER, re.compile(r"[-+]?\d{1,10}")),
-    (Form.DECIMAL, re.compile(r"[-+]?\d{1,9}\.\d{1,6}")),
+    (Form.DECIMAL, re.compile(r"[-+]?(\d{1,25}\.\d{1,6}|nan|inf)")),
     (Form.TRUTH, re.compile(r"true|false")),
     (Form.FILE, re.compile(r"(\S.*) (\d{1,9})")),
     (Form.NAME, re.compile(r"\S+")),

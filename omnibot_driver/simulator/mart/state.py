@@ -20,6 +20,8 @@ COMMAND, STOP = 0, 1
 NEAR_READINGS_S = 0.15
 """Duration of the three readings that confirm a near obstacle, in s."""
 FARTHEST_IN = 254
+UNSIGNED_S = 2**64 / 1000
+"""What a negative time becomes in the server, which counts unsigned milliseconds."""
 FILES = 100
 
 Then = Callable[..., None]
@@ -152,9 +154,10 @@ class ServerState:
         """Note the time of a sample of RM.
 
         With ``heading_starts_off``, the first sample of RM is integrated over the time since the
-        last sample of the previous RM.
+        last sample of the previous RM. That time is huge if the clock was set back meanwhile.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s
         if first and before_s is not None and self.quirks.heading_starts_off:
-            self.imu.heading_deg += self.imu.rate_dps / 2 * (clock_s - before_s)
+            seconds = clock_s - before_s + (UNSIGNED_S if clock_s < before_s else 0.0)
+            self.imu.heading_deg += self.imu.rate_dps / 2 * seconds

@@ -23,6 +23,8 @@ GOLDEN = {
     b"ok": Ok(Form.NOTHING),
     b"ok BBB": Ok(Form.NAME, "BBB"),
     b"ok 25.31": Ok(Form.DECIMAL, "25.31"),
+    b"ok -9471922026430314.00": Ok(Form.DECIMAL, "-9471922026430314.00"),
+    b"ok -nan": Ok(Form.DECIMAL, "-nan"),
     b"ok -1": Ok(Form.INTEGER, "-1"),
     b"ok -49": Ok(Form.INTEGER, "-49"),
     b"ok true": Ok(Form.TRUTH, "true"),

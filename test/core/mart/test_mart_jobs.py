@@ -2,6 +2,8 @@
 
 """Requests to the controller besides motion: gyro bias, dock, log, files, clock."""
 
+import math
+
 import pytest
 from mart_bench import MartBench
 
@@ -114,6 +116,23 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
     bench.board.ask(Job.TIME, "token", bench.now, 1, 1, 2027, 0, 0, 0)
     bench.command(0.3, 0.0, 1.0)
     assert b"TIME 1 1 2027 0 0 0" not in bench.said()
+
+
+def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
+    """The heading of the second RM is about 1e15 degrees, so it is stopped and begun again."""
+    bench = MartBench("source").ready()
+    assert bench.board.is_fresh
+    bench.command(0.3, 0.3, 2.0)
+    bench.run(2.0)
+    assert not bench.board.is_fresh
+    assert bench.job(Job.TIME, 1, 1, 1999, 0, 0, 0).success
+    bench.command(0.3, 0.3, 5.0)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.3, rel=0.05)
+    assert sum("clock" in notice for notice in bench.notices) == 1
+    assert len(bench.notices) == 1
+    bench.run(2.0)
+    assert bench.error.way_m < 0.05
+    assert abs(math.remainder(bench.error.yaw_rad, math.tau)) < 0.05
 
 
 def test_another_server_is_refused_by_its_name() -> None:
