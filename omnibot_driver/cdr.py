@@ -103,8 +103,8 @@ class Serializer:
         return LITTLE_ENDIAN + self._joints_at_odds.pack(*head, 0, 0)
 
 
-def twist(data: bytes) -> BodyTwist:
-    """Parse a serialised geometry_msgs/Twist; return its planar part as ``messages.body_twist``.
+def twist(data: bytes) -> tuple[BodyTwist, bool]:
+    """Parse a serialised geometry_msgs/Twist; return its planar part, and whether that is all.
 
     Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist, which some
     middlewares might deliver.
@@ -113,8 +113,9 @@ def twist(data: bytes) -> BodyTwist:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
         finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0  # else the product is NaN
         if finite and encapsulation == LITTLE_ENDIAN:
-            return BodyTwist(x, y, yaw)
-        return messages.body_twist(deserialize_message(data, Twist))
+            return BodyTwist(x, y, yaw), not (z or roll or pitch)
+        message = deserialize_message(data, Twist)
+        return messages.body_twist(message), messages.is_planar(message)
     except (RMWError, struct.error) as error:
         raise CommandRefused(
             f"cmd_vel rejected: not a valid Twist ({error}); fix the publishing node"

@@ -193,6 +193,11 @@ def body_twist(twist: Any) -> BodyTwist:
     return BodyTwist(linear.x, linear.y, angular.z)
 
 
+def is_planar(twist: Any) -> bool:
+    """Return whether a geometry_msgs/Twist has no velocity out of the plane."""
+    return not (twist.linear.z or twist.angular.x or twist.angular.y)
+
+
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
     """Return the planar pose of a geometry_msgs/PoseStamped; z must be finite, but is ignored.
 

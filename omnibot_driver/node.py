@@ -219,7 +219,8 @@ class OmniBotDriver(Node):
 
     def _twist_stamped(self, session: Session, stamped: TwistStamped, now: float) -> None:
         age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)
-        session.command_twist(messages.body_twist(stamped.twist), now, age_s=age_s)
+        twist, planar = messages.body_twist(stamped.twist), messages.is_planar(stamped.twist)
+        session.command_twist(twist, now, age_s=age_s, planar=planar)
 
     def _pose(self, session: Session, goal: PoseStamped, now: float) -> None:
         frame = self._publishing.settings.odom_frame
@@ -261,7 +262,8 @@ class OmniBotDriver(Node):
 
 
 def _twist(session: Session, data: bytes, now: float) -> None:
-    session.command_twist(cdr.twist(data), now)
+    twist, planar = cdr.twist(data)
+    session.command_twist(twist, now, planar=planar)
 
 
 def _wheels(session: Session, wheels: Float32MultiArray, now: float) -> None:

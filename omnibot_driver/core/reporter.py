@@ -18,7 +18,13 @@ from omnibot_driver.core.long_task import LongTask
 from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager, Phase
 from omnibot_driver.core.reporting.figures import SessionFigures
-from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Notices, why_silent
+from omnibot_driver.core.reporting.notices import (
+    HEADING_ASSUMED,
+    OUT_OF_PLANE,
+    SIDEWAYS,
+    Notices,
+    why_silent,
+)
 
 NEWS_EVERY_S: Final = 0.1
 """Shortest time between two searches for news, in s; every read would be too often."""
@@ -115,6 +121,13 @@ class Reporter:
         measured = self._policy.proof.measured
         blind = not self._board.shows_standstill
         self.notify(self._notices.unconfirmed(self._board.mode, measured=measured, blind=blind))
+
+    def set_to_zero(self, *, sideways: bool, planar: bool) -> None:
+        """Report, once each, which parts of a body velocity were set to zero."""
+        if sideways:
+            self.notify(self._notices.once(SIDEWAYS))
+        if not planar:
+            self.notify(self._notices.once(OUT_OF_PLANE))
 
     def take(self) -> list[Event]:
         """Return and clear the events since the last call, in order."""

@@ -180,13 +180,17 @@ class Session:
 
     # Commands and requests
 
-    def command_twist(self, twist: BodyTwist, now: float, *, age_s: float = 0.0) -> None:
+    def command_twist(
+        self, twist: BodyTwist, now: float, *, age_s: float = 0.0, planar: bool = True
+    ) -> None:
         """Command a body velocity. If it raises CommandRefused, nothing changes.
 
         ``age_s``: age of the command by its sender's stamp, in s; negative for a stamp in the
-        future.
+        future. ``planar``: whether the sender asked for no motion out of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
+        if self._commanding.sideways or not planar:
+            self._reporter.set_to_zero(sideways=self._commanding.sideways, planar=planar)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Command wheel rates. If it raises CommandRefused, nothing changes."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.geometry.kinematics import Kinematics
 from omnibot_driver.core.imu.bias_correction import ImuCorrection
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.odometry.estimator import OdometrySettings
@@ -22,3 +23,8 @@ class SessionSettings:
     imu: ImuCorrection = field(default_factory=ImuCorrection)
     motion_monitor: bool = True
     """Whether a robot that does not move as commanded is stopped."""
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Geometry of the robot's wheels, at a wheel radius of 1 m."""
+        return self.odometry.noise.wheels

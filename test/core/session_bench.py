@@ -46,14 +46,14 @@ class Bench:
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame, period_s = self.board.settings.frame, self.board.settings.delta_period_s
-        self._settings = SessionSettings(
+        self.settings = SessionSettings(
             limits=limits or SpeedLimits(),
             commands=CommandSettings(),
             odometry=OdometrySettings(use_board_pose=use_board_pose),
         )
         self.session = Session(
             OmniBot(OmniBotSettings(delta_frame=frame, delta_period_s=period_s)),
-            self._settings,
+            self.settings,
             run=run,
             axis_signs=axis_signs,
             control=control or self.board.settings.control,
@@ -121,7 +121,7 @@ class Bench:
 
     def configure(self, **changed: Any) -> None:
         """Change fields of SessionSettings; the others keep their first values."""
-        self.session.configure(replace(self._settings, **changed), self.now)
+        self.session.configure(replace(self.settings, **changed), self.now)
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
@@ -130,12 +130,12 @@ class Bench:
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed
         )
-        self.session.configure(self._settings, self.now, board=settings)
+        self.session.configure(self.settings, self.now, board=settings)
         self.settle()
 
     def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
         """Interpret deltas as given in this frame."""
-        self.session.configure(self._settings, self.now, board=OmniBotSettings(delta_frame=frame))
+        self.session.configure(self.settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def last_words(self, on_exit: OnExit) -> bytes:
         """Return what is written before the port is closed."""

@@ -62,7 +62,13 @@ class CommandPipeline:
         )
         self._odometry = odometry
         self._shaper = CommandShaper(
-            board, self._actuator, odometry, settings.limits, axis_signs, control
+            board,
+            self._actuator,
+            odometry,
+            settings.limits,
+            settings.kinematics,
+            axis_signs,
+            control,
         )
         self.interlock = MotionInterlock(starts=Request.START in board.traits.requests)
         self._board, self._axis_signs = board, axis_signs
@@ -84,7 +90,7 @@ class CommandPipeline:
         stricter = commands.timeout_s < self.policy.settings.timeout_s or limits.stricter_than(
             self._shaper.limits
         )
-        self._shaper.limits = limits
+        self._shaper.limits, self._shaper.kinematics = limits, settings.kinematics
         self.policy.configure(commands)
         current = self.policy.current
         if not stricter or current is None or current.is_zero or isinstance(current, GoalSetpoint):
@@ -105,6 +111,11 @@ class CommandPipeline:
             self.policy.halt(now)
             return [f"robot stopped: the current command does not fit the new scale ({error})"]
         return []
+
+    @property
+    def sideways(self) -> bool:
+        """Whether the last body velocity had a sideways part that the wheels cannot produce."""
+        return self._shaper.sideways
 
     def figures(self, now: float) -> CommandFigures:
         """Return the topic that commands the robot, and the counters of commands."""

@@ -21,6 +21,7 @@ from omnibot_driver.core.commands.set_points import (
     SteadySetpoint,
 )
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.kinematics import Kinematics
 from omnibot_driver.core.geometry.se2 import Pose, Signs
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import Odometry
@@ -31,8 +32,8 @@ ControlMethod = Literal["velocity", "position"]
 class CommandShaper:
     """The checks and limits of motion commands. Every method may raise CommandRefused.
 
-    ``limits`` may be replaced at any time. ``control``: position of the board's control switch, or
-    None for a board without one.
+    ``limits`` and ``kinematics`` may be replaced at any time. ``control``: position of the board's
+    control switch, or None for a board without one.
     """
 
     def __init__(
@@ -41,24 +42,29 @@ class CommandShaper:
         actuator: Actuator,
         odometry: Odometry,
         limits: SpeedLimits,
+        kinematics: Kinematics,
         axis_signs: Signs,
         control: ControlMethod | None,
     ) -> None:
-        self.limits = limits
+        self.limits, self.kinematics = limits, kinematics
         self._board, self._actuator, self._odometry = board, actuator, odometry
         self._axis_signs, self._control = axis_signs, control
         self.limited = 0
         """Number of commands that exceeded the limits."""
+        self.sideways = False
+        """Whether the last body velocity had a sideways part that the wheels cannot produce."""
 
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
         """Return the set-point for a body velocity; a ramp starts at the set-point ``before``."""
         if self._control == "position":
             raise self._at_odds(Authority.BASE)
-        limited = twist
-        if not self.limits.allow(twist):
+        if not self.limits.allow(twist):  # checked before a part is dropped
             require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
-            limited = self.limits.twist(twist)
-            self.limited += limited != twist
+        limited = feasible = self.kinematics.feasible(twist)
+        self.sideways = feasible.vy_mps != twist.vy_mps
+        if not self.limits.allow(feasible):
+            limited = self.limits.twist(feasible)
+            self.limited += limited != feasible
         x, y, yaw = self._axis_signs
         return BaseSetpoint(
             BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),

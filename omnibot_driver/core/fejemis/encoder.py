@@ -26,7 +26,6 @@ from omnibot_driver.core.fejemis.steering import (
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import Packets
 
-SIDEWAYS = "cmd_vel: sideways speed is set to zero; this base cannot move sideways"
 REVERSE = (
     "cmd_vel: a negative speed is set to zero, because `allow_reverse` is false; read"
     " docs/boards/fejemis.md before you set it to true"
@@ -122,8 +121,6 @@ class Encoder:
     def _drive(self, twist: BodyTwist) -> Packets:
         pair = self._pair
         geometry = pair.geometry
-        if twist.vy_mps:
-            pair.remark(SIDEWAYS)
         speed_mps = twist.vx_mps if abs(twist.vx_mps) >= LEAST_MPS else 0.0
         wanted = BodyTwist(speed_mps, 0.0, twist.yaw_rate_radps)
         if wanted.vx_mps < 0.0 and not self.settings.allow_reverse:

@@ -74,10 +74,6 @@ class Stops(Ground, ABC):
         if not isinstance(order, Drive):
             return Motion.NONE, STANDING
         speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
-        if order.twist.vy_mps:
-            self._once(
-                "cmd_vel: sideways speed is set to zero; this base cannot move sideways (said once)"
-            )
         if abs(speed) < SLOWEST_MPS and abs(rate) < SLOWEST_RADPS:
             return Motion.NONE, STANDING
         if turn_is_on_the_spot(speed, rate, self._settings.track_m):

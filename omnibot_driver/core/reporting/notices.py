@@ -17,6 +17,13 @@ HEADING_ASSUMED: Final = (
     "the board sends no valid pose; the driver assumes that the board's heading began at 0"
 )
 
+SIDEWAYS: Final = (
+    "cmd_vel: sideways speed is set to zero; this base cannot move sideways (said once)"
+)
+OUT_OF_PLANE: Final = (
+    "cmd_vel: linear.z, angular.x and angular.y are set to zero; this base moves on the floor only"
+    " (said once)"
+)
 STOP_UNSEEN: Final = (
     "stop unconfirmed: in IMU-only mode the board does not report motion, so the driver repeats"
     " Stop for 5 s after each stop; check by eye that the robot has stopped"

@@ -3,6 +3,8 @@
 """Motion commands through a session to a simulated board: authority, ramps, stamps, limits."""
 
 import itertools
+import math
+from dataclasses import replace
 
 import pytest
 from session_bench import STOP, Bench, bare
@@ -10,6 +12,11 @@ from session_bench import STOP, Bench, bare
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.set_point_stream import PACE_S
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.events import Notice
+from omnibot_driver.core.geometry.differential import DifferentialKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.odometry.covariance import OdometryNoise
+from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
@@ -54,6 +61,39 @@ def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
         "ff fe 02 00 00 00 00 00 00",
         "ff fe 01 00 15 00 00 00 00",
     ]
+
+
+def notices(bench: Bench) -> list[str]:
+    return [event.text for event in bench.events if isinstance(event, Notice)]
+
+
+def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
+    """The sideways part neither moves the robot nor slows it down, and NaN in it refuses all."""
+    noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
+    settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
+    bench.session.configure(settings, bench.now)
+    start = len(bench.written)
+    for _ in range(2):
+        bench.session.command_twist(BodyTwist(0.4, 0.4, 0.0), bench.now)
+        bench.settle()
+        bench.run(0.1)
+    assert {tuple(words) for _, words in velocities(bench, start)} == {(28, 0, 0)}
+    assert [text for text in notices(bench) if "sideways speed is set to zero" in text] == [
+        "cmd_vel: sideways speed is set to zero; this base cannot move sideways (said once)"
+    ]
+    with pytest.raises(CommandRefused, match="NaN"):
+        bench.session.command_twist(BodyTwist(0.1, math.nan, 0.0), bench.now)
+
+
+def test_a_velocity_out_of_the_plane_is_said_once(bench: Bench) -> None:
+    """The driver obeys the rest of the command."""
+    for _ in range(2):
+        bench.session.command_twist(BodyTwist(0.4, 0.0, 0.0), bench.now, planar=False)
+        bench.settle()
+        bench.run(0.1)
+    assert bench.board.commands[-1].values == (28, 0, 0)
+    (said,) = [text for text in notices(bench) if "set to zero" in text]
+    assert said.startswith("cmd_vel: linear.z, angular.x and angular.y are set to zero")
 
 
 def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
