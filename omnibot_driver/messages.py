@@ -8,7 +8,7 @@ orientation).
 
 import math
 from array import array
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import add
 from typing import Any, Final
@@ -227,23 +227,6 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
             " about z only"
         )
     return Pose(position.x, position.y, yaw_of(x, y, z, w))
-
-
-def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
-    """Return a warning about ``cmd_vel`` publishers whose type is not received; else empty."""
-    ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
-    if stamped:
-        ours, other = other, ours
-    unheard = sorted(
-        {publisher.node_name for publisher in publishers if publisher.topic_type != ours}
-    )
-    if not unheard:
-        return ""
-    return (
-        f"{', '.join(unheard)} publishes cmd_vel with a type other than {ours}, so the driver does"
-        f" not receive it; for {other} start the driver with"
-        f" enable_stamped_cmd_vel:={str(not stamped).lower()}"
-    )
 
 
 def age(stamp: Time, now_ns: int) -> float:

@@ -236,7 +236,7 @@ class OmniBotDriver(Node):
     def _see_other_types(self) -> str:
         stamped = self._values["enable_stamped_cmd_vel"]
         publishers = self.get_publishers_info_by_topic("cmd_vel")
-        return messages.type_conflict(publishers, stamped=stamped)
+        return selfcheck.type_conflict(publishers, stamped=stamped)
 
     def _see_namesakes(self) -> str:
         publishers = self.get_publishers_info_by_topic("~/state")

@@ -2,9 +2,9 @@
 
 """Advice on settings of the computer and of other nodes that disturb the driver.
 
-This module checks the adapter of an open port, the clock, and nodes of the same name. It reads
-sysfs, and knows no pyserial, no ROS and no board. Obstacles to opening a port, such as its
-permissions, are reported by ``transports``.
+This module checks the adapter of an open port, the clock, nodes of the same name and publishers of
+another type. It reads sysfs, and knows no pyserial, no ROS and no board. Obstacles to opening a
+port, such as its permissions, are reported by ``transports``.
 """
 
 from collections.abc import Iterable
@@ -75,4 +75,20 @@ def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
     return (
         f"another node has the name {name}, and both obey the same commands; end one, or start it"
         " in its own namespace (--ros-args -r __ns:=/robot2)"
+    )
+
+
+def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
+    """Return a warning about ``cmd_vel`` publishers whose type is not received; else empty."""
+    ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+    if stamped:
+        ours, other = other, ours
+    unheard = sorted(
+        {publisher.node_name for publisher in publishers if publisher.topic_type != ours}
+    )
+    if not unheard:
+        return ""
+    return (
+        f"{', '.join(unheard)} publishes another type than {ours} on cmd_vel and is not received;"
+        f" for {other} start the driver with enable_stamped_cmd_vel:={str(not stamped).lower()}"
     )

@@ -3,7 +3,6 @@
 """Values to ROS messages: the place of each number, by REP-103, REP-105 and REP-145."""
 
 import math
-from types import SimpleNamespace
 
 import pytest
 from builtin_interfaces.msg import Time
@@ -93,23 +92,6 @@ def test_a_goal_that_is_no_place_on_the_floor_is_refused_with_a_reason(
     """The frame is wrong, a number or rotation is missing, or it is not upright."""
     with pytest.raises(CommandRefused, match=f"cmd_pose re(fus|ject)ed.*{said}"):
         messages.goal_pose(wrong, "odom")
-
-
-def publisher(name: str, kind: str) -> SimpleNamespace:
-    return SimpleNamespace(node_name=name, topic_type=f"geometry_msgs/msg/{kind}")
-
-
-def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """This holds for both types; only the wrong publisher is named."""
-    teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
-    assert messages.type_conflict([teleop], stamped=False) == ""
-    assert messages.type_conflict([nav], stamped=True) == ""
-    text = messages.type_conflict([teleop, nav, nav], stamped=False)
-    assert text.startswith("nav publishes")
-    assert text.endswith("enable_stamped_cmd_vel:=true")
-    text = messages.type_conflict([teleop, nav], stamped=True)
-    assert text.startswith("teleop publishes")
-    assert text.endswith("enable_stamped_cmd_vel:=false")
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:

@@ -100,3 +100,20 @@ def test_a_node_of_the_same_full_name_is_told_of(
     ]
     text = selfcheck.namesake_advice("/omnibot_driver", publishers)
     assert ("another node has the name /omnibot_driver," in text) == warned
+
+
+def publisher(name: str, kind: str) -> SimpleNamespace:
+    return SimpleNamespace(node_name=name, topic_type=f"geometry_msgs/msg/{kind}")
+
+
+def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
+    """This holds for both types; only the wrong publisher is named."""
+    teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
+    assert selfcheck.type_conflict([teleop], stamped=False) == ""
+    assert selfcheck.type_conflict([nav], stamped=True) == ""
+    text = selfcheck.type_conflict([teleop, nav, nav], stamped=False)
+    assert text.startswith("nav publishes")
+    assert text.endswith("enable_stamped_cmd_vel:=true")
+    text = selfcheck.type_conflict([teleop, nav], stamped=True)
+    assert text.startswith("teleop publishes")
+    assert text.endswith("enable_stamped_cmd_vel:=false")
