@@ -42,9 +42,9 @@ class MeasurementPipeline:
     def __init__(self, board: Board, settings: SessionSettings, axis_signs: Signs) -> None:
         self.odometry = Odometry(settings.odometry, axis_signs)
         self.inertial = BiasCorrector(board, settings.imu)
-        self._tally = StreamStatistics()
         self._board = board
         period_s = board.traits.imu_period_s
+        self._tally = StreamStatistics(imu_period_s=period_s if board.clock is None else None)
         self._clock: ReadingClock
         if board.clock is not None:
             self._clock = board.clock

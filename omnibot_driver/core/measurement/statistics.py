@@ -22,8 +22,12 @@ class StreamStatistics:
     """Counts and sums since the driver began.
 
     All values only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
+
+    ``imu_period_s``: period of the IMU readings in s, if the board sends them and displacements at
+    the pace of one clock; a lost displacement then means lost IMU readings too. Otherwise None.
     """
 
+    imu_period_s: float | None = None
     imu: int = 0
     displacements: int = 0
     poses: int = 0
@@ -44,6 +48,9 @@ class StreamStatistics:
     """Number of times in a row that each sensor has repeated exactly the same values."""
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
+    _sent_imu: int | None = field(default=None, repr=False)
+    """``imu`` plus ``lost_imu`` at the last displacement; None without one to count from."""
+    _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
         """Count the readings of one read, and the age of its newest sample."""
@@ -62,11 +69,29 @@ class StreamStatistics:
             elif isinstance(reading, DisplacementReading):
                 self.displacements += 1
                 self._miss(reading.lost, reading.restarted)
+                self._miss_imus(reading)
             elif isinstance(reading, PoseReading):
                 self.poses += 1
                 self._miss(reading.lost, reading.restarted)
+                if self._sent_imu is not None:  # the next displacement does not report them again
+                    self._sent_imu += reading.lost * self._imus_per_displacement
             else:
                 self.same_force = self.same_rate = 0
+                self._sent_imu = None
+
+    def _miss_imus(self, reading: DisplacementReading) -> None:
+        """Count the IMU readings that were lost with displacements, as frames do not show them."""
+        if self.imu_period_s is None:
+            return
+        if reading.duration_s is None or reading.restarted:
+            self._sent_imu = None
+        else:
+            self._imus_per_displacement = round(reading.duration_s / self.imu_period_s)
+        seen = self.imu + self.lost_imu
+        if self._sent_imu is not None:
+            sent = self._sent_imu + self._imus_per_displacement * (reading.lost + 1)
+            self.lost_imu += max(0, sent - seen)
+        self._sent_imu = self.imu + self.lost_imu
 
     def _miss(self, lost: int, restarted: bool) -> None:
         self.restarts += restarted

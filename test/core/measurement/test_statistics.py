@@ -1,0 +1,40 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The counts of lost readings, on a simulated OmniBot."""
+
+import pytest
+from session_bench import Bench
+
+from omnibot_driver.simulator.omnibot import BoardSettings
+
+
+def lost(bench: Bench) -> tuple[int, int]:
+    """Return the numbers of lost IMU readings and displacements."""
+    tally = bench.session.figures(bench.now).tally
+    return tally.lost_imu, tally.lost_displacements
+
+
+@pytest.mark.parametrize("silence_s", [0.04, 0.2, 1.0, 5.0])
+def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: float) -> None:
+    """IMU frames have no counter, but four of them precede each displacement."""
+    bench = Bench(BoardSettings(running=True))
+    bench.open()
+    bench.run(2.0)
+    assert lost(bench) == (0, 0)
+    bench.speaks = False
+    bench.run(silence_s)
+    bench.speaks = True
+    bench.run(2.0)
+    assert lost(bench) == (round(silence_s / 0.01), round(silence_s / 0.04))
+
+
+def test_a_pause_loses_nothing() -> None:
+    """A paused board does not measure."""
+    bench = Bench(BoardSettings(running=True))
+    bench.open()
+    bench.run(2.0)
+    bench.board.receive(b"P")
+    bench.run(3.3)
+    bench.run_until_state("nominal")
+    bench.run(2.0)
+    assert lost(bench) == (0, 0)
