@@ -52,7 +52,7 @@ TRAITS: Final = Traits(
             "check `control_method`, `axis_signs`, `delta_frame` and the wiring of the wheels"
         ),
         Fault.WRONG_TURN: "check `control_method`, `axis_signs` and the wiring of the wheels",
-        Fault.TOO_FAST: "check `control_method` and `linear_scale`",
+        Fault.TOO_FAST: "check `control_method`, `linear_scale` and `delta_frame`",
         Fault.TURNS_TOO_FAST: (
             "check `control_method` and `angular_scale` (for wheel_cmd, `linear_scale`)"
         ),

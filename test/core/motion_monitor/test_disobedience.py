@@ -141,14 +141,17 @@ def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
     assert "measured 1." in bench.notices[0]
 
 
-def test_a_wrong_delta_frame_is_among_what_to_check() -> None:
+@pytest.mark.parametrize(
+    ("heading_mrad", "what"), [(1571.0, "wrong direction"), (700.0, "moves faster")]
+)
+def test_a_wrong_delta_frame_is_among_what_to_check(heading_mrad: float, what: str) -> None:
     """The robot obeys, but its displacements are read in the wrong frame."""
-    bench = Bench(BoardSettings(running=True, initial_pose=BoardPose(0.0, 0.0, 1571.0)))
+    bench = Bench(BoardSettings(running=True, initial_pose=BoardPose(0.0, 0.0, heading_mrad)))
     bench.read_deltas_as("body")
     bench.open()
     bench.run(2.0)
     try_to_drive(bench, 2.0)
-    (text,) = (text for text in bench.notices if "wrong direction" in text)
+    (text,) = (text for text in bench.notices if what in text)
     assert "`delta_frame`" in text
 
 
