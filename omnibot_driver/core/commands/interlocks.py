@@ -86,6 +86,8 @@ class Interlocks:
             return self.missing
         if phase is Phase.CLOSED:
             return "the port is not open; connect the board, then call again"
+        if phase is Phase.RESETTING:
+            return f"the board is {phase.value}; call again when it runs"
         if mode is Mode.UNKNOWN:
             return "no valid data from the board; check its power and cable, then call again"
         if not mode.running:

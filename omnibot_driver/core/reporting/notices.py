@@ -18,11 +18,11 @@ HEADING_ASSUMED: Final = (
 )
 
 SIDEWAYS: Final = (
-    "cmd_vel: sideways speed is set to zero; this base cannot move sideways (said once)"
+    "cmd_vel: sideways speed is set to zero; this base cannot move sideways (reported once)"
 )
 OUT_OF_PLANE: Final = (
     "cmd_vel: linear.z, angular.x and angular.y are set to zero; this base moves on the floor only"
-    " (said once)"
+    " (reported once)"
 )
 STOP_UNSEEN: Final = (
     "stop unconfirmed: in IMU-only mode the board does not report motion, so the driver repeats"

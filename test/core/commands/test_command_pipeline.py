@@ -79,7 +79,7 @@ def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> N
         bench.run(0.1)
     assert {tuple(words) for _, words in velocities(bench, start)} == {(28, 0, 0)}
     assert [text for text in notices(bench) if "sideways speed is set to zero" in text] == [
-        "cmd_vel: sideways speed is set to zero; this base cannot move sideways (said once)"
+        "cmd_vel: sideways speed is set to zero; this base cannot move sideways (reported once)"
     ]
     with pytest.raises(CommandRefused, match="NaN"):
         bench.session.command_twist(BodyTwist(0.1, math.nan, 0.0), bench.now)

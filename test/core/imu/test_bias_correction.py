@@ -49,6 +49,15 @@ def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -
     assert last(bench).angular_velocity == pytest.approx((0.0, 0.0, 0.0), abs=0.006)
 
 
+def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
+    """The board sends nothing meanwhile, but its cable is not the reason."""
+    bench = running()
+    bench.session.request(Request.RESET, "reset", bench.now)
+    bench.settle()
+    with pytest.raises(RequestRefused, match="the board is being reset; call again when it runs"):
+        bench.session.calibrate_gyro("token", bench.now)
+
+
 def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
     """A calibration is refused during a command, and fails if a command arrives later."""
     bench = running()
