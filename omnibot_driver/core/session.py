@@ -189,8 +189,9 @@ class Session:
         future. ``planar``: whether the sender asked for no motion out of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
-        if self._commanding.sideways or not planar:
-            self._reporter.set_to_zero(sideways=self._commanding.sideways, planar=planar)
+        sideways = self._commanding.shaper.sideways
+        if sideways or not planar:
+            self._reporter.set_to_zero(sideways=sideways, planar=planar)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Command wheel rates. If it raises CommandRefused, nothing changes."""

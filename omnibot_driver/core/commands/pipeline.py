@@ -40,6 +40,7 @@ class CommandPipeline:
     """The path of motion commands in one session.
 
     * ``policy``: the command in effect, its expiry and the e-stop latch.
+    * ``shaper``: checks and limits commands.
     * ``interlock``: refuses motion after the motion monitor has stopped the robot.
     * ``monitored``: whether the motion monitor is enabled.
     * ``obeys``: whether the robot can be expected to follow commands; False for a recording.
@@ -61,7 +62,7 @@ class CommandPipeline:
             settings.commands, self._actuator, proof, board.traits.unproved_s
         )
         self._odometry = odometry
-        self._shaper = CommandShaper(
+        self.shaper = CommandShaper(
             board,
             self._actuator,
             odometry,
@@ -88,9 +89,9 @@ class CommandPipeline:
             self.interlock.start()
         limits, commands = settings.limits, settings.commands
         stricter = commands.timeout_s < self.policy.settings.timeout_s or limits.stricter_than(
-            self._shaper.limits
+            self.shaper.limits
         )
-        self._shaper.limits, self._shaper.kinematics = limits, settings.kinematics
+        self.shaper.limits, self.shaper.kinematics = limits, settings.kinematics
         self.policy.configure(commands)
         current = self.policy.current
         if not stricter or current is None or current.is_zero or isinstance(current, GoalSetpoint):
@@ -112,18 +113,13 @@ class CommandPipeline:
             return [f"robot stopped: the current command does not fit the new scale ({error})"]
         return []
 
-    @property
-    def sideways(self) -> bool:
-        """Whether the last body velocity had a sideways part that the wheels cannot produce."""
-        return self._shaper.sideways
-
     def figures(self, now: float) -> CommandFigures:
         """Return the topic that commands the robot, and the counters of commands."""
         current = self.policy.current
         return CommandFigures(
             source=current.authority.value if current else None,
             age_s=now - self.policy.commanded_at,
-            limited=self._shaper.limited,
+            limited=self.shaper.limited,
             estop=self.policy.latched,
             monitored=self.monitored or not self._obeys,
             trips=self.interlock.trips,
@@ -151,16 +147,16 @@ class CommandPipeline:
         if age_s:
             require_timely("cmd_vel", age_s, timeout_s)
             expires_at -= max(0.0, age_s)
-        motion = self._shaper.base(twist, before=self.policy.current, since=now - PACE_S)
+        motion = self.shaper.base(twist, before=self.policy.current, since=now - PACE_S)
         return motion, expires_at
 
     def wheels(self, rates_radps: Sequence[float], now: float) -> Command:
         """Return the command for wheel rates in rad/s, in the board's order of wheels."""
-        return self._shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
+        return self.shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
         """Return the command to drive to a pose in the odometry frame; it never expires."""
-        return self._shaper.pose(goal), NEVER
+        return self.shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
         """Note that the packets of a request, which is not a motion command, were sent."""

@@ -58,11 +58,10 @@ class CommandShaper:
         """Return the set-point for a body velocity; a ramp starts at the set-point ``before``."""
         if self._control == "position":
             raise self._at_odds(Authority.BASE)
-        if not self.limits.allow(twist):  # checked before a part is dropped
-            require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
         limited = feasible = self.kinematics.feasible(twist)
         self.sideways = feasible.vy_mps != twist.vy_mps
-        if not self.limits.allow(feasible):
+        if not self.limits.allow(twist):
+            require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
             limited = self.limits.twist(feasible)
             self.limited += limited != feasible
         x, y, yaw = self._axis_signs
