@@ -89,6 +89,7 @@ def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
     if not unheard:
         return ""
     return (
-        f"{', '.join(unheard)} publishes another type than {ours} on cmd_vel and is not received;"
-        f" for {other} start the driver with enable_stamped_cmd_vel:={str(not stamped).lower()}"
+        f"{', '.join(unheard)} publishes cmd_vel with a type other than {ours}, so the driver does"
+        f" not receive it; for {other} start the driver with"
+        f" enable_stamped_cmd_vel:={str(not stamped).lower()}"
     )
