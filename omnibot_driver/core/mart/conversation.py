@@ -123,12 +123,12 @@ class Conversation:
 
     def certain_from_s(self, word: Word) -> float:
         """Return the time from which no late reply can be taken for the reply to ``word``."""
-        until = [
-            each.get(form, -math.inf)
-            for form in word.forms
-            for each in (self._copies_until_s, self._owed_until_s)
-        ]
-        return max(until) - word.least_s
+        return max(map(self.late_until_s, word.forms)) - word.least_s
+
+    def late_until_s(self, form: Form) -> float:
+        """Return the time until which a late reply or a copy of this form may come."""
+        owed_s = self._owed_until_s.get(form, -math.inf)
+        return max(owed_s, self._copies_until_s.get(form, -math.inf))
 
     def disturbed(self, now: float) -> bool:
         """Return whether the network has recently lost, duplicated or delayed a datagram."""

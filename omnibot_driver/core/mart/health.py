@@ -44,11 +44,6 @@ OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
 """Similar readings in a row needed to accept one that may be the reply to another query."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
-REFERENCE_FAILS: Final = 2
-"""Number of bare ``fail`` replies to RM in a row that show a defective server.
-
-A single ``fail`` can also come from an intact server, after a stop that took long.
-"""
 
 
 class Health:
@@ -63,6 +58,7 @@ class Health:
     def __init__(self, imu: ImuProof) -> None:
         self._imu = imu
         self.reference_fails = 0
+        self._defective = False
         self.connect()
 
     def connect(self) -> None:
@@ -152,8 +148,7 @@ class Health:
 
     def reference_moves(self) -> None:
         """Note that the robot moves after an RM that failed, which is a defect of the server."""
-        if self.reference_fails:
-            self.reference_fails = REFERENCE_FAILS
+        self._defective |= self.reference_fails > 0
 
     def volts_or(self, nominal: float) -> float:
         """Return the battery voltage in V, or ``nominal`` before the first report."""
@@ -187,7 +182,7 @@ class Health:
                 "the IMU does not answer (MPU6050 connection lost): check its wiring, and"
                 " restart server and driver if this persists"
             )
-        if self.reference_fails >= REFERENCE_FAILS:
+        if self._defective:
             return "this server answers 'fail' to RM although the robot moves: update the server"
         return ""
 

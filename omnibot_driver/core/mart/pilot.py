@@ -182,14 +182,22 @@ class Pilot(Measuring):
         if self.state is State.LOST:
             return
         if self._stopping is not None:
+            late = self._may_be_late_ok(reply, now)
             if isinstance(reply, Ok):
                 self.conversation.heard(reply.form, now)
-            if not self._may_be_count(reply, now) and self._stopping.hear(reply, now):
+            if late or self._may_be_count(reply, now):
+                return
+            if self._stopping.hear(reply, now):
                 self._stopped(now)
             return
         answer = self.conversation.hear(reply, now)
         if answer is not None:
             self._answered(answer, now)
+
+    def _may_be_late_ok(self, reply: Reply, now: float) -> bool:
+        """Return whether a bare ``ok`` may be late, or a copy of the start's or the check's."""
+        bare = isinstance(reply, Ok) and reply.form is Form.NOTHING
+        return bare and now < self.conversation.late_until_s(Form.NOTHING)
 
     def _named(self, reply: Ok, now: float) -> None:
         if reply.text != "BBB":

@@ -36,6 +36,11 @@ AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
 """Longest duration of controlled moves: s per inch (straight), s per degree (turn)."""
+REFERENCE_FAILS: Final = 2
+"""Number of bare ``fail`` replies to RM in a row after which RM is not tried again.
+
+A single one also comes from an intact server, after a stop that took long.
+"""
 SLOW_UNITS: Final = 20
 """Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 
@@ -249,8 +254,14 @@ class Starts(Moves):
             self.motion = Motion.UNKNOWN
             why = "another motion is in progress"
         elif word is words.RM and self._is_of_another(reply, now):
-            why = "the driver tries again"
             self.health.reference_fails += reply.reason == ""
+            why = "the driver tries again"
+            if self.health.reference_fails >= REFERENCE_FAILS:
+                self._blocked, self.health.reference_fails = Motion.REFERENCE, 0
+                why = (
+                    "the motors may be stuck or without power; forward motion is refused until"
+                    " another command"
+                )
         else:
             why = self._obstacle(reply, self.motion)
         if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
