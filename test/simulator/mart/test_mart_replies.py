@@ -143,6 +143,7 @@ def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
     rig.drive("RM 30")
     rig.say("")
     rig.server.restart()
+    rig.run(1.0)
     assert rig.ask("HELLO") == "ok BBB"
     assert rig.ask("SRM") == "fail no motion in progress"
     assert rig.moving

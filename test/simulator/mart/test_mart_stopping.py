@@ -152,6 +152,7 @@ def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
     rig.say("EXIT")
     rig.run(0.1)
     rig.server.restart()
+    rig.run(1.0)
     assert rig.ask("F") == "ok"
 
 
