@@ -121,6 +121,11 @@ class Conversation:
         """Note that a reply of this form came, whose duplicate may come within ``delay_s``."""
         self._copies_until_s[form] = now + self.delay_s
 
+    def came(self, reply: Ok, now: float) -> None:
+        """Note that this reply is the one that was owed, if it is no copy of another."""
+        if not self._has_come(reply, now):
+            self._owed_until_s.pop(reply.form, None)
+
     def certain_from_s(self, word: Word) -> float:
         """Return the time from which no late reply can be taken for the reply to ``word``."""
         return max(map(self.late_until_s, word.forms)) - word.least_s
@@ -197,8 +202,7 @@ class Conversation:
         ):
             self.discarded += 1
             if isinstance(reply, Ok):
-                if not self._has_come(reply, now):
-                    self._owed_until_s.pop(reply.form, None)
+                self.came(reply, now)
                 if reply.form is not Form.NAME:
                     self._disturbed_s = self._doubled_s = now
             return None

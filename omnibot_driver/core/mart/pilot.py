@@ -182,7 +182,7 @@ class Pilot(Measuring):
         if self.state is State.LOST:
             return
         if self._stopping is not None:
-            late = self._may_be_late_ok(reply, now)
+            late = isinstance(reply, Ok) and self._may_be_late(reply, now)
             if isinstance(reply, Ok):
                 self.conversation.heard(reply.form, now)
             if late or self._may_be_count(reply, now):
@@ -194,10 +194,16 @@ class Pilot(Measuring):
         if answer is not None:
             self._answered(answer, now)
 
-    def _may_be_late_ok(self, reply: Reply, now: float) -> bool:
-        """Return whether a bare ``ok`` may be late, or a copy of the start's or the check's."""
-        bare = isinstance(reply, Ok) and reply.form is Form.NOTHING
-        return bare and now < self.conversation.late_until_s(Form.NOTHING)
+    def _may_be_late(self, reply: Ok, now: float) -> bool:
+        """Return whether the reply to a stop may be that to an earlier request, or a copy of one.
+
+        A bare ``ok`` may be that of the start or the check. A number, with which a stop of a turn
+        on the spot is answered, may be a count that was asked for before.
+        """
+        late = now < self.conversation.late_until_s(reply.form)
+        if reply.form is Form.INTEGER and late:
+            self.conversation.came(reply, now)
+        return late and reply.form in (Form.NOTHING, Form.INTEGER)
 
     def _named(self, reply: Ok, now: float) -> None:
         if reply.text != "BBB":

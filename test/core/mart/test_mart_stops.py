@@ -2,6 +2,8 @@
 
 """Every motion of the simulated controller is stopped, whatever has started it, on any network."""
 
+import math
+
 import pytest
 from mart_bench import MartBench
 from mart_campaign import FIRMWARES
@@ -105,6 +107,33 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
     bench.run(2.0)
     assert bench.robot.stands
     assert not bench.server.hung
+
+
+def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The server answers a stop of a turn with an angle, and the late count looks like one."""
+    bench = MartBench().ready()
+    bench.command(0.0, 0.5, 1.5)
+    lost: list[bytes] = []
+    receive = bench.robot.receive
+
+    def cut(data: bytes, now: float, channel: int) -> None:
+        if lost or data == b"ENC":
+            lost.append(data)
+        else:
+            receive(data, now, channel)
+
+    monkeypatch.setattr(bench.robot, "receive", cut)
+    while not lost:
+        bench.command(0.0, 0.5, 0.1)
+    bench.try_command(0.0, 0.0)
+    assert b"SM" in lost
+    degrees = round(math.degrees(bench.truth.yaw_rad))
+    bench.session.inbound.receive(f"ok {degrees}".encode(), bench.now, 0)
+    assert bench.board._pilot.state is State.STOPPING
+    monkeypatch.undo()
+    assert bench.until_it_stands() < 1.0
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
