@@ -122,7 +122,7 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Note that this reply is the one that was owed, if it is no copy of another."""
+        """Note that this reply is the one that was owed, unless it is a copy of another."""
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
 
