@@ -28,7 +28,6 @@ CGROUP: Final = Path("/sys/fs/cgroup")
 NAMES: Final = ("ours", "floor")
 RELAY: Final = "measurements"
 STOP: Final = b"\xff\xfe\x02"
-LISTENING_S: Final = 1.0
 STOPPING_S: Final = 2.0
 
 
@@ -119,26 +118,23 @@ def _table(parts: Sequence[float], seconds: float) -> list[str]:
 
 def _row(part: float, stage: Stage, seconds: float) -> str:
     with ear(*NAMES) as listener:
-        time.sleep(LISTENING_S)
-        start = time.monotonic()
         with Program(str(HERE / "hand.py"), str(seconds), NAMES[0]) as hand:
-            sent = hand.result()[0]
-        end = time.monotonic()
+            sent = hand.result()[0]  # the start of that process disturbs what measures
         time.sleep(STOPPING_S)
         result = listener.result()
+    start, last = sent[0][0], sent[-1][0]
     rates, delays = [], []
     for heard, said, unit in zip(result["heard"], stage.said, (MPS2_PER_COUNT, 1.0), strict=True):
-        within = [each for each in heard if start <= each[0] < end]
-        rates.append(f"{len(within) / (end - start):.0f}")
+        within = [each for each in heard if start <= each[0] < last]
+        rates.append(f"{len(within) / (last - start):.0f}")
         delays.append(_delay([us for _, us in latencies(said, within, unit)]))
-    odometries = sum(start <= at < end for (at,) in result["odometries"][0])
+    odometries = sum(start <= at < last for (at,) in result["odometries"][0])
     on_board = [each for each in stage.heard[0] if each[0] >= start]
-    last = sent[-1][0]
     stop = next((at - last for at, data in on_board if at > last and STOP in data), math.inf)
     cells = (
         f"{part:.0%}",
         ", ".join(rates),
-        f"{odometries / (end - start):.1f}",
+        f"{odometries / (last - start):.1f}",
         *delays,
         _delay(command_latencies(sent, on_board)),
         f"{stop:.2f}",
