@@ -68,7 +68,7 @@ integrity: $(VENV)/.test  ## measure damaged lines of BOARD, both ways (15 minut
 	$(PY) test/integrity/report.py --board $(BOARD) || inbound=$$?; \
 	  $(PY) test/integrity/outbound.py --board $(BOARD) && exit $${inbound:-0}
 
-bench: $(VENV)/.test  ## measure BOARD against a floor (13 minutes), into docs/internals/performance.md
+bench: $(VENV)/.test  ## measure BOARD against a floor (15 minutes), into docs/internals/performance.md
 	$(PY) test/bench/report.py --board $(BOARD)
 
 faults: $(VENV)/.test  ## break everything around BOARD, with the real node (15 minutes), into docs/internals/faults.md
