@@ -11,23 +11,21 @@ from typing import Final
 from omnibot_driver.core.geometry.se2 import Pose, roll
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart.doubt import SPREAD, Errors, anywhere
-from omnibot_driver.core.mart.reckoning import BLIND_MPS, Reckoning
+from omnibot_driver.core.mart.reckoning import ACCELERATION_RADPS2, BLIND_MPS, Reckoning
 from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.readings import OdometryReading
 
 LONGEST_PREDICTION_S: Final = 0.5
 SLOWING_S: Final = 0.12
 """Time constant in s with which a robot that is being stopped slows down."""
-ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
-"""Standard deviations of the acceleration since the last count, in m/s² and rad/s²."""
+ACCELERATION_MPS2: Final = 1.0
+"""Standard deviation of the acceleration since the last count, in m/s²."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
 """Standard deviations of the error of speeds from the last counts, in m/s and rad/s."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
 """Standard deviations of speed and turn rate before they are measured after a start."""
 BLIND_RADPS: Final = 1.5
 """Standard deviation of the turn rate of a robot during a controlled move, in rad/s."""
-FRESH_S: Final = 0.2
-"""Age in s up to which the last heading shows the present turn rate."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03
 
 
@@ -81,10 +79,8 @@ class MartOdometry(Reckoning):
             ACCELERATION_MPS2 * square_s2 + (abs(speed_mps) + FASTER_MPS) * late_s,
             ACCELERATION_RADPS2 * square_s2 + (abs(rate_radps) + FASTER_RADPS) * late_s,
         )
-        stale_s = now - self.heading.told_s - FRESH_S
-        if self.motion is Motion.REFERENCE and stale_s > 0.0:
-            turn_rad = ACCELERATION_RADPS2 * stale_s * stale_s / 2
-            errors += anywhere(abs(speed_mps) * stale_s * min(1.0, turn_rad), turn_rad)
+        stale_s, turn_rad = self.stale(now)
+        errors += anywhere(abs(speed_mps) * stale_s * min(1.0, turn_rad), turn_rad)
         if self.on_the_spot:
             errors += self.doubt.turn(self.spun_rad, self.told_rad)
         if len(self._track) < 2:

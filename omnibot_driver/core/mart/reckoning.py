@@ -36,6 +36,10 @@ The two motors differ although their units are equal.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
+ACCELERATION_RADPS2: Final = 3.0
+"""Standard deviation of the turn acceleration since the last count, in rad/s²."""
+FRESH_S: Final = 0.2
+"""Age in s up to which the last heading shows the present turn rate."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 """Standard deviations of the end of a motion during which the connection was lost, in m and rad."""
 ANY_RAD: Final = 1.8
@@ -276,7 +280,8 @@ class Reckoning:
         self.moved_m += way_m
         self._track.append((self.wheel.told_s, self._way_m, self._yaw_rad))
         guessed = self.motion is Motion.REVERSE and self.left_over_right is not None
-        mistimed_rad = self.heading.rate_radps * self.spread_s + turn_rad * min(seconds, 1.0)
+        mistimed_rad = abs(self.heading.rate_radps * self.spread_s + turn_rad * min(seconds, 1.0))
+        mistimed_rad += min(1.0, self.stale(self.wheel.told_s)[1])
         self.doubt.moved(
             before.yaw_rad,
             way_m,
@@ -289,6 +294,16 @@ class Reckoning:
         stray_m = STRAY_COUNTS * abs(self._settings.metres_per_count)
         if self.motion is Motion.NONE and abs(wheel_m) > stray_m:
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
+
+    def stale(self, now: float) -> tuple[float, float]:
+        """Return how long RM has driven without a fresh heading, in s.
+
+        The second value is the standard deviation of the turn within that time, in rad.
+        """
+        stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
+        if self.motion is not Motion.REFERENCE:
+            stale_s = 0.0
+        return stale_s, ACCELERATION_RADPS2 * stale_s * stale_s / 2
 
     @property
     def speeds(self) -> tuple[float, float]:

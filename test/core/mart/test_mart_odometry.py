@@ -2,6 +2,8 @@
 
 """Odometry from replies that are lost, late, duplicated or the answer to another query."""
 
+import math
+
 import pytest
 from honesty import nees
 from mart_bench import MartBench
@@ -237,6 +239,26 @@ def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
     for at_s in (1.3, 1.4, 1.5):
         odometry.counted(1267, at(at_s, doubtful=True))
     assert odometry.pose.x_m == pytest.approx(0.04)
+
+
+def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
+    """A count comes after 1.2 s of a curve, the heading of that curve only with the next one."""
+    settings = MartSettings()
+    odometry = MartOdometry(settings)
+    odometry.counted(0, at(0.9))
+    odometry.begin(Motion.REFERENCE, 1.0)
+    odometry.started(1.05, sure=True)
+    for tenth in range(4):
+        odometry.turned(0.0, at(1.1 + tenth / 10))
+        odometry.counted(20 * tenth, at(1.15 + tenth / 10))
+    odometry.counted(260, at(2.65))
+    turn_rad = 0.5
+    odometry.turned(math.degrees(turn_rad) * settings.heading_sign, at(2.7))
+    odometry.counted(262, at(2.75))
+    way_m = 202 * settings.metres_per_count - turn_rad * settings.track_m / 2
+    assert odometry.pose.yaw_rad == pytest.approx(turn_rad, abs=0.03)
+    wrong_m = way_m * turn_rad / 2 - odometry.pose.y_m
+    assert abs(wrong_m) < 3.0 * math.sqrt(odometry.doubt.total([]).yy)
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
