@@ -64,7 +64,7 @@ class Measuring(Starts):
             return
         self.health.encoder_answers()
         self.readings.append(reading)
-        _speed, rate = self.odometry.speeds
+        _speed, rate = self.odometry.speeds.means
         if self.state is State.STILL:
             rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
             if self._moved_by is not None and rested and self.odometry.motion is not Motion.NONE:

@@ -37,7 +37,7 @@ class MartOdometry(Reckoning):
 
         ``blind_since_s``: time since which a controlled move is under way, or None.
         """
-        speed_mps, rate_radps = self.speeds
+        speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s
         ahead_s = max(0.0, now - counted_s) if counted_s > -math.inf else 0.0
         predicted_s, left = min(ahead_s, LONGEST_PREDICTION_S), 1.0
@@ -70,10 +70,10 @@ class MartOdometry(Reckoning):
             return anywhere(BLIND_MPS * blind_s, min(math.pi, BLIND_RADPS * blind_s))
         if self.motion is Motion.NONE:
             return []
-        speed_mps, rate_radps = self.speeds
-        late_s = SPREAD * self.spread_s
+        speed_mps, rate_radps = self.speeds.means
+        late_s = SPREAD * self.speeds.spread_s
         if self.slowing_since_s is not None:
-            late_s += min(now - self.slowing_since_s, self.spread_s)
+            late_s += min(now - self.slowing_since_s, self.speeds.spread_s)
         square_s2 = ahead_s * ahead_s / 2
         errors = anywhere(
             ACCELERATION_MPS2 * square_s2 + (abs(speed_mps) + FASTER_MPS) * late_s,
@@ -83,9 +83,9 @@ class MartOdometry(Reckoning):
         errors += anywhere(abs(speed_mps) * stale_s * min(1.0, turn_rad), turn_rad)
         if self.on_the_spot:
             errors += self.doubt.turn(self.spun_rad, self.told_rad)
-        if len(self._track) < 2:
+        if not self.speeds.are_known:
             errors += anywhere(STARTS_MPS * ahead_s, STARTS_RADPS * ahead_s)
-        more_mps, more_radps = self.speed_changes
+        more_mps, more_radps = self.speeds.changes
         errors += anywhere(more_mps * ahead_s, more_radps * ahead_s)
         if self.wheel.maybe:
             errors += anywhere(*self.maybe)
@@ -94,8 +94,8 @@ class MartOdometry(Reckoning):
     def _speed_variances(self, ahead_s: float, blind_since_s: float | None) -> tuple[float, float]:
         if blind_since_s is not None:
             return BLIND_MPS**2, 1.0
-        speed_mps, rate_radps = self.speeds
-        part = SPREAD * self.spread_s / self.window_s
+        speed_mps, rate_radps = self.speeds.means
+        part = SPREAD * self.speeds.spread_s / self.speeds.window_s
         more_mps, more_radps = (
             each * ahead_s / 2 for each in (ACCELERATION_MPS2, ACCELERATION_RADPS2)
         )

@@ -8,11 +8,11 @@ knows counts, degrees and metres; it knows no commands. Time is an argument.
 """
 
 import math
-from collections import deque
 from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose, roll
 from omnibot_driver.core.mart.doubt import CLOCK_S, SPREAD, Doubt
+from omnibot_driver.core.mart.mean_speeds import LEAST_S, MeanSpeeds
 from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.relative_heading import RelativeHeading
 from omnibot_driver.core.mart.settings import MartSettings
@@ -21,9 +21,6 @@ from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
-WINDOW_S, SPREADS = 0.35, 4
-"""Averaging time of speeds: the larger of WINDOW_S (s) and SPREADS times a reply's spread."""
-LEAST_S: Final = 0.05
 TOLD_RAD, TOLD_PART = 0.05, 0.3
 """Largest difference of a reported turn from the wheel's: in rad, plus a part of the turn.
 
@@ -65,12 +62,10 @@ class Reckoning:
         self.bend = UNEQUAL
         self._began_s = self._stood_s = -math.inf
         self.slowing_since_s: float | None = None
-        self._track: deque[tuple[float, float, float]] = deque(maxlen=40)
-        self._way_m = self._yaw_rad = self._motion_rad = 0.0
-        self.spun_rad = self.moved_m = 0.0
+        self.speeds = MeanSpeeds()
+        self._motion_rad = self.spun_rad = self.moved_m = 0.0
         self.told_rad: float | None = None
         self._guessed = False
-        self.spread_s = CLOCK_S
         self.reset()
 
     @property
@@ -94,7 +89,7 @@ class Reckoning:
             self.heading.forget()
         else:
             self.doubt.add(UNHEARD_M**2, UNHEARD_RAD**2)
-        self.forget_speeds()
+        self.speeds.forget()
 
     def begin(self, motion: Motion, now: float) -> None:
         """Note that a motion was started; its count begins at zero."""
@@ -138,7 +133,7 @@ class Reckoning:
         self.motion = Motion.NONE
         self.wheel.rest()
         self.slowing_since_s = None
-        self.forget_speeds()
+        self.speeds.forget()
 
     def turned(self, degrees: float, when: Moment) -> bool:
         """Process a reported heading in degrees; return whether it is plausible and has changed."""
@@ -156,7 +151,7 @@ class Reckoning:
 
         ``part``: the change of the ratio; ``late_s``: the interval in s in which it takes effect.
         """
-        turn_rad = part * abs(self.speeds[0]) * late_s / self._settings.track_m
+        turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
 
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
@@ -168,7 +163,7 @@ class Reckoning:
         if when.from_s < self._began_s:
             return None
         settings = self._settings
-        speed_mps, rate_radps = self.speeds
+        speed_mps, rate_radps = self.speeds.means
         step = self.wheel.tell(
             count,
             when,
@@ -179,7 +174,7 @@ class Reckoning:
         )
         if step is None:
             return None
-        self.spread_s = max(CLOCK_S, when.spread_s)
+        self.speeds.spread_s = max(CLOCK_S, when.spread_s)
         if step.lost:
             self.doubt.add((BLIND_MPS * step.seconds) ** 2, ANY_RAD**2)
         if step.unsure:
@@ -250,7 +245,7 @@ class Reckoning:
     def _correct_yaw(self, wrong_rad: float) -> None:
         self.pose = Pose(self.pose.x_m, self.pose.y_m, self.pose.yaw_rad + wrong_rad)
         self.rolled += Pose(0.0, 0.0, wrong_rad)
-        self._yaw_rad += wrong_rad
+        self.speeds.correct(wrong_rad)
 
     def _finish_turn(self) -> None:
         """End a turn on the spot after its last count.
@@ -274,13 +269,12 @@ class Reckoning:
         before = self.pose
         self.pose = before.moved(roll(tangent))
         self.rolled += tangent
-        self._way_m += way_m
-        self._yaw_rad += turn_rad
         self._motion_rad += turn_rad
         self.moved_m += way_m
-        self._track.append((self.wheel.told_s, self._way_m, self._yaw_rad))
+        self.speeds.add(self.wheel.told_s, way_m, turn_rad)
         guessed = self.motion is Motion.REVERSE and self.left_over_right is not None
-        mistimed_rad = abs(self.heading.rate_radps * self.spread_s + turn_rad * min(seconds, 1.0))
+        late_rad = self.heading.rate_radps * self.speeds.spread_s
+        mistimed_rad = abs(late_rad + turn_rad * min(seconds, 1.0))
         mistimed_rad += min(1.0, self.stale(self.wheel.told_s)[1])
         self.doubt.moved(
             before.yaw_rad,
@@ -304,32 +298,3 @@ class Reckoning:
         if self.motion is not Motion.REFERENCE:
             stale_s = 0.0
         return stale_s, ACCELERATION_RADPS2 * stale_s * stale_s / 2
-
-    @property
-    def speeds(self) -> tuple[float, float]:
-        """Mean speeds over the window, from at least two counts, in m/s and rad/s; else zero."""
-        if len(self._track) < 2:
-            return 0.0, 0.0
-        newest_s, way_m, yaw_rad = self._track[-1]
-        from_s = min(newest_s - self.window_s, self._track[-2][0])
-        at_s, then_m, then_rad = next(each for each in self._track if each[0] >= from_s)
-        seconds = max(newest_s - at_s, 1e-3)
-        return (way_m - then_m) / seconds, (yaw_rad - then_rad) / seconds
-
-    @property
-    def speed_changes(self) -> tuple[float, float]:
-        """Speeds between the last two counts minus ``speeds``, in m/s and rad/s."""
-        if len(self._track) < 2:
-            return 0.0, 0.0
-        (then_s, then_m, then_rad), (at_s, way_m, yaw_rad) = self._track[-2], self._track[-1]
-        seconds = max(at_s - then_s, LEAST_S)
-        speed, rate = self.speeds
-        return (way_m - then_m) / seconds - speed, (yaw_rad - then_rad) / seconds - rate
-
-    @property
-    def window_s(self) -> float:
-        return max(WINDOW_S, SPREADS * self.spread_s)
-
-    def forget_speeds(self) -> None:
-        """Forget the counts that give the speeds, as the next counts belong to another motion."""
-        self._track.clear()

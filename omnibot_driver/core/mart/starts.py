@@ -197,7 +197,7 @@ class Starts(Moves):
         if start.word in HARMFUL_LATE:
             self._harmful_s = now
         self.proof.moved()
-        self.odometry.forget_speeds()
+        self.odometry.speeds.forget()
         self.odometry.begin(self.motion, now)
         if start.word.kind is Kind.MOVE:
             self._moved_by = self._last_move = start

@@ -121,7 +121,7 @@ class Stops(Ground, ABC):
             return "the server does not report the encoder count while the robot drives"
         if (
             odometry.wheel.told_s - self._begun_s > NO_START_S
-            and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3
+            and sum(map(abs, odometry.speeds.means)) < 1e-3
         ):
             return "the robot is driven and does not move"
         longest_s = FROZEN_S + 2 * self.conversation.trip_s
