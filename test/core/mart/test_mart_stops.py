@@ -9,6 +9,7 @@ from mart_bench import MartBench
 from mart_campaign import FIRMWARES
 
 from omnibot_driver.core.mart import State
+from omnibot_driver.core.mart.states import ROLLING
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
@@ -133,6 +134,31 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     bench.session.inbound.receive(f"ok {degrees}".encode(), bench.now, 0)
     assert bench.board._pilot.state is State.STOPPING
     monkeypatch.undo()
+    assert bench.until_it_stands() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("start", "twist"), [(b"RM", (0.3, 0.0)), (b"L", (0.0, 0.5)), (b"B", (-0.2, 0.0))]
+)
+def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
+    start: bytes, twist: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The reply to the start comes late, 0.4 s after it, and twice; the stop is sent in between."""
+    bench = MartBench().ready()
+    while not bench.said()[-1].startswith(start):
+        bench.try_command(*twist)
+        bench.run(0.01)
+    bench.speaks = False
+    bench.command(*twist, 0.4)
+    bench.session.inbound.receive(b"ok", bench.now, 0)
+    assert bench.board._pilot.state in ROLLING
+    monkeypatch.setattr(bench.robot, "receive", lambda *_: None)
+    bench.try_command(0.0, 0.0)
+    bench.run(0.05)
+    bench.session.inbound.receive(b"ok", bench.now, 0)
+    assert bench.board._pilot.state is State.STOPPING
+    monkeypatch.undo()
+    bench.speaks = True
     assert bench.until_it_stands() < 1.0
 
 
