@@ -63,17 +63,6 @@ class Console:
             return True
         return self._answer(f"{question} [y/N] ").lower() in ("y", "yes")
 
-    def choose(self, question: str, answers: Sequence[str]) -> str:
-        """Ask until the answer is, or clearly begins, one of these words; return the word."""
-        while True:
-            answer = self._answer(f"{question} [{'/'.join(answers)}] ").lower()
-            fitting = [one for one in answers if answer and one.lower().startswith(answer)]
-            if answer in answers:
-                return answer
-            if len(fitting) == 1:
-                return fitting[0]
-            self.say(f"Please answer one of: {', '.join(answers)}.")
-
     def number(self, question: str, unit: str, low: float, high: float) -> float:
         """Ask until the answer is a number from ``low`` to ``high``; return the number."""
         while True:

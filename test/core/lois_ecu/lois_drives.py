@@ -4,6 +4,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from random import Random
 
 from omnibot_driver.core.geometry.se2 import Pose
@@ -281,3 +282,14 @@ def motion(
 def drive(settings: LoisSettings, program: Program, *, loss: float = 0.0) -> Drive:
     """Drive a program and stop; each byte is lost with the chance ``loss``, in both directions."""
     return Rig(settings, loss=loss).drive(program)
+
+
+@cache
+def driven(firmware: Firmware, name: str, seed: int = 1) -> Drive:
+    """Return the outcome of a drive with exact wheel sizes."""
+    return drive(nominal(firmware, seed), CLASSES[name])
+
+
+def off_m(one: Drive) -> float:
+    """Return the distance in m between the estimated and the true position."""
+    return math.hypot(one.error.x_m, one.error.y_m)
