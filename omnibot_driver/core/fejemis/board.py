@@ -18,6 +18,7 @@ from omnibot_driver.core.fejemis.actuator import PairStream
 from omnibot_driver.core.fejemis.angle_relay import AngleRelay
 from omnibot_driver.core.fejemis.encoder import Encoder
 from omnibot_driver.core.fejemis.inbound import Inbound
+from omnibot_driver.core.fejemis.jobs import POWER_ENDS
 from omnibot_driver.core.fejemis.machine import OFF
 from omnibot_driver.core.fejemis.motion_lines import STOP
 from omnibot_driver.core.fejemis.obedience import Obedience
@@ -105,7 +106,7 @@ class FejemisBoard(Board):
     def refusal(self) -> str:
         """The reason why the robot must not be driven; empty if it may be."""
         if self._upkeep.jobs.powering_off:
-            return "power is about to be cut"
+            return POWER_ENDS
         if job := self._upkeep.jobs.at_rest:
             return job
         watch, follower = self._inbound.watch, self._encoder.follower

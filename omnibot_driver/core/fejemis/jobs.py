@@ -17,6 +17,8 @@ from omnibot_driver.core.fejemis.half import Role
 from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, WheelConfiguration
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
+POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
+"""The reason why nothing may move after a power off was requested."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose codes add up to 99, so that a sum does not detect the loss of both."""
 WITHIN_S: Final = 8.0

@@ -9,6 +9,7 @@ from typing import Final, Protocol
 
 from omnibot_driver.core.board import Mode
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.fejemis.jobs import POWER_ENDS
 from omnibot_driver.core.fejemis.obedience import Obedience
 from omnibot_driver.core.fejemis.odometry import PoseOdometry
 from omnibot_driver.core.fejemis.readings import Job
@@ -100,6 +101,8 @@ class Services:
             self._upkeep.machine.off()
 
     def _why_not_turn(self) -> str:
+        if self._upkeep.jobs.powering_off:
+            return POWER_ENDS
         if self._obedience.estopped:
             return "the e-stop is latched; release it first (~/estop)"
         if self._robot.mode is Mode.PAUSED:

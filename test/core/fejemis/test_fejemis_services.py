@@ -123,12 +123,16 @@ def test_a_configuration_is_saved_and_loaded() -> None:
 
 
 def test_power_off_is_called_back_by_a_start() -> None:
-    """Motion is refused between the request to power off and the start."""
+    """Motion, brush and lift are refused between the request to power off and the start."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
     done = ask(bench, Job.POWER_OFF)
     assert done.success
     assert "5 s" in done.message
     assert "power" in bench.board.refusal
+    with pytest.raises(RequestRefused, match="call ~/start"):
+        bench.board.services.set_brush(True, bench.now)
+    with pytest.raises(CommandRefused, match="call ~/start"):
+        bench.board.services.lift(3.0, bench.now)
     for channel, data in bench.board.start():
         bench.robot.receive(data, bench.now, channel)
     bench.run(6.0)
