@@ -10,6 +10,6 @@ INTERPRETED = core_kind() == "interpreted"
 
 interpreted_only = pytest.mark.skipif(
     not INTERPRETED,
-    reason="it replaces, counts or looks into what compiled code has bound",
+    reason="the core is compiled, and the test replaces, counts or inspects Python functions",
 )
 compiled_only = pytest.mark.skipif(INTERPRETED, reason="the core is not compiled: make compiled")

@@ -91,7 +91,8 @@ def test_what_cannot_be_compiled_is_installed_as_it_is(
 
 
 @pytest.mark.skipif(
-    not shutil.which((sysconfig.get_config_var("CC") or "cc").split()[0]), reason="no C compiler"
+    not shutil.which((sysconfig.get_config_var("CC") or "cc").split()[0]),
+    reason="no C compiler is installed",
 )
 def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path: Path) -> None:
     """An installation without compiling must remove the compiled modules of an earlier one."""

@@ -92,7 +92,7 @@ def test_every_command_exists() -> None:
 
 
 @pytest.mark.skipif(
-    not all(map(find_spec, SPHINX)), reason="Sphinx and its theme are not installed"
+    not all(map(find_spec, SPHINX)), reason="Sphinx, its theme or myst-parser is not installed"
 )
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     """The site contains every page, the README and the changelog."""

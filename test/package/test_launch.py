@@ -29,7 +29,8 @@ LAUNCH_FILES = sorted((ROOT / "launch").glob("*.py"))
 INSTALLED = ("config", "launch", "rviz", "urdf")
 
 needs_launch = pytest.mark.skipif(
-    not (find_spec("launch") and find_spec("launch_ros")), reason="launch is not installed"
+    not (find_spec("launch") and find_spec("launch_ros")),
+    reason="launch or launch_ros is not installed",
 )
 
 # It replaces every executable, and records its arguments and the content of its parameter files.

@@ -141,7 +141,7 @@ def test_a_url_that_means_no_place_is_refused(url: str) -> None:
         UdpPorts(url, 2)
 
 
-@pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="no IPv6 here")
+@pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="the kernel has no IPv6")
 def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
     """IPv6 addresses are in brackets; the second channel is one port higher."""
     lost = pytest.raises(LinkError, match=re.escape("lost udp://[::1]:5001: "))
