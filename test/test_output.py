@@ -74,7 +74,7 @@ import contextlib, os, time
 from omnibot_driver.output import UnblockedOutput
 with UnblockedOutput():
     for _ in range({lines}):
-        time.sleep(1e-3)
+        time.sleep(1e-3)  # the copying thread takes the lines one by one, without an event
         with contextlib.suppress(BlockingIOError):
             os.write(2, bytes(4096))
 raise SystemExit("the last words")

@@ -18,7 +18,10 @@ ROOT: Final = Path(__file__).parents[2]
 SERVER: Final = Path(sys.prefix, "bin/fast-discovery-server")
 PORT: Final = "11811"
 WINDOW_S: Final = 30.0
+"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
 SETTLE_S: Final = 10.0
+"""Length of the start phase, and of the pause after the observer has left, in s: no event reports
+the last packet."""
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """
 import sys, time, rclpy

@@ -107,7 +107,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
     while time.monotonic() < until:
         with contextlib.suppress(CommandRefused):
             link.call(lambda session, now: session.command_twist(BodyTwist(0.0, 0.0, 0.0), now))
-        time.sleep(0.05)
+        time.sleep(0.05)  # the rate of the commands
     link.close("stop")
 
 

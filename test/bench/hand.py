@@ -32,7 +32,7 @@ def main() -> None:
         twist.linear.x = speed / LSB_PER_MPS
         for number, publisher in enumerate(publishers):
             at += PERIOD_S / len(publishers)
-            time.sleep(max(0.0, at - time.monotonic()))
+            time.sleep(max(0.0, at - time.monotonic()))  # commands have a given rate
             sent[number].append((time.monotonic(), speed))
             publisher.publish(twist)
     print(json.dumps(sent), flush=True)

@@ -26,7 +26,10 @@ from omnibot_driver.simulator.lois_ecu import LoisSettings, SimulatedLois
 TICK_S: Final = 0.01
 RECORDED_S: Final = 120.0
 WINDOW_S: Final = 8.0
+"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
 SETTLING_S: Final = 10.0
+"""How long the programs run before they are measured, in s: no event reports the end of their
+start."""
 
 
 class Stage:

@@ -20,7 +20,10 @@ from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
 WINDOW_S: Final = 20.0
+"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
 SETTLING_S: Final = 8.0
+"""How long the programs run before they are measured, in s: no event reports the end of their
+start."""
 LATEST_S: Final = 0.9
 """Longest latency in s; a later datagram belongs to the next command."""
 LARGE: Final = 3

@@ -45,7 +45,7 @@ class Relay:
         while True:
             for word in (b"ENC", b"RMRA"):
                 self._socket.send(word)
-                time.sleep(PERIOD_S)
+                time.sleep(PERIOD_S)  # the rate of the queries is part of the floor
 
     def listen(self) -> None:
         """Receive, and publish prefilled messages."""

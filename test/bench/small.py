@@ -29,6 +29,8 @@ NAMES: Final = ("ours", "floor")
 RELAY: Final = "measurements"
 STOP: Final = b"\xff\xfe\x02"
 STOPPING_S: Final = 2.0
+"""How long a Stop is awaited after the last command, in s. The time stays the same for each part of
+a core, so no event ends it."""
 
 
 class Group:

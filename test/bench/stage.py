@@ -110,7 +110,7 @@ class Stage:
         for at, board, data in heapq.merge(*lines, key=itemgetter(0)):
             if self._ending.is_set():
                 return
-            time.sleep(max(0.0, at - time.monotonic()))
+            time.sleep(max(0.0, at - time.monotonic()))  # a line has a given rate
             now = time.monotonic()
             sent[board] += len(data)
             while end[board] <= sent[board]:

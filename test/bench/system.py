@@ -25,8 +25,11 @@ from stage import Stage, number_of
 from steps import STEPS
 
 WINDOW_S = 6.0
+"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
 COMMANDS_S = 3.0
 SETTLING_S = 8.0
+"""How long the programs run before they are measured, in s: no event reports the end of their
+start."""
 GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "pieces of 1 to 16 bytes": (1.0, 1.0, 1.0, 1.0),
     "1 ms timer": (None, None, None, None),
@@ -204,7 +207,7 @@ def scale(counts: Sequence[int], seconds: float) -> list[str]:
             ]
             time.sleep(SETTLING_S + 2.0 * count)
             before, start = [each.busy_s for each in drivers], time.monotonic()
-            time.sleep(seconds)
+            time.sleep(seconds)  # all that happens in this time is measured
             after, end = [each.busy_s for each in drivers], time.monotonic()
             result = listener.result()
         each_ms = 1e3 * (sum(after) - sum(before)) / count / (end - start)
@@ -227,7 +230,7 @@ def split(seconds: float) -> list[str]:
         with driver(stage.paths[0], "ours", before, SPLIT=str(told)) as program:
             time.sleep(SETTLING_S)
             busy_s = program.busy_s
-            time.sleep(seconds)
+            time.sleep(seconds)  # all that happens in this time is measured
             spent_s = program.busy_s - busy_s
             listener.result()
         stages = json.loads(told.read_text())

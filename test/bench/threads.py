@@ -29,7 +29,7 @@ def table(seconds: float) -> list[str]:
             pid, (guard,) = program.process.pid, program.children
             named = dict(line.split(maxsplit=1) for line in names.read_text().splitlines())
             begun, start, faults = _counts(pid, named, guard), time.monotonic(), _faults(pid)
-            time.sleep(seconds)
+            time.sleep(seconds)  # all that happens in this time is measured
             ended, passed_s = _counts(pid, named, guard), time.monotonic() - start
             faults = _faults(pid) - faults
             listener.result()
