@@ -12,6 +12,7 @@ the gains found and with evenly spaced marks.
 
 import contextlib
 import io
+import math
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from lois_robot import RPM, SimulatedRobot, random_motors
+from lois_robot import SimulatedRobot, random_motors
 
 from omnibot_driver.simulator.lois_ecu import MotorSettings
 from omnibot_driver.tools.calibrate import pi_step
@@ -28,6 +29,8 @@ from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.pi_result import WheelTuned
 
 STEP_S = 4.0
+RPM = math.tau / 60
+"""One revolution a minute, in rad/s."""
 Motors = tuple[MotorSettings, MotorSettings]
 
 
