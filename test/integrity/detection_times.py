@@ -72,7 +72,7 @@ def row(
             times.append(time_s(bench))
         shown.append(f"{min(times):.2f} s to {max(times):.2f} s")
     x, y, yaw = command
-    commanded = f"{yaw:g} rad/s" if yaw else f"{x or y:g} m/s" if x or y else "nothing"
+    commanded = f"{yaw:g} rad/s" if yaw else f"{x or y:g} m/s" if x or y else "no motion"
     print(f"| {what} | {commanded} | {' | '.join(shown)} |", flush=True)
 
 
@@ -80,7 +80,7 @@ def main() -> None:
     """Print all rows."""
     print("| the robot | commanded | stopped after | with `delta_period: 0.1` |\n|---|---|---|---|")
     row(
-        "the board's switch stands on position, 3 m from its origin",
+        "the board's switch is on position, 3 m from its origin",
         SLOWLY,
         lambda bench: stopped_after_s(bench, SLOWLY),
         lambda period_s: on_the_wrong_switch("earth", period_s),
@@ -97,7 +97,7 @@ def main() -> None:
                 )
     forward = (0.3, 0.0, 0.0)
     row(
-        "the same, by `wheel_cmd`",
+        "is 2.38 times as fast, by `wheel_cmd`",
         forward,
         lambda bench: stopped_after_s(bench, forward, by_wheels),
         robot(linear_scale=70 / 2.38),
@@ -124,13 +124,13 @@ def main() -> None:
             )
     for what, command, motion in (
         ("suddenly goes back at 0.05 m/s", (0.05, 0.0, 0.0), (-0.05, 0.0, 0.0)),
-        ("suddenly goes back as fast", (0.3, 0.0, 0.0), (-0.3, 0.0, 0.0)),
+        ("suddenly goes back at the same speed", (0.3, 0.0, 0.0), (-0.3, 0.0, 0.0)),
         ("suddenly drifts sideways by 0.1 m/s", (0.3, 0.0, 0.0), (0.3, 0.1, 0.0)),
         ("suddenly turns at 0.15 rad/s", (0.3, 0.0, 0.0), (0.3, 0.0, 0.15)),
         ("suddenly turns the other way", (0.0, 0.0, 0.15), (0.0, 0.0, -0.15)),
-        ("suddenly does 1.19 m/s", (0.5, 0.0, 0.0), (1.19, 0.0, 0.0)),
-        ("stood, and moves at 0.05 m/s", (0.0, 0.0, 0.0), (0.05, 0.0, 0.0)),
-        ("stood, and turns at 0.15 rad/s", (0.0, 0.0, 0.0), (0.0, 0.0, 0.15)),
+        ("suddenly drives at 1.19 m/s", (0.5, 0.0, 0.0), (1.19, 0.0, 0.0)),
+        ("is at a standstill, and then moves at 0.05 m/s", (0.0, 0.0, 0.0), (0.05, 0.0, 0.0)),
+        ("is at a standstill, and then turns at 0.15 rad/s", (0.0, 0.0, 0.0), (0.0, 0.0, 0.15)),
     ):
         row(
             what,
