@@ -58,7 +58,7 @@ def test_common_code_imports_no_board(path: Path) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
-    """Its kinematics has one joint per wheel that can be commanded."""
+    """The board's kinematics has one joint per wheel that can be commanded."""
     values = boards.check_all({"board": name})
     profile = boards.load(name)
     board = profile.make(values)
@@ -68,7 +68,7 @@ def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_names_its_simulated_board(name: str) -> None:
-    """The same name runs it with ``simulator --board``."""
+    """The command ``simulator --board`` runs it by the same name."""
     module = boards.load(name).SIMULATOR
     assert module == f"omnibot_driver.simulator.{name}"
     assert name in simulated_boards()
@@ -85,7 +85,7 @@ def test_what_is_no_board_is_refused_with_those_there_are(wrong: object) -> None
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_has_a_table_of_its_own(name: str) -> None:
-    """Its parameter names are unique, and its own board is the only choice."""
+    """The table's parameter names are unique, and its own board is the only choice."""
     table = boards.load(name).PARAMETERS
     assert sum(map(len, table.sections.values())) == len(table.rows)
     assert (table.board, table.by_name["board"].choices) == (name, (name,))
@@ -107,7 +107,7 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """It has the common rows that fit the board's abilities, its defaults, and its own rows."""
+    """The table has the common rows that fit the board's abilities, its defaults, its own rows."""
     own = table(
         "few",
         FEW,

@@ -33,7 +33,7 @@ def test_no_file_yet_is_no_calibration(tmp_path: Path) -> None:
 
 
 def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
-    """Their order stays, too."""
+    """The order of other names stays, too."""
     path = tmp_path / "robot.yaml"
     path.write_text("robot: no. 7\ngyro_bias: [0, 0, 0]\naccel_bias: [1, 2, 3]\n")
     assert calibration.load(path, PARAMETERS) == {
@@ -89,7 +89,7 @@ def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
 
 
 def test_others_may_read_the_file(tmp_path: Path) -> None:
-    """The file of ``mkstemp``, from which it is made, is private."""
+    """The file is made from one of ``mkstemp``, which only its owner may read."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
     assert stat.S_IMODE(path.stat().st_mode) == 0o644

@@ -80,7 +80,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
     wheels: Wheels,
     stamp_ns: int,
 ) -> None:
-    """They are equal byte for byte except for padding, and in every field after deserializing."""
+    """The bytes are equal except for padding, and every field is equal after deserializing."""
     serializer, messages = Serializer(chosen), Messages(chosen)
     for ours, message in (
         (serializer.imu(imu, stamp_ns), messages.imu(imu, stamp_ns)),
@@ -113,7 +113,7 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
-    """So the fast serializer can be used for each alignment."""
+    """The fast serializer can be used for each alignment."""
     values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
 
@@ -129,7 +129,7 @@ def test_no_frame_length_is_refused_at_start(length: int) -> None:
 def test_a_difference_is_found_at_start(
     monkeypatch: pytest.MonkeyPatch, name: str, wrong: object, strange: str
 ) -> None:
-    """Constant parts are checked at start; values that vary are compared in the test above."""
+    """The constant parts are checked at the start; varying values are compared in another test."""
     monkeypatch.setattr(cdr, name, wrong)
     chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     assert difference(chosen) == strange
@@ -156,7 +156,7 @@ def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
 def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
-    """This includes axes that this robot does not have."""
+    """Axes that this robot does not have are checked too."""
     values = [0.1] * 6
     values[place] = nonsense
     with pytest.raises(CommandRefused, match="NaN or infinity"):

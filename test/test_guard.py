@@ -40,7 +40,7 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
-    """The guard repeats them for a second, since the board may not receive now; then it ends."""
+    """The guard repeats the stops for a second, as the board may not receive now. Then it ends."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.end(stopped=False)
     assert line.hear(guard.TIMES * LAST_WORDS) == guard.TIMES * LAST_WORDS
@@ -100,7 +100,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """Ctrl-C does not reach its session, and it ignores a SIGTERM sent to a whole process group."""
+    """Ctrl-C does not reach the guard's session, and it ignores a SIGTERM to the process group."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     assert os.getsid(pid) == pid
@@ -133,7 +133,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
 
 
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
-    """It has none of the driver's sockets and files, and imports few modules."""
+    """The guard has none of the driver's sockets and files, and imports few modules."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     started(pid)
@@ -192,7 +192,7 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """They are in the guard's pipe before the driver ends."""
+    """The new stop commands are in the guard's pipe before the driver ends."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):

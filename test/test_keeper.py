@@ -15,7 +15,7 @@ from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """The hung guard would write the bytes it knew before."""
+    """A hung guard would write the old bytes."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGSTOP)
@@ -29,7 +29,7 @@ def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Lin
 
 
 def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
-    """The guard has only not started to read yet."""
+    """The guard does not read yet because it is still starting."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     children = line.children()
     for number in range(30):
@@ -87,7 +87,10 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is replaced at once and reaped later; a process in uninterruptible sleep behaves so."""
+    """The guard is replaced at once and reaped later.
+
+    A process in uninterruptible sleep behaves like this guard.
+    """
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()

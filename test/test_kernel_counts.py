@@ -23,8 +23,9 @@ def test_a_pseudo_terminal_counts_no_overruns() -> None:
 
 
 def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They are the eighth and the eleventh number of ``serial_icounter_struct`` in
-    linux/serial.h.
+    """The overruns are the eighth and the eleventh number of ``serial_icounter_struct``.
+
+    The struct is in linux/serial.h.
     """
 
     def ioctl(_descriptor: int, request: int, _data: bytes) -> bytes:
@@ -36,7 +37,7 @@ def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.Mo
 
 
 def test_a_thread_has_waited_and_one_that_is_none_is_not_known() -> None:
-    """Its waiting time is in s; for an unknown thread it is None."""
+    """The waiting time of a thread is in s; for an unknown thread it is None."""
     waited = waited_s(threading.get_native_id())
     assert waited is None or waited >= 0.0
     assert waited_s(0) is None

@@ -67,7 +67,7 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 
 
 def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:
-    """They contain why the port cannot be opened, how often it was, and the bytes each way."""
+    """The figures are: why the port cannot be opened, how often it was, and the bytes each way."""
     listener, name = Listener(), tmp_path / "board"
     link = link_to(str(name), listener, session())
     link.start()
@@ -152,7 +152,7 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """Only the driver itself can stop the robot then."""
+    """Without a guard, only the driver itself can stop the robot."""
     listener = Listener()
     link = link_to("loop://", listener, session())
     link.start()

@@ -94,7 +94,7 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """So the log shows the reason before the refusal."""
+    """The log thus shows the reason before the refusal."""
     listener, ours = Listener(), session()
     link = link_to(
         board.path, listener, ours, refused=lambda text: listener.deliver([Notice(text)])

@@ -132,7 +132,7 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
 
 
 def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
-    """The robot can be driven; the line that was open stays open."""
+    """After the second line is opened, the robot can be driven; the first line stays open."""
     lines.link.start()
     lines.drive.read_until(STOPS)
     lines.connect()
@@ -161,7 +161,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 
 
 def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
-    """Its measurements still arrive."""
+    """The measurements of the robot still arrive."""
     lines.connect()
     missing = lines.openers[0] = partial(SerialPort, str(lines.name) + "-not", 115200)
     lines.link.start()
@@ -189,7 +189,7 @@ def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> No
 
 
 def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
-    """Its odometry comes every 0.4 s, so the proof of a standstill takes longer."""
+    """Odometry comes every 0.4 s, so the proof of a standstill takes longer."""
     with ServedBoard(LineRobot()) as robot:
         lines = [partial(SerialPort, path, 115200) for path in robot.addresses]
         listener, ours = Listener(), session_of(LineBoard())

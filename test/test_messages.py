@@ -36,7 +36,7 @@ def test_a_stamp_is_seconds_and_nanoseconds() -> None:
 
 @pytest.mark.parametrize(("sec", "nanosec", "age_s"), [(98, 0, 2.0), (102, 5 * 10**8, -2.5)])
 def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, age_s: float) -> None:
-    """It is negative when the stamp is in the future."""
+    """The age is negative when the stamp is in the future."""
     assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
 
 
@@ -95,7 +95,7 @@ def test_a_goal_that_is_no_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """Slow readings of the clocks do not change it; a step in either direction does."""
+    """Slow readings of the clocks do not change the offset; a step in either direction does."""
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
     assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset
@@ -143,7 +143,7 @@ def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> Non
 
 
 def test_an_imu_message_has_no_orientation() -> None:
-    """REP-145: the first element of its covariance is -1; force and rate are as measured."""
+    """By REP-145 the orientation covariance begins with -1. Force and rate are as measured."""
     estimate = ImuEstimate(0.0, (1.0, 2.0, -9.8), (0.1, 0.2, 0.3))
     message = messages.imu_message(estimate, STAMP, SETTINGS)
     assert message.header.frame_id == "imu_link"
@@ -209,7 +209,7 @@ def test_joints_whose_rate_is_not_known_have_none() -> None:
 
 
 def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
-    """Each way is divided by the radius of its time; at rest a new radius turns nothing."""
+    """Each distance is divided by the radius at its time, so a new radius at rest turns nothing."""
     small, large = OmniKinematics(0.029, 0.143), OmniKinematics(0.058, 0.2)
     ahead = [OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(x, 0.0, 0.0)) for x in (1, 2)]
     before = messages.turned(messages.unturned(SETTINGS.wheels), ahead[0], small)
@@ -235,7 +235,7 @@ def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
 
 @given(st.floats(-1e4, 1e4))
 def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
-    """This holds for any number of turns."""
+    """The yaw may include any number of turns."""
     turn = messages.yaw_quaternion(yaw_rad)
     assert math.hypot(turn.z, turn.w) == pytest.approx(1.0)
     assert math.cos(2 * math.atan2(turn.z, turn.w)) == pytest.approx(math.cos(yaw_rad), abs=1e-6)

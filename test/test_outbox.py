@@ -140,7 +140,7 @@ def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """Otherwise the queue would grow without limit."""
+    """Without waiting, the queue would grow without limit."""
     outbox = Outbox()
     left: list[int] = []
     held = Held(outbox)

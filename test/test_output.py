@@ -89,7 +89,7 @@ raise SystemExit("the last words")
 
 
 def test_what_is_printed_at_the_end_is_seen_where_it_is_read() -> None:
-    """It comes after what was printed before."""
+    """The last text comes after what was printed before."""
     program = """
 import os
 from omnibot_driver.output import UnblockedOutput
@@ -103,7 +103,7 @@ raise SystemExit("then the last words")
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
-    """Otherwise printed text would go to the board."""
+    """With such a descriptor, printed text would go to the board."""
     program = """
 import os, sys
 from omnibot_driver.output import UnblockedOutput

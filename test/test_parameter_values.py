@@ -59,7 +59,7 @@ def test_both_ends_of_a_range_are_allowed_and_nothing_beyond(parameter: Paramete
 
 @pytest.mark.parametrize("parameter", CHOICES, ids=name_of)
 def test_each_choice_is_allowed_and_the_message_lists_them(parameter: Parameter) -> None:
-    """The message lists them."""
+    """The message for a wrong value lists the choices."""
     for choice in parameter.choices:
         assert parameter.check(choice) == choice
     with pytest.raises(ParameterError) as caught:
@@ -134,7 +134,7 @@ json_like = st.recursive(
 def test_any_value_is_either_taken_in_the_right_type_or_refused(
     parameter: Parameter, value: object
 ) -> None:
-    """It raises nothing else, and an accepted value is accepted again."""
+    """The check raises no other exception, and an accepted value is accepted again."""
     try:
         taken = parameter.check(value)
     except ParameterError:
@@ -164,14 +164,14 @@ def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
 def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
     parameter: Parameter, wrong: str
 ) -> None:
-    """Both are invalid in tf2."""
+    """An empty name and a leading slash are invalid in tf2."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 
 
 @pytest.mark.parametrize("wrong", ["/", "/robot1/"])
 def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
-    """Such frames are unknown to tf2; an empty prefix is valid."""
+    """A prefix with a leading slash is unknown to tf2; an empty prefix is valid."""
     with pytest.raises(ParameterError, match=r"'frame_prefix'.*such as robot1/"):
         PARAMETERS.by_name["frame_prefix"].check(wrong)
     assert PARAMETERS.by_name["frame_prefix"].check("robot1/") == "robot1/"
@@ -209,7 +209,7 @@ ANY = Parameter("any", ["x"], "", "One word.")
 def test_a_list_may_have_any_length_that_its_row_allows(
     parameter: Parameter, value: object, taken: object
 ) -> None:
-    """Its elements are numbers or strings."""
+    """The elements of the list are numbers or strings."""
     assert parameter.check(value) == taken
 
 

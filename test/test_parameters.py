@@ -82,7 +82,7 @@ def name_of(parameter: object) -> str | None:
 
 @pytest.mark.parametrize(("name", "default"), PROMISED.items())
 def test_every_promised_parameter_is_there_with_its_default(name: str, default: object) -> None:
-    """This includes the type: a float stays a float."""
+    """The type is checked too: a float stays a float."""
     assert PARAMETERS.by_name[name].default == default
     assert type(PARAMETERS.by_name[name].default) is type(default)
 
@@ -140,14 +140,14 @@ def test_what_is_not_given_is_the_default() -> None:
     ],
 )
 def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, meant: str) -> None:
-    """rclpy alone would ignore it in silence."""
+    """Without this check, rclpy would ignore the name in silence."""
     with pytest.raises(ParameterError, match=f"'{mistyped}'.*'{meant}'"):
         check_all({mistyped: 1})
 
 
 @given(st.text())
 def test_any_unknown_name_is_refused(name: str) -> None:
-    """This holds for names that are similar to known ones or not, and for the empty name."""
+    """The name may be similar to known ones or not, or be empty."""
     if name not in PARAMETERS.by_name and not boards.owners_of(name):
         with pytest.raises(ParameterError, match="the nearest is"):
             check_all({name: 1})
@@ -170,7 +170,7 @@ def test_odom_and_base_must_be_different_frames() -> None:
 def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
     signs: list[int],
 ) -> None:
-    """They are valid for velocities; for goal positions they are not."""
+    """The signs are valid for velocities; for goal positions they are not."""
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
         check_all({"axis_signs": signs, "control_method": "position"})
@@ -243,7 +243,7 @@ def test_the_file_has_its_former_name_as_well() -> None:
 
 
 def test_the_file_of_parameters_is_the_table() -> None:
-    """It contains every name with its default, of the exact type that a strict reader expects."""
+    """The file has every name with its default, of the exact type that a strict reader expects."""
     values = in_the_file()
     assert values == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     for name, value in values.items():

@@ -46,7 +46,7 @@ def bag(
 
 @pytest.mark.parametrize("plugin", StoragePlugin)
 def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlugin) -> None:
-    """This holds for both storage formats, and for the bag's single file."""
+    """Both storage formats, and the bag's single file, give the same bytes."""
     path = bag(tmp_path / "bag", "/omnibot_driver/raw_tx", RX, plugin=plugin)
     (file,) = (found for found in path.iterdir() if found.suffix != ".yaml")
     for place in (path, file):

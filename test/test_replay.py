@@ -164,7 +164,7 @@ def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
 
 
 def test_stamps_are_times_of_the_recording() -> None:
-    """They begin with the first bytes and continue with the board's ticks."""
+    """The stamps begin with the first bytes and continue with the board's ticks."""
     heard = play(Tape(simulated(300)))
     stamps = [event.stamp_s for event in heard.events if isinstance(event, ImuEstimate)]
     assert len(stamps) == 300
@@ -221,7 +221,7 @@ def test_a_recording_that_breaks_off_says_so() -> None:
 
 
 def test_an_empty_recording_ends_at_once() -> None:
-    """It publishes nothing."""
+    """The recording publishes nothing."""
     heard = play(Tape([]))
     assert heard.events == [ENDED]
     assert heard.reports == []

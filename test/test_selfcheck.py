@@ -78,7 +78,7 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """Only ports whose measurements wait for it are affected; a recording has its own stamps."""
+    """Only ports whose measurements wait for /clock get a notice; a recording has own stamps."""
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
 
@@ -107,7 +107,7 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """This holds for both types; only the wrong publisher is named."""
+    """Both types are tried; only the wrong publisher is named."""
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert selfcheck.type_conflict([teleop], stamped=False) == ""
     assert selfcheck.type_conflict([nav], stamped=True) == ""

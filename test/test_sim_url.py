@@ -44,7 +44,7 @@ def test_a_board_that_ends_with_the_driver_needs_no_guard() -> None:
 
 
 def test_options_come_after_a_question_mark() -> None:
-    """They are the simulator's own."""
+    """The options are the simulator's own."""
     listener, ours = Listener(), session()
     link = link_to("sim://?imu_only&seed=1&lose=0.001", listener, ours)
     link.start()
@@ -53,7 +53,7 @@ def test_options_come_after_a_question_mark() -> None:
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is reported with its cause, and not taken for a lost cable."""
+    """The defect is reported with its cause, and is not regarded as a lost cable."""
 
     def explode(_board: SimulatedBoard) -> bytes:
         raise ZeroDivisionError

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of stalls of the watchdog's thread, and of commands that waited meanwhile."""
+"""Detection of stalls of the watchdog's thread, and of commands that waited in a stall."""
 
 import pytest
 
@@ -26,7 +26,7 @@ def resumed(length_s: float) -> StallDetector:
 
 
 def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
-    """A busy machine may delay it a little."""
+    """A busy machine may delay the call a little."""
     standstill = StallDetector()
     assert standstill.begun(5.0) == 0.0  # also before its first run
     for now in (10.0, 10.1, 10.45):
@@ -36,7 +36,7 @@ def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
 
 
 def test_a_standstill_is_told_once_with_its_length() -> None:
-    """The first thread that runs afterwards reports it; the next stall is reported again."""
+    """The first thread that runs after a stall reports it; the next stall is reported again."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert standstill.begun(103.0) == pytest.approx(3.0)
@@ -76,7 +76,7 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """Commands sent then have arrived, or never will."""
+    """Commands that were sent during the stall have arrived, or never will."""
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)
     standstill.passed(201.3, wall_ns(201.3))
@@ -85,15 +85,14 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """It waited in a queue when the driver stalled, and is processed long after the end."""
+    """The command waited in a queue when the driver stalled; it is processed long after the end."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(99.9), 103.4)
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """The offset of its sender's clock is only as certain as the transit time of the fastest
-    message."""
+    """The offset of the sender's clock is only as certain as the fastest message's transit time."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(103.001), 103.4)
@@ -119,5 +118,5 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
 
 
 def test_whenever_the_guard_steps_in_the_driver_notices() -> None:
-    """Otherwise guard and driver would send contradictory commands."""
+    """If the driver did not notice, guard and driver would send contradictory commands."""
     assert 3 * BEAT_S < STANDSTILL_S < LIMIT_S

@@ -75,7 +75,7 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """The delay is the time on the way and in our queue; its estimate never exceeds the truth."""
+    """The delay is the time in network and queue; the estimate never exceeds the true delay."""
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
         now_s += pause_s
@@ -89,7 +89,7 @@ def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apar
 def test_a_command_that_was_under_way_for_longer_is_refused(
     sender_s: float, receiver_s: float, numbered: bool, late_s: float, silent_s: float
 ) -> None:
-    """This holds after any silence and for any sender; the next command in time is accepted."""
+    """Any silence may precede the command, from any sender; the next one in time is accepted."""
     receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
     for number in range(10):
         assert not refused(receiver.hear(sender, 100.0 + 0.1 * number, 0.01))
@@ -105,7 +105,7 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """Our own clock is enough to see it."""
+    """The clock of this computer is enough to notice the delay."""
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
     assert delay.total_s == pytest.approx(waited_s)
@@ -208,7 +208,7 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """The drift lasts for ten hours, with an hour of silence now and then."""
+    """The drift lasts for ten hours, with some silences of an hour."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -217,7 +217,7 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
-    """It names the network, or this computer's load."""
+    """The refusal names the network, or this computer's load."""
     with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
         Delay(1.2, 0.1).require("cmd_vel", 0.5)
     with pytest.raises(

@@ -37,7 +37,7 @@ WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
 """Shortest time between two published steering angles, in ns. The angle comes 66 times a second;
 joint states are for display."""
-NOT_CONNECTED: Final = "the boards are not connected; check their cables and ports"
+NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = {
     "tof": Range.INFRARED,
     "sonar": Range.ULTRASOUND,

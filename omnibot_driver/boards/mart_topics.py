@@ -37,9 +37,11 @@ NAN: Final = float("nan")
 TIME_EVERY_S: Final = 1.0
 MINUTE_BEGINS_S: Final = 3
 """Seconds at the beginning of a minute in which TIME does not set a correct clock back."""
-NOT_READY: Final = (
-    "the standstill is not proved, or there is no data from the controller; stop the sender, wait"
-    " a second, then call again"
+NO_DATA: Final = "no valid data from the controller; check its power and the network"
+ESTOP: Final = "the e-stop is latched; release it, then call again"
+NOT_AT_REST: Final = (
+    "no proof that the robot is at rest, or the server is busy; end the motion commands, wait a"
+    " second, then call again"
 )
 
 
@@ -139,8 +141,12 @@ class MartTopics:
 
         def ask(session: Session, now: float) -> str:
             board = cast(MartBoard, session.board)
-            if session.state != "nominal" or not board.resting or session.estop_active:
-                return NOT_READY
+            if session.state != "nominal":
+                return NO_DATA
+            if session.estop_active:
+                return ESTOP
+            if not board.resting:
+                return NOT_AT_REST
             try:
                 board.ask(job, answer, now, *arguments)
             except RequestRefused as error:

@@ -57,7 +57,7 @@ class Group:
 
     @contextmanager
     def joined(self) -> Iterator[None]:
-        """Put this process, and so all that it starts meanwhile, into the group."""
+        """Put this process into the group, and so the processes that it starts in the context."""
         self._members.write_text(str(os.getpid()))
         try:
             yield

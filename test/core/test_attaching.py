@@ -63,7 +63,7 @@ def test_a_board_that_was_paused_is_no_doubt_where_the_odometry_begins() -> None
 
 
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
-    """If the next pose is lost, the single one is accepted after a second."""
+    """If the next pose is lost, the pose before it is accepted after a second."""
     odometry = Odometry(SETTINGS)
     odometry.settle(heading(math.pi / 2))
     for _ in range(25):
@@ -142,7 +142,7 @@ def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
-    """This holds before the first valid pose and after it."""
+    """The pose is ignored before the first valid pose and after it."""
     odometry = Odometry(SETTINGS)
     odometry.displace(earth(0.0, 0.1), 0.0)
     assert odometry.settle(PoseReading(0.0, 0.0, bad)) == []
@@ -195,7 +195,7 @@ def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
 
 
 def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """This includes motion that still waited for the board's first pose."""
+    """Motion that still waited for the board's first pose does not move the pose either."""
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     for _ in range(3):
         odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)

@@ -84,7 +84,7 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
 
 
 def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
-    """It keeps its own rate, covariance and variances of the twist."""
+    """The board's odometry keeps its own rate, covariance and variances of the twist."""
     before = len(bench.odometry)
     bench.drive_on(0.3, 2.0)
     told = bench.odometry[before:]
@@ -141,7 +141,7 @@ def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
 
 
 def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
-    """This holds however many such displacements there are."""
+    """Any number of such displacements proves nothing."""
     proof = StopProof()
     proof.stopped(0.0)
     for step in range(1, 20):

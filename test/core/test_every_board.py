@@ -23,7 +23,7 @@ def bench(request: pytest.FixtureRequest) -> AnyBench:
 
 
 def test_every_board_of_the_driver_is_among_them() -> None:
-    """A board that is missing would not be tested here."""
+    """A board that is missing in the list would not be tested."""
     missing = set(PROFILES) - {name.split()[0] for name in MAKERS}
     assert not missing, "add a robot and an entry of MAKERS to test/core/any_board.py"
 
@@ -77,7 +77,7 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
     bench: AnyBench, seconds: float
 ) -> None:
-    """This holds for any amount of unread data; the bench has no guard that stops the robot."""
+    """The amount of unread data does not matter; the bench has no guard that stops the robot."""
     for _ in range(2):
         bench.drive_on()
         bench.stall(seconds)
@@ -90,7 +90,7 @@ def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:
-    """The release does not move it."""
+    """The release of the button does not move the robot."""
     bench.drive_on()
     bench.estop(True)
     with pytest.raises(CommandRefused, match="e-stop"):
@@ -119,7 +119,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """This holds whatever command came before the event."""
+    """A command that came before the event, of any kind, has no effect."""
     bench.drive_on()
     event(bench)
     bench.settle()
@@ -155,7 +155,7 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 
 
 def test_what_is_no_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
-    """The command before it stays in force."""
+    """The previous command stays active."""
     bench.drive_on()
     with pytest.raises(CommandRefused, match="NaN or infinity"):
         bench.session.command_twist(BodyTwist(math.nan, 0.0, 0.0), bench.now)

@@ -30,7 +30,7 @@ def opened() -> Session:
 
 @pytest.mark.parametrize("drives", [False, True])
 def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool) -> None:
-    """This holds while the board starts, runs, is paused and is started again."""
+    """Nothing is written or reported while the board starts, runs, is paused and restarts."""
     session, board = opened(), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0
     for tick in range(3000):

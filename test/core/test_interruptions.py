@@ -43,7 +43,10 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """Text, SEQ and pose begin at zero; this holds also when text or the first frames are lost."""
+    """Text, SEQ and pose begin at zero.
+
+    The result is the same if text or the first frames are lost.
+    """
     on = line(seed)
     on.drives = False
     on.run(1.0)

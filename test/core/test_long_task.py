@@ -38,7 +38,7 @@ def test_a_second_one_is_refused() -> None:
 
 
 def test_it_ends_when_its_time_is_over() -> None:
-    """It does not end before."""
+    """The task does not end before its time is over."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.wake_at == 125.0
@@ -73,7 +73,7 @@ ENDS: dict[str, Callable[[AnyBench], object]] = {
 
 @pytest.mark.parametrize("words", ENDS)
 def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
-    """It fails at once, with the reason in its message."""
+    """The task fails at once, with the reason in its message."""
     bench = nominal(NAME)
     if "stopped" in words:
         bench.drive_on()

@@ -40,7 +40,7 @@ def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
 
 
 def test_without_auto_start_a_paused_board_stays_paused() -> None:
-    """The opening then does not contain S."""
+    """The opening does not contain S."""
     bench = Bench(run=False)
     bench.open()
     bench.run(3.0)
@@ -49,7 +49,7 @@ def test_without_auto_start_a_paused_board_stays_paused() -> None:
 
 
 def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
-    """The board itself does not report this mode."""
+    """The board itself does not report that it is in IMU-only mode."""
     bench = Bench(BoardSettings(imu_only=True))
     bench.open()
     bench.run_until_state("imu_only")
@@ -71,7 +71,7 @@ def test_garbage_is_not_an_understood_board() -> None:
 
 
 def test_a_silent_board_is_told_once() -> None:
-    """It is reported again only after data has arrived in between."""
+    """The silence is reported again only after data has arrived in between."""
     bench = Bench()
     bench.speaks = False
     bench.open()

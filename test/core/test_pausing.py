@@ -123,7 +123,10 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """The caller wants it at rest: P is repeated, motion is refused, and the answer says so."""
+    """The caller wants the robot at rest.
+
+    P is repeated, motion is refused, and the answer says so.
+    """
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -152,7 +155,7 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
 
 
 def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:
-    """The request to pause is still in force; motion is refused meanwhile."""
+    """The request to pause still applies, so motion is refused until the board is paused."""
     assert bench.ask(Request.PAUSE, 5.0).success
     bench.board.receive(b"S")
     bench.run(0.2)

@@ -78,7 +78,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """Needless wake-ups cost CPU time; this holds during any request and in silence."""
+    """Needless wake-ups cost CPU time; the session is tested during requests and in silence."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -118,7 +118,7 @@ def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Ben
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
-    """This holds whether it was found paused or paused by request; the answer says so."""
+    """The board was found paused, or was paused by request; the answer says so."""
     bench = standing() if asked else paused()
     if asked:
         assert bench.ask(Request.PAUSE, 5.0).success
@@ -132,7 +132,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """The numbers in its notices continue, so it has not restarted."""
+    """The numbers in the board's notices continue, so it has not restarted."""
     bench = Bench(run=False)
     bench.open()
     bench.run(2.5)
@@ -143,7 +143,10 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
-    """It ran before the reset, so it runs after it; the robot stands until a fresh command."""
+    """The board ran before the reset, so it runs after it.
+
+    The robot stands until a fresh command.
+    """
     bench = driving()
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
@@ -157,7 +160,7 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """The board has not restarted, so the earlier request to pause is still in force."""
+    """The board has not restarted, so the earlier request to pause still applies."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     assert not bench.ask(Request.RESET, 10.0).success

@@ -95,7 +95,7 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """Damage bytes for ``seconds``, and from then on until the robot must be at rest."""
+    """Damage bytes for ``seconds`` of driving, and after that until the robot must be at rest."""
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board

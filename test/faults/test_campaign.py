@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Nearly every fault once: the robot is at rest in time, and nothing false is published."""
+"""Tests of nearly every fault: the robot is at rest in time, and nothing false is published."""
 
 from collections.abc import Iterator
 from random import Random
@@ -51,7 +51,7 @@ def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """In all cases of this module together, no message is false and odometry never jumps."""
+    """No case of this module leads to a false message or a jump of odometry."""
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()
     assert rig.findings.published > 1000

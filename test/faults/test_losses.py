@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each kind of stop once, on a line that loses bytes to the board; ``make faults`` has more."""
+"""Tests of each kind of stop on a line that loses bytes to the board; ``make faults`` has more."""
 
 from pathlib import Path
 

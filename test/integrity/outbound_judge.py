@@ -81,7 +81,7 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Whether the set point in force, if any, is neither stray nor uncommanded."""
+        """Whether the active set-point, if any, is neither stray nor uncommanded."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":
@@ -148,7 +148,7 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the set point in force, and count the time for which it was stray or uncommanded."""
+        """End the active set-point, and count the time for which it was stray or uncommanded."""
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s

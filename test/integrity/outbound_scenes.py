@@ -50,7 +50,7 @@ def _rates(random: Random) -> tuple[float, float, float]:
 def driving(
     random: Random, begin_s: float, end_s: float, *, by_wheels: bool = False, rate_hz: float = 0.0
 ) -> list[Command]:
-    """Return commands at a random rate, which change now and then."""
+    """Return commands at a random rate; the commands change at random times."""
     rate_hz, changes = rate_hz or random.choice(RATES_HZ), random.choice((0.0, 0.1, 0.1, 1.0))
     wishes = []
     now = begin_s

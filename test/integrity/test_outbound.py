@@ -129,7 +129,10 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """A sent letter is right. A payload byte that acts is false; one from the line is "added"."""
+    """A letter that was sent is right.
+
+    A payload byte that acts as a letter is false; a byte from the line is "added".
+    """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)
     assert judge.letter(0x50, 25) == ""
@@ -179,7 +182,7 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """The sum over all endings leaves out scenes that only drive; those have a sum of their own."""
+    """The sum over all endings omits scenes that only drive; these have a sum of their own."""
     scores = {
         ("a", "r", "timeout"): Score(trials=1),
         ("a", "r", "kill"): Score(trials=2),

@@ -50,7 +50,7 @@ FAILURES = {
 
 
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
-    """Build the package into ``lib`` of this folder with such a mypyc; return the output."""
+    """Build the package into ``lib`` of this folder with a replaced mypyc; return the output."""
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()
     (folder / "stand_in/mypyc/build.py").write_text(

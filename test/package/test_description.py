@@ -107,7 +107,7 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
 
 
 def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
-    """The commissioning guide says so; the axles point away from the centre."""
+    """The axles point away from the centre, as the commissioning guide says."""
     for name in WHEELS:
         joint = ROBOT.joint_map[name]
         x, y, _ = joint.origin.xyz
@@ -124,7 +124,7 @@ def test_the_wheels_stand_on_the_ground() -> None:
 
 
 def test_the_imu_hangs_upside_down() -> None:
-    """Its place is that in the vendor's drivers; its z points down, its x forward."""
+    """The IMU's place is that in the vendor's drivers; its z points down, its x forward."""
     joint = ROBOT.joint_map["imu_joint"]
     assert (joint.parent, joint.child) == ("base_link", "imu_link")
     assert joint.origin.xyz == [-0.005, 0.035, -0.06]
@@ -148,7 +148,7 @@ def test_another_robot_is_described_by_arguments() -> None:
 
 
 def test_the_description_needs_no_other_files() -> None:
-    """It contains only primitives, so it looks the same in every viewer."""
+    """The description contains only primitives, so it looks the same in every viewer."""
     text = (ROOT / "urdf/omnibot.urdf.xacro").read_text()
     assert "package://" not in text
     assert "<mesh" not in text

@@ -43,7 +43,7 @@ def found(pattern: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("name", GENERATED)
 def test_what_is_generated_is_what_the_code_says(name: str) -> None:
-    """These are parameters, their files, mode table and diagram; ``make docs`` writes them."""
+    """Parameters, their files, mode table and diagram are generated; ``make docs`` writes them."""
     assert (ROOT / name).read_text(encoding="utf-8") == GENERATED[name](), (
         "run: .venv/bin/python docs/generate.py"
     )

@@ -103,7 +103,7 @@ def test_every_status_of_the_diagnostics_has_its_row() -> None:
 
 
 def test_the_tour_shows_what_the_driver_says() -> None:
-    """Its warnings and errors can still be printed, word for word except for inserted values."""
+    """The warnings and errors can still be printed, word for word except for inserted values."""
     patterns = [
         re.compile(".*".join(map(re.escape, template.split(GAP))))
         for template in said().splitlines()

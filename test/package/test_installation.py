@@ -117,7 +117,7 @@ def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
 
 
 def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
-    """Users without the repository read them there."""
+    """Users without the repository follow the links in the installed documents."""
     pages = [*(prefix / "share" / PACKAGE).glob("**/*.md")]
     assert len(pages) > 10
     for page in pages:
@@ -142,7 +142,7 @@ def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Pat
 
 
 def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, prefix: Path) -> None:
-    """Both are started from their installed places, and ctrl-C ends the driver in order."""
+    """Both programs are started from their installed places; ctrl-C ends the driver in order."""
     executables = prefix / "lib" / PACKAGE
     board = workspace / "board"
     simulator = in_workspace(workspace, [executables / "simulator", "--link", board])

@@ -241,7 +241,7 @@ def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]
 
 @needs_launch
 def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
-    """It uses this package's display, in the robot's own odometry frame."""
+    """RViz uses this package's display, in the robot's own odometry frame."""
     started = launch("description.launch.py", "rviz:=true", "frame_prefix:=robot1/")
     words = started["rviz2"]["arguments"]
     display = Path(words[words.index("--display-config") + 1])
@@ -251,7 +251,7 @@ def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
 
 @needs_launch
 def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]) -> None:
-    """The driver does not publish it, and all nodes are in one namespace."""
+    """The driver does not publish the transform, and all nodes are in one namespace."""
     started = launch("ekf.launch.py", "namespace:=robot1", "frame_prefix:=robot1/")
     assert set(started) == {"driver", "ekf_node", "robot_state_publisher", "xacro"}
     assert parameters(started["driver"])["publish_tf"] is False

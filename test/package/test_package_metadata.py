@@ -148,7 +148,7 @@ def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any
 
 
 def test_only_tools_need_what_an_extra_brings() -> None:
-    """A driver works without them; only a replay needs rosbags, and says so."""
+    """A driver works without these packages; only a replay needs rosbags, and says so."""
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {
         (file.relative_to(ROOT / PACKAGE).parts[0], library)
@@ -182,7 +182,7 @@ def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
 
 
 def test_optional_packages_are_started_and_documented() -> None:
-    """rosdep does not install them, so the README says how to."""
+    """rosdep does not install these packages, so the README says how to install them."""
     readme = (ROOT / "README.md").read_text()
     assert started_by(python_files("launch")) >= OPTIONAL
     for name in OPTIONAL:
@@ -197,7 +197,7 @@ def test_manifest_declares_what_the_tests_import() -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "launch").iterdir()), ids=lambda path: path.name)
 def test_launch_file_describes_a_launch(path: Path) -> None:
-    """Its name has the right ending, it compiles, and it defines what ``ros2 launch`` calls."""
+    """The name has the right ending, the file compiles and defines what ``ros2 launch`` calls."""
     assert path.name.endswith(".launch.py")
     tree = ast.parse(path.read_text(), path)
     compile(tree, path, "exec")
@@ -217,7 +217,7 @@ def test_the_core_imports_itself_and_pure_modules_only() -> None:
 
 
 def test_the_simulator_shares_nothing_with_the_core() -> None:
-    """So a misread manual is not misread in the same way in driver and simulated board."""
+    """A misread manual is then not misread in the same way in driver and simulated board."""
     shared = {
         f"{file.relative_to(ROOT)}: {name}"
         for file in python_files(f"{PACKAGE}/simulator")

@@ -95,7 +95,7 @@ def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None
 
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")
 def test_systemd_accepts_the_unit() -> None:
-    """It reports unknown keys and values on stderr."""
+    """systemd reports unknown keys and values on stderr."""
     done = subprocess.run(
         ["systemd-analyze", "verify", "--man=no", str(UNIT)],
         capture_output=True,

@@ -72,7 +72,7 @@ DRIVER = driver_names()
 
 
 def test_the_drivers_names_are_found() -> None:
-    """The other tests compare names with these."""
+    """The other tests of this module compare names with this list."""
     assert {"odom", "imu/data_raw", "cmd_vel", f"{NODE}/estop_active", f"{NODE}/estop"} <= DRIVER
 
 
@@ -147,7 +147,7 @@ def test_every_critic_that_is_tuned_is_used() -> None:
 
 
 def test_the_mux_is_locked_by_the_drivers_estop() -> None:
-    """Its topic is the driver's latched Bool, with a higher priority than every source."""
+    """The lock's topic is the driver's latched Bool, with a higher priority than every source."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     (lock,) = mux["locks"].values()
     assert lock["topic"] == f"{NODE}/estop_active"
@@ -157,7 +157,7 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 
 
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
-    """Its sources differ from its output, and have the driver's timeout."""
+    """The sources differ from the output, and have the driver's timeout."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()
     assert {source["timeout"] for source in sources} == {TIMEOUT}
@@ -195,7 +195,7 @@ def test_foxglove_lays_out_every_panel_once() -> None:
 
 
 def test_foxglove_drives_slowly_and_often_enough() -> None:
-    """Its buttons stay within the limits and repeat faster than the command timeout."""
+    """The buttons stay within the limits and repeat faster than the command timeout."""
     teleop = json.loads((CONFIG / "foxglove.json").read_text())["configById"]["Teleop!drive"]
     assert teleop["publishRate"] > 2 / TIMEOUT
     limits = {"linear-x": LINEAR, "angular-z": ANGULAR}

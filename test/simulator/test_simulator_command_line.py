@@ -29,7 +29,10 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
-    """Exit code 0, no traceback, links removed; before that, a closed stdin does not end it."""
+    """The exit code is 0, without traceback, and links are removed.
+
+    A closed stdin does not end the program.
+    """
     link = tmp_path / "toy"
     with toy("toy_lines", "--link", str(link), stdin=subprocess.DEVNULL) as process:
         path = line(process)
@@ -60,7 +63,10 @@ def test_the_boards_are_the_packages_beside_what_they_share() -> None:
 
 
 def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
-    """One ``--link`` gives a link for each line; the hint has all port parameters of the driver."""
+    """A single ``--link`` makes a link for each line.
+
+    The hint has all port parameters of the driver.
+    """
     with toy("toy_lines", "--link", str(tmp_path / "toy"), "--angle", "30") as process:
         printed = [line(process), line(process)]
         links = [tmp_path / "toy-drive", tmp_path / "toy-front"]
@@ -72,7 +78,7 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
 
 
 def test_a_board_on_the_network_prints_its_address() -> None:
-    """It has options for network faults, and rejects ``--link`` and ``--flip``."""
+    """The simulator has options for network faults, and rejects ``--link`` and ``--flip``."""
     with toy("toy_udp", "--lose", "0.1", "--duplicate", "0.1", "--delay", "0.2") as process:
         address = line(process)
         assert re.fullmatch(r"udp://127\.0\.0\.1:\d+", address)

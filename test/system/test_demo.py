@@ -48,7 +48,7 @@ def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> 
 
 @given(poses, st.integers(0, 1000))
 def test_a_robot_that_cannot_drive_sideways_is_never_told_to(pose: Pose, leg: int) -> None:
-    """It drives ahead or turns, and is never at rest."""
+    """The robot drives ahead or turns, and is never at rest."""
     _, twist = square.steer_ahead(pose, leg)
     assert twist.vy_mps == 0.0
     assert 0.0 <= twist.vx_mps <= square.SPEED_MPS
@@ -249,7 +249,7 @@ def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
 
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It shows the driver of the demo until the time is over; then the result follows."""
+    """The monitor shows the driver of the demo until the time is over; then the result follows."""
     monkeypatch.setenv("DEMO_SECONDS", "6")  # the monitor may find the driver late
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
         terminal.wait_for("ros2 topic hz /demo_")

@@ -91,7 +91,7 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """It drives, its wheels have their names, and its own service replies."""
+    """The robot drives, its wheels have their names, and its own service replies."""
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))
     joints, odometry = probe.listen(JointState, "joint_states"), probe.listen(Odometry, "odom")
@@ -119,7 +119,7 @@ def test_the_monitor_shows_what_the_board_has(
     probe_of: Start,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """It neither shows an IMU nor reports it as missing."""
+    """The monitor neither shows an IMU nor reports it as missing."""
     driver = start_plain(start_driver, start_board().path)
     probe_of(driver).wait_for_state("nominal")
     assert main(["--json", "--namespace", driver.namespace]) == 0

@@ -116,7 +116,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
     probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
 ) -> None:
-    """This includes axes that the driver ignores, because their publisher is faulty."""
+    """Axes that the driver ignores are checked too, because their publisher is faulty."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.y = 0.3
@@ -156,7 +156,7 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
 def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """The type of the topic is then geometry_msgs/TwistStamped."""
+    """The type of the topic is geometry_msgs/TwistStamped if the parameter is set."""
     stamps = {"enable_stamped_cmd_vel": True, "cmd_vel_timeout": 10.0}
     probe: Probe = probe_of(start_driver(board.path, **stamps))
     probe.wait_for_state("nominal")

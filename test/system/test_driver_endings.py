@@ -85,7 +85,10 @@ atexit.register(lambda: print("left running:", sum(bool(e._sigint_gc) for e in e
 
 
 def test_the_executor_is_shut_down_before_python_ends(start_driver: Start) -> None:
-    """Python would destroy its parts in any order, and rclpy then sometimes prints a traceback."""
+    """Python would destroy the node's parts in any order.
+
+    Sometimes rclpy would print a traceback.
+    """
     driver: Driver = start_driver("sim://", before=REPORTS_EXECUTORS)
     driver.wait_for_line("state: nominal")
     assert driver.end(signal.SIGTERM) == 0

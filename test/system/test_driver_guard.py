@@ -166,7 +166,7 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """Its stamp may come from a planner that does not know about the hang."""
+    """The stamp may come from a planner that does not know about the hang."""
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -216,7 +216,7 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
 def test_every_connection_has_one_guard_and_no_process_stays_behind(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """This holds over five reconnections and after the end of the driver."""
+    """Each of five connections has a guard of its own; no guard remains after the driver's end."""
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)
     probe: Probe = probe_of(driver)

@@ -159,7 +159,7 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
 
 
 def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
-    """It has its own period parameter; names, levels and hardware id are the same."""
+    """The updater has its own period parameter; names, levels and hardware id are the same."""
     pytest.importorskip("diagnostic_updater", exc_type=ImportError)
     period = ["diagnostic_updater.period"]
     values = robot.probe.call(GetParameters, "get_parameters", names=period).values
@@ -194,7 +194,7 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 def test_measurements_wait_for_simulated_time_and_it_is_said(
     start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """This includes a simulated board, whose time differs from that of /clock."""
+    """A simulated board waits too; its time differs from that of /clock."""
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)
     probe.wait_for_state("nominal")

@@ -60,7 +60,7 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     ],
 )
 def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
-    """If they were ignored, the driver could open another port than the one that was meant."""
+    """With ignored arguments, the driver could open another port than the one that was meant."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -90,7 +90,7 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 
 @pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
-    """It works before any library is loaded, with exit code 0."""
+    """``--help`` works before any library is loaded, with exit code 0."""
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")

@@ -100,7 +100,7 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     start_driver: Start, port: str, reason: str
 ) -> None:
-    """It keeps trying, and ends normally at SIGINT."""
+    """The node keeps trying, and ends normally at SIGINT."""
     driver: Driver = start_driver(port)
     driver.wait_for_line(reason)
     assert driver.process.poll() is None
@@ -111,7 +111,7 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
     start_driver: Start, probe_of: Start, silent_port: str, write_to_silent_port: Start
 ) -> None:
-    """A wrong baud rate looks like this; valid frames after it are published."""
+    """A wrong baud rate causes garbage; valid frames after it are published."""
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     imu = probe.listen(Imu, "imu/data_raw")

@@ -161,7 +161,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
 def test_commands_under_estop_are_refused_and_told_what_to_do(
     probe: Probe, driver: Driver, board: PtyBoard
 ) -> None:
-    """They move the robot neither during the e-stop nor after its release."""
+    """Refused commands move the robot neither during the e-stop nor after its release."""
     assert probe.call(SetBool, "estop", data=True).success
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()

@@ -55,7 +55,7 @@ def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: Pty
 
 
 def test_imu_messages_follow_rep_145(probe: Probe) -> None:
-    """They have covariances, the frame of the sensor and increasing stamps, no orientation."""
+    """Messages have covariances, the frame of the sensor and increasing stamps, no orientation."""
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 50)
     message = received[0]
@@ -72,7 +72,7 @@ def test_imu_messages_follow_rep_145(probe: Probe) -> None:
 
 
 def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
-    """100 Hz to 25 Hz, counted by stamps, so that a slow computer does not matter."""
+    """The rates 100 Hz and 25 Hz are counted by stamps, so a slow computer does not matter."""
     imu, odometry = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
     probe.wait_for(lambda: imu and len(odometry) >= 10)
     first = len(odometry)

@@ -83,7 +83,7 @@ def driven(probe: Probe, toy: Toy) -> Iterator[None]:
 
 
 def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: Toy) -> None:
-    """cmd_vel reaches its line, its line reaches odom, and it stops when commands cease."""
+    """The toy obeys cmd_vel, its lines appear in odom, and it stops when commands end."""
     probe: Probe = probe_of(start_toy(start_driver, toy))
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for_state("nominal")
@@ -136,7 +136,7 @@ def test_each_toy_runs_inside_the_driver_too(start_driver: Start, probe_of: Star
 def test_wheels_have_the_boards_number_and_names(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """This board has two wheels: a command of two values drives it, one of three is rejected."""
+    """The toy board has two wheels: a command of two values drives it, one of three is rejected."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)

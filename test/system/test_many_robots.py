@@ -73,7 +73,7 @@ def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
 
 
 def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
-    """One drives forwards, one backwards, the third stays at rest."""
+    """The first robot drives forward, the second backward, the third stays at rest."""
     forward, still, backward = fleet
     speeds = {forward.name: 0.3, backward.name: -0.3}
     publishers = {
@@ -106,7 +106,7 @@ def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
 
 
 def test_two_of_the_same_name_are_told_of_each_other() -> None:
-    """Both report it, whichever started first."""
+    """Both drivers report it, whichever started first."""
     with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
         for driver in (first, second):
             driver.wait_for_line(f"another node has the name /{first.namespace}/omnibot_driver,")

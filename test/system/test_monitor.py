@@ -118,10 +118,7 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """One press sends a motion, a few zeros, then nothing.
-
-    Quitting sends zero again.
-    """
+    """A single press sends a motion, a few zeros, then nothing. Quitting sends zero again."""
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
     terminal.wait_for("0.15 m/s")
@@ -150,7 +147,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """It is killed, or its window is closed, during a motion with stamped commands."""
+    """The monitor is killed, or its window is closed, during a motion with stamped commands."""
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
 
@@ -190,7 +187,10 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """SIGSTOP leaves it no time to restore the terminal; after SIGCONT, q still ends it."""
+    """After SIGSTOP the monitor cannot restore the terminal.
+
+    After SIGCONT, q still ends the monitor.
+    """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     line = os.open(f"/proc/{terminal.process.pid}/fd/0", os.O_RDWR | os.O_NOCTTY)

@@ -47,7 +47,10 @@ def measure(fake: Probe, odometry: Odometry) -> None:
 
 
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
-    """It is repeated on the topic, as the service is missing, until the driver shows the latch."""
+    """The e-stop is repeated on the topic until the driver shows the latch.
+
+    The service is missing.
+    """
     said = fake.listen(Bool, "estop")
     feed = Feed([], "fake", "omnibot_driver")
     try:

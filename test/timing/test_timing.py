@@ -31,7 +31,7 @@ def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
 def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either(
     line: str, scenario: str, skew: float, seed: int
 ) -> None:
-    """With one byte in 100 lost, these streams once showed wrong stamps."""
+    """With one byte in 100 lost, an earlier version gave wrong stamps on these streams."""
     stamped = stamp(line, scenario, 1e-2, skew, seed, 30.0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -39,7 +39,7 @@ def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either
 
 @pytest.mark.parametrize("event", ["the board restarts", "stall of 0.3 s", "stall of 2 s"])
 def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) -> None:
-    """The stamps' constant offset is the same before and after."""
+    """The stamps' constant offset is the same before and after the event."""
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, skew, seed, 20.0, event)
         assert stamped.unevenness() < 0.2e-3

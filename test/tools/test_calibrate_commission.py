@@ -80,7 +80,7 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_switch_and_deltas_are_told_by_the_data(
     planted: dict[str, Any], found: dict[str, str], tmp_path: Path
 ) -> None:
-    """The robot's odometry shows them, so the user is not asked."""
+    """The robot's odometry shows the directions, so the user is not asked."""
     with rig(tmp_path, **planted) as robot:
         assert robot.calibrate("commission", "--only", "board") == 0
         assert robot.written().items() >= found.items()
@@ -107,7 +107,7 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The answer r repeats the motion, an invalid one the question; the signs are those seen."""
+    """The answer r repeats the motion; an invalid answer repeats the question."""
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)
     assert "Please answer with three of + - 0" in told(capsys)

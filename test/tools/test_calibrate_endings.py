@@ -108,7 +108,7 @@ def test_a_broken_pipe_loses_nothing(
 def test_what_is_to_be_copied_stands_on_one_line(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A shell would take a long path that is broken over two lines for two arguments."""
+    """A shell reads a long path that is broken over two lines as two arguments."""
     folder = tmp_path / ("a_long_name_" * 12)
     assert ending(folder=folder) == 0
     assert f"  -p calibration_file:={folder}/robot.yaml" in capsys.readouterr().out.splitlines()

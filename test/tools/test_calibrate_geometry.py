@@ -114,7 +114,7 @@ def test_a_square_comes_back() -> None:
 
 
 def test_readings_with_a_wrong_sign_are_turned_away() -> None:
-    """Without this check they would give an impossible robot."""
+    """Without this check the readings would give an impossible robot."""
     wrong = readings(PERFECT, 1.0, np.random.default_rng(0))
     for one in wrong[2:4]:
         one.end[:2] *= -1

@@ -62,7 +62,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 def test_level_is_the_turn_that_makes_gravity_point_up(
     roll: float, pitch: float, mounting: float
 ) -> None:
-    """It is compared with a rotation matrix of fixed-axis angles that is written out here."""
+    """The result is compared with a rotation matrix of fixed-axis angles, written out here."""
     roll += mounting
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     to_body = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])

@@ -93,7 +93,7 @@ def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
 
 
 class Encoder(TwoWheels):
-    """A robot whose driver has a distance for each encoder count, and a gyro for the heading."""
+    """A robot whose driver has the parameter ``metres_per_count``, and a gyro for the heading."""
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
@@ -107,7 +107,7 @@ class Encoder(TwoWheels):
 
 
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
-    """Two lines suffice: such a driver does not have factors for its odometry."""
+    """Two measured lines are enough: this driver does not have factors for its odometry."""
     robot = Encoder()
     console = Console(
         yes=False,

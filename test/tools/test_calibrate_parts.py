@@ -37,7 +37,10 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """Its first data come late, so it has 3 s; the message omits the scales that it lacks."""
+    """The first data come late, so the robot has 3 s.
+
+    The message omits the scales that it lacks.
+    """
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
     for tick in range(250):
@@ -113,7 +116,7 @@ def test_stairs_are_climbed_one_by_one() -> None:
 
 
 def test_an_empty_log_has_empty_columns() -> None:
-    """The columns keep their shapes, so that calculations need not treat this case."""
+    """The columns keep their shapes, so that calculations need no special case."""
     log = Log()
     assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
     assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
@@ -172,7 +175,7 @@ def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
 
 
 def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
-    """A file with such a value would make the driver's next start fail."""
+    """With a value that is not finite in the file, the driver's next start would fail."""
     path = tmp_path / "robot.yaml"
     with pytest.raises(ToolError, match="parameter 'linear_scale' must be"):
         save(result(linear_scale=1e9), path, PARAMETERS)
@@ -216,7 +219,7 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
     "words", [[], ["nonsense"], ["imu", "--minutes", "0"], ["scale", "--levels", "x"]]
 )
 def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """A message on stderr explains it."""
+    """A message on stderr gives the reason."""
     assert main(words) == 2
     assert "calibrate" in capsys.readouterr().err
 

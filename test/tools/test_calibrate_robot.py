@@ -120,7 +120,7 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
 
 
 def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """It is switched off only during a motion that it would stop."""
+    """The monitor is switched off only during a motion that it would stop."""
     seen = []
 
     def interrupt() -> None:
@@ -135,7 +135,7 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 
 
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """Any exception restores it; otherwise it would stay off until the driver restarts."""
+    """Any exception switches the monitor on again; it would stay off until the driver restarts."""
 
     def fail() -> None:
         raise RuntimeError("a defect")
@@ -149,7 +149,7 @@ def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> Non
 def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
     robot: Robot, rigged: Rig
 ) -> None:
-    """After ctrl-Z and fg only zeros are sent: the driver has stopped the robot meanwhile."""
+    """After ctrl-Z and fg only zeros are sent: the driver has stopped the robot before."""
     clock = SimpleNamespace(monotonic=time.monotonic)
 
     def suspend() -> None:

@@ -113,7 +113,7 @@ def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> Non
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
 def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
-    """They range from a tenth of the limits to the full limits."""
+    """Speeds range from a tenth of the limits to the full limits."""
     dead_man = DeadMan()
     dead_man.fastest = (0.4, 1.5)
     for step in steps:

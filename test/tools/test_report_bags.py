@@ -101,7 +101,7 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
 
 
 def test_the_only_robot_needs_no_name(tmp_path: Path) -> None:
-    """It is found in any namespace."""
+    """The robot is found in any namespace."""
     log = log_of(write(tmp_path / "bag", [Drive(SECONDS, "/robot1")]))
     assert log.robot == "/robot1"
 
@@ -186,7 +186,7 @@ def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str
 
 
 def test_a_bag_is_reported_on_where_there_is_no_ros(drive: Drive, tmp_path: Path) -> None:
-    """The process cannot import ROS modules; a closed stdout does not disturb it either."""
+    """The process cannot import ROS modules; a closed stdout does not disturb it."""
     bag = write(tmp_path / "bag", [drive])
     program = (
         "import sys\n"

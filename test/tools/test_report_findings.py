@@ -87,7 +87,7 @@ def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
 
 
 def test_uneven_stamps_are_noticed(drive: Drive) -> None:
-    """This happens, for example, if the timestamps are arrival times."""
+    """The stamps are uneven, for example, if they are arrival times."""
     drive.imu.stamp_s = drive.imu.stamp_s + np.random.default_rng(2).uniform(0, 4e-3, 2000)
     (jitter,) = troubles(drive)
     assert jitter.subject == "Timing"
@@ -204,7 +204,7 @@ def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
 
 
 def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
-    """They share /diagnostics, which does not show which robot a count belongs to."""
+    """The robots share /diagnostics, which does not show which robot a count belongs to."""
     drive.imu.drop(6.0, 6.1)
     findings = judge(replace(drive.log(), alone=False))
     (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
@@ -221,7 +221,7 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 
 
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
-    """This driver stamps all messages, so another node published these."""
+    """The driver stamps all its messages, so another node published these."""
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan
     assert any("3 messages of imu/data_raw without a stamp" in item.text for item in judge(log))

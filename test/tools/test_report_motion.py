@@ -113,7 +113,7 @@ def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
 
 
 def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) -> None:
-    """It reaches 70 % of the command in x and y, and 100 % of the yaw rate."""
+    """The robot reaches 70 % of the command in x and y, and 100 % of the yaw rate."""
     drive.odom.values[:, :2] *= 0.7
     drive.odom.values[:, 3:5] *= 0.7
     (slow,) = troubles(drive)
@@ -139,7 +139,7 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 
 
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
-    """The driver then stops the robot, so the note explains why it stood still."""
+    """The driver stops a robot without commands, so the note explains why it stood still."""
     drive.cmd_vel.drop(10.0, 10.8)
     assert "1 time for more" in said(drive, "Commands", "paused").text
 
@@ -162,7 +162,7 @@ def test_an_estop_is_noted_and_what_it_stops_is_no_trouble(drive: Drive) -> None
 
 
 def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
-    """It has the worst level, BAD."""
+    """The finding has the worst level, BAD."""
     drive.estops += [(10.0, True)]
     moved = said(drive, "E-stop", "moved while")
     assert moved.level is Level.BAD
@@ -232,7 +232,7 @@ def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
 
 
 def test_an_imu_that_the_board_has_not_is_not_missed(drive: Drive) -> None:
-    """Its driver's diagnostics have no count of IMU frames."""
+    """The diagnostics of that board's driver have no count of IMU frames."""
     drive.imu.drop(0.0, 99.0)
     said_of_it = [finding.text for finding in judge(drive.log())]
     assert "No message of imu/data_raw: the IMU cannot be judged." in said_of_it

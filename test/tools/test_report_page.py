@@ -55,7 +55,7 @@ def test_a_name_cannot_become_markup(folder: Path) -> None:
 
 
 def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
-    """Both are made from the same findings."""
+    """Page and terminal are made from the same findings."""
     drive = Drive(10.0)
     drive.estops += [(5.0, True), (6.0, False)]
     findings = judge(drive.log())

@@ -88,7 +88,7 @@ def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: floa
 @settings(max_examples=15)
 @given(st.floats(0.01, 0.3), st.floats(0.0, 0.08))
 def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: float) -> None:
-    """They agree with a numerical integral of scipy's step response."""
+    """The deltas agree with a numerical integral of scipy's step response."""
     times_s = np.linspace(0.0, 0.6, 6001)
     _, response = signal.step(([1.0], [time_constant_s, 1.0]), T=times_s)
     _check(first_order, np.array([time_constant_s, delay_s]), times_s, response, delay_s)
@@ -104,7 +104,7 @@ def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: flo
 def test_second_order_deltas_are_mean_values(
     omega: float, damping: float, zero_s: float, delay_s: float
 ) -> None:
-    """They agree with scipy's response for any damping, with a zero in either half-plane."""
+    """The deltas agree with scipy's response for any damping, with a zero in either half-plane."""
     times_s = np.linspace(0.0, 0.6, 6001)
     system = ([zero_s, 1.0], [1 / omega**2, 2 * damping / omega, 1.0])
     _, response = signal.step(system, T=times_s)
@@ -142,7 +142,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @settings(max_examples=5)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
-    """They keep the limits of Ms and overshoot, and reduce the errors after command and load."""
+    """The gains keep the limits of Ms and overshoot, and lower errors after command and load."""
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)
     assert after.ms <= LARGEST_MS

@@ -77,7 +77,7 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """This keeps out programs that do not use locks, too; a pseudo-terminal is left as it is."""
+    """Programs that do not use locks are kept out, too; a pseudo-terminal is left as it is."""
 
     def exclusive() -> bool:
         near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)  # root may open it

@@ -120,7 +120,10 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 
 
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
-    """A write never waits for it; after a while it is missing, and old data is not sent to it."""
+    """A write never waits for a full line.
+
+    After a while the line counts as missing, and old data is not sent to it.
+    """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     poll = select.poll
@@ -143,7 +146,7 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
 def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reader may be busy, so the write itself must notice it."""
+    """The reader may be busy, so the write itself must notice the full line."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -155,7 +158,7 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a guard held it open, its lock would prevent that."""
+    """If a guard held the line open, its lock would prevent a new opening."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -167,7 +170,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several
 ) -> None:
-    """It is written as soon as the other end's reader makes room."""
+    """The rest is written as soon as the other end's reader makes room."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     lines.write(((0, b"one"),))
@@ -182,7 +185,7 @@ def test_what_a_full_line_does_not_take_at_once_follows_in_order(
 def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
     ends: Ends, tmp_path: Path
 ) -> None:
-    """The open lines are not closed for it."""
+    """The open lines are not closed when another line is opened."""
     late = tmp_path / "late"
     paths = str(late), ends.paths[1]
     lines = Several([partial(SerialPort, path, 115200) for path in paths], retry_s=0.01)
@@ -221,6 +224,6 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
 
 
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
-    """It has no descriptor."""
+    """The port has no descriptor."""
     with pytest.raises(LinkError, match="does not work for a board with several lines"):
         Several([partial(SerialPort, "loop://", 115200)])

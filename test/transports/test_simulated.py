@@ -43,19 +43,19 @@ def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
 
 
 def test_it_needs_no_guard_and_no_kernel() -> None:
-    """It ends with this process, has no descriptors, and counts no overruns."""
+    """The board ends with this process, has no descriptors, and counts no overruns."""
     with closing(SimulatedTransport("sim://", TOY)) as transport:
         assert transport.ends_with_us
         assert (transport.descriptors, transport.overruns) == (None, None)
 
 
 def test_a_read_ends_without_a_packet() -> None:
-    """It ends after its time limit."""
+    """The read ends after its time limit."""
     assert InProcessBoard(ToyServer()).read(0.01) == (0, b"")
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
-    """Otherwise closing a driver would wait for the next notice of a paused board."""
+    """Without interruption, closing a driver would wait for the next notice of a paused board."""
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
     canceller.start()
@@ -66,7 +66,7 @@ def test_a_read_that_waits_can_be_interrupted() -> None:
 
 
 def test_after_closing_nothing_is_read_and_nothing_written() -> None:
-    """It behaves like a lost port; a second close does nothing."""
+    """The transport behaves like a lost port; a second close does nothing."""
     transport = SimulatedTransport("sim://", TOY)
     transport.close()
     transport.close()
@@ -78,7 +78,7 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """As much is kept of each channel as in a terminal, the oldest bytes first."""
+    """A channel keeps as many bytes as a terminal does: the oldest ones; newer ones are dropped."""
     served = InProcessBoard(toy_lines.ToyLines())
     taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]
     assert taken == [1000, 1000, 1000, 1000, UNREAD_LIMIT - 4000, 0]
@@ -89,7 +89,7 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
-    """As many are kept as in a socket, each by itself, an empty one too."""
+    """The number of datagrams kept is that of a socket; each is kept whole, also an empty one."""
     served = InProcessBoard(ToyServer())
     taken = [served._send(0, data) for data in [b"", *[b"ok 1"] * UNREAD_DATAGRAMS]]
     assert taken == [0, *[4] * (UNREAD_DATAGRAMS - 1), 0]
@@ -124,7 +124,7 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is raised with its cause, and not taken for a lost cable; the board can be closed."""
+    """The exception has its cause, and is not regarded as a lost cable; the board can be closed."""
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:
         raise ZeroDivisionError

@@ -67,7 +67,7 @@ def next_packet(transport: UdpPorts) -> Packet:
 
 
 def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPorts) -> None:
-    """This holds in both directions; packets are never joined."""
+    """Both directions are tested; packets are never joined."""
     transport.write(((0, b"one"), (0, b"two"), (1, b"halt")))
     (first, driver), (second, _) = host.ports[0].recvfrom(99), host.ports[0].recvfrom(99)
     assert (first, second) == (b"one", b"two")
@@ -151,7 +151,7 @@ def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
 
 @pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])
 def test_a_host_that_is_not_known_is_refused(name: str) -> None:
-    """This holds for any error of the resolver; no descriptor stays open."""
+    """Any error of the resolver is reported; no descriptor stays open."""
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(LinkError, match="check the parameter `port`"):
         UdpPorts(f"udp://{name}:5000", 2)

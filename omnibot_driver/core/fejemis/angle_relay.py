@@ -8,9 +8,9 @@ error is added to the next angles, so the mean is right. Some angles to the righ
 that rounding cannot avoid: their minus sign and that ``6`` can be lost undetected, which leaves an
 angle of less than 10° to the left.
 
-Without sums, the loss of any character is undetected. Then whole degrees are sent, in which any
-loss leaves a smaller number: beyond 90° the board would compute an inner wheel faster than the
-outer one.
+Without sums, the loss of any character is undetected. So whole degrees are sent: any loss then
+leaves a smaller number, never one beyond 90°, for which the board would compute an inner wheel
+faster than the outer one.
 """
 
 import math

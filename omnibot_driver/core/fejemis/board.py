@@ -220,7 +220,8 @@ class FejemisBoard(Board):
         elif not self._obedience.estopped:
             self._upkeep.machine.off()
             self._obedience.latch(running=self.mode is Mode.NOMINAL)
-            self._upkeep.jobs.interrupt("the e-stop was latched meanwhile; release it, call again")
+            why = "the e-stop was latched meanwhile; release it, then call again"
+            self._upkeep.jobs.interrupt(why)
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
         """Return these lines as packets for the two boards."""

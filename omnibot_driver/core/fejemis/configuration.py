@@ -49,8 +49,8 @@ class Configuration:
         self._once: dict[str, tuple[float, ...]] = {}
         """The last reported numbers by keyword, confirmed by a second reading or not."""
         self.turned = False
-        """Whether the board reports ``confs`` with the track first; by the help text it is
-        last."""
+        """Whether the track is the first number of the board's ``confs``; in the help text it is
+        the last number."""
         self.written = written
         self.begin()
 

@@ -2,9 +2,9 @@
 
 """Check that the front wheel follows its commanded angle; if not, motion is refused.
 
-Without the refusal, a sender that continues would move the robot for a second, again and again.
-After a first fault, motion is refused until the wheel has moved; after a second fault within a
-minute, until ~/start is called. The module knows only angles and times.
+Without the refusal, a node that continues to send commands would move the robot for a second, again
+and again. After a first fault, motion is refused until the wheel has moved; after a second fault
+within 60 s, until ~/start is called. The module knows only angles and times.
 """
 
 import math
@@ -22,8 +22,8 @@ UNTIL_IT_MOVES: Final = (
     " refused until the wheel has moved, or ~/start is called"
 )
 UNTIL_START: Final = (
-    "the front wheel did not go where it was commanded, for the second time within a minute; check"
-    " the servo and its power, for reversing see `allow_reverse`; then call ~/start"
+    "the front wheel did not go where it was commanded, for the second time within 60 s; check the"
+    " servo and its power (for reverse motion, see `allow_reverse`), then call ~/start"
 )
 
 

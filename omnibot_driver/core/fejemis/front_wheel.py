@@ -61,11 +61,14 @@ class FrontWheel:
         """The sensor's faults, as a sentence with advice; empty while it works."""
         if not self.fault:
             return ""
-        return f"the angle sensor of the front wheel reports: {self.fault}; check sensor and magnet"
+        return (
+            f"the angle sensor of the front wheel reports: {self.fault}; check the sensor and its"
+            " magnet"
+        )
 
     @property
     def stale_at(self) -> float:
-        """Time in s at which the last angle becomes too old, unless a new angle comes before."""
+        """Time in s at which the last angle becomes too old, unless a new angle comes earlier."""
         return self.heard_at + OLDEST_S + 1e-6
 
     @property

@@ -42,7 +42,10 @@ TOGETHER: Final = ("gyro", "acc")
 """Streams subscribed in one packet, so that the board sends both in the same cycle."""
 AGAIN_S: Final = 0.5
 MANY: Final = 30
-"""Lines per second, of some hundred, that may be damaged or unknown before the user is notified."""
+"""Number of damaged or unknown lines per second up to which the user is not notified.
+
+A board sends some hundred lines per second.
+"""
 SILENT_S: Final = 1.5
 """Silence in s after which a board is regarded as gone."""
 _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")

@@ -67,7 +67,8 @@ class Inbound:
         if half.not_understood(now):
             self._told.tell(
                 f"many lines from the {self._ports.role(channel)} board are damaged or not"
-                " understood: check the cable, and whether another program asks it for help text",
+                " understood: check the cable, and whether another program requests help text"
+                " from the board",
                 now,
             )
         if half.decoder.changed:
@@ -140,7 +141,7 @@ class Inbound:
         if self._angle_told(front.angle_rad, now):
             self._told.halt(
                 "the front wheel does not go where it is commanded; robot stopped. Check the servo"
-                " and its power; for reversing see `allow_reverse`",
+                " and its power; for reverse motion, see `allow_reverse`",
                 now,
             )
 

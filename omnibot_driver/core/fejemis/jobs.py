@@ -91,7 +91,9 @@ class Jobs:
         power.
         """
         if self.job is not None:
-            raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
+            raise RequestRefused(
+                f"a {self.job.value} is under way; wait for its answer, then call again"
+            )
         self.job, self._token = job, token
         self._begun_at = self._next_at = now + wait_s
         self._until = self._begun_at + WITHIN_S
@@ -117,14 +119,14 @@ class Jobs:
         """Cancel a requested power off; return the line for it, or an empty list if not needed."""
         lines = [b"on"] if self.powering_off else []
         if self.job is Job.POWER_OFF:
-            self.cancel("it was called back")
+            self.cancel("a start has cancelled it")
         self.powering_off = False
         return lines
 
     def begin(self) -> None:
         """Fail the running job and forget a power off: the connection is new."""
         self.powering_off = False
-        self.cancel("the port was lost meanwhile; call again")
+        self.cancel("the port was lost meanwhile; call again once it is back")
 
     def due(self, now: float) -> Lines:
         """Return the lines to send now, by board."""

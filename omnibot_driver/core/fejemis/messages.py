@@ -117,7 +117,7 @@ class Infrared:
 
 @value(frozen=True, slots=True)
 class WheelConfiguration:
-    """``conf``: both wheel radii, gear ratio, encoder ticks a revolution, track, control period."""
+    """``conf``: both wheel radii, gear, encoder ticks per revolution, track, control period."""
 
     left_radius_m: float
     right_radius_m: float
@@ -140,7 +140,7 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: by the help text, distance of the steered wheel from the axle, then track."""
+    """``confs``: distance of the steered wheel from the axle, then track, as in the help text."""
 
     first_m: float
     second_m: float

@@ -4,8 +4,8 @@
 
 A sum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or ``-``
 and ``6``. Each line contains the source ``2``, so the numbers here do not contain ``1``. They also
-do not contain ``3``, nor ``5``, nor, in a line with a minus sign, ``6``. So between the numbers
-there are gaps, of which the largest (relative to the number) is from 1 to 2.
+do not contain ``3``, nor ``5``, nor, in a line with a minus sign, ``6``. So there are gaps between
+the numbers; the largest gap, relative to the number, is from 1 to 2.
 """
 
 from bisect import bisect_left, bisect_right

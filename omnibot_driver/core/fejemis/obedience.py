@@ -2,10 +2,10 @@
 
 """Whether the drive board obeys, by its heartbeat, and why not: a pause, or the driver's e-stop.
 
-The driver sends ``stop`` to the board for both. The driver's own e-stop is not regarded as a pause:
-after its release, ``start`` is sent until the heartbeat shows that the board obeys. A pause remains
-until the user calls start. The module knows rcSource (the source of commands that the board reports
-to obey) and times, not lines.
+The driver sends ``stop`` to the board in both cases. The driver's own e-stop is not regarded as a
+pause: after its release, ``start`` is sent until the heartbeat shows that the board obeys. A pause
+remains until the user calls start. The module knows rcSource (the source of commands that the board
+reports to obey) and times, not lines.
 """
 
 import math

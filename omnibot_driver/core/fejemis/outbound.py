@@ -12,7 +12,7 @@ sum, so the digits of a motion line are chosen to get a suitable sum:
   character of a number, nor of the ``;`` (without it, the digits of the sum would continue the last
   number of the first line). Other lines with such a sum follow an empty line, which the boards
   ignore.
-* A lost digit of the sum leaves a sum that fits only if a certain character is lost as well.
+* A lost digit of the sum leaves a sum that is correct only if a certain character is lost as well.
 
 Characters are never added to a line itself: a board may compare the complete line with ``stop``.
 """

@@ -3,8 +3,8 @@
 """Finds which of the two boards (halves) is at which port, and addresses lines to them.
 
 The heartbeats identify the boards, whatever the order of the ports. Until a board is identified,
-lines that end something go to each port where it may be, and no other lines are sent to it. The
-module knows identities, not the lines' meaning.
+lines that stop or switch off something go to each port where the board may be, and the board gets
+no other lines. The module knows identities, not the lines' meaning.
 """
 
 from dataclasses import replace
@@ -102,7 +102,7 @@ class Ports:
         return NO_PACKETS if half is None else self.at(self.halves.index(half), *texts)
 
     def ending(self, role: Role, *texts: bytes) -> Packets:
-        """Return lines that end something, for one board, or for each port where it may be."""
+        """Return lines that stop or switch off something, for each port where the board may be."""
         if self.half(role) is not None:
             return self.line(role, *texts)
         unknown = [channel for channel, half in enumerate(self.halves) if half.role is None]

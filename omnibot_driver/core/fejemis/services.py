@@ -19,6 +19,7 @@ from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
 """Time in s between a Stop and the loading of a configuration, for a robot that moves."""
+NO_DATA: Final = "no data from the boards; check their power and cables"
 
 
 class Robot(Protocol):
@@ -77,15 +78,16 @@ class Services:
         """
         robot, moving = self._robot, self._odometry.moving
         if robot.mode is Mode.UNKNOWN:
-            reason = robot.refusal or "no data from the boards; check both cables"
+            reason = robot.refusal or NO_DATA
             raise RequestRefused(f"{job.value} refused: {reason}")
         if robot.driving and job is not Job.LOAD:
             raise RequestRefused(
-                f"{job.value} refused: the robot is commanded; stop the sender, then call again"
+                f"{job.value} refused: the robot is commanded by cmd_vel; end these commands, then"
+                " call again"
             )
         if moving and job is not Job.LOAD:
             raise RequestRefused(
-                f"{job.value} refused: the robot moves; wait until it stands still"
+                f"{job.value} refused: the robot moves; wait until it stands still, then call again"
             )
         moves = robot.driving or moving
         self._upkeep.jobs.ask(
@@ -104,9 +106,9 @@ class Services:
         if self._upkeep.jobs.powering_off:
             return POWER_ENDS
         if self._obedience.estopped:
-            return "the e-stop is latched; release it first (~/estop)"
+            return "the e-stop is latched; release it with the service ~/estop (data: false)"
         if self._robot.mode is Mode.PAUSED:
             return "the robot is paused; call ~/start first"
         if self._robot.mode is Mode.UNKNOWN:
-            return self._robot.refusal or "no data from the boards; check both cables"
+            return self._robot.refusal or NO_DATA
         return ""

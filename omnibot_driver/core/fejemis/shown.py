@@ -12,7 +12,7 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""How many of the latest lines that a board's firmware does not know are shown."""
+"""Number of lines that are shown: the latest of those that a board's firmware does not know."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

@@ -38,7 +38,7 @@ class Steered:
 
     ``speed_mps``, ``turn_radps``: numbers for the front board; the drive board gets both multiplied
     by ``part``. ``angle_rad``: the front wheel's target. ``twist``: the body's motion at the
-    present front angle. ``whole``: whether ``part`` is 1, so that the speed is not limited.
+    present front angle. ``whole``: whether ``part`` is 1: the speed is not limited.
     """
 
     speed_mps: float

@@ -34,7 +34,7 @@ class Told:
         """Add a notice that the user gets only once."""
         if text not in self._told_at:
             self._told_at[text] = math.inf
-            self.notices.append(NoticeReading(f"{text} (said once)", halt=False))
+            self.notices.append(NoticeReading(f"{text} (reported once)", halt=False))
 
     def _news(self, text: str, now: float) -> str:
         if now - self._told_at.get(text, -math.inf) < TELL_EVERY_S:

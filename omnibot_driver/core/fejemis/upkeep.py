@@ -136,7 +136,7 @@ class Upkeep:
             if unknown := half.unknown_streams:
                 return (
                     f"the firmware of the {half.role} board does not know {', '.join(unknown)},"
-                    " so that data is missing; update the firmware"
+                    " so this data is missing; update the firmware"
                 )
         one, other = (self.configurations[role].geometry for role in ROLES)
         told = Written.STEERING not in self._settings.written  # else `failed` tells it

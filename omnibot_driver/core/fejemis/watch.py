@@ -37,7 +37,7 @@ class Watch:
         self._patient_until = -math.inf
 
     def stalled(self) -> None:
-        """Note that this process stalled, so that boards are not regarded as silent for it."""
+        """Note that this process stalled, which must not make the boards appear silent."""
         self._stalled = True
 
     def open(self, now: float) -> None:

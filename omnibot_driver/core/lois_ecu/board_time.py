@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Delay of a group of ticks: how much later than usual it was read, by the board's clock in it.
+"""Delay of a group of ticks: how late it was read, by the board's time that the group contains.
 
-The public firmware's clock stands still while the board sends, so the clock falls behind by 4 to
-36 %. The number of sent lines is known, and each takes about 1.2 ms. A board as in the manual has a
+The public firmware's clock stands still while the board sends, so the clock falls behind by 4 to 36
+%. The number of sent lines is known, and each takes about 1.2 ms. A board as in the manual has a
 clock that does not stop. Both models of the clock are fitted to the last arrivals, and the better
 fit is used. The fit is a straight line below all arrivals, because a read may be late but never
 early. Works on clock counts, numbers of lines and arrival times.

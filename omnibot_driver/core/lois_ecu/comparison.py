@@ -37,7 +37,7 @@ TICKS_AGE_S: Final = 0.005
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""Variances, in squared ticks, of what a count, a heading of 0x20 and a distance of 0x20 hide."""
+"""Variances, in squared ticks, of the error of a count, and of heading and distance of 0x20."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
 """Residual in ticks beyond which the wheel has changed its speed although its set-point has not."""
@@ -45,8 +45,8 @@ SAME_TICKS: Final = 0.6
 """Residual in ticks within which an unchanged count is not a measurement."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""Residual, in standard deviations and in m, beyond which a heading is discarded: it has integrated
-a kept speed for the time of a rest."""
+"""Residual, in standard deviations and in m, beyond which a heading is discarded: the board has
+integrated an old speed while the wheel was at rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012

@@ -6,17 +6,17 @@ Damage. A line is accepted if it is 14 characters from a ``:`` (12 without check
 feed, and its checksum is right. The public firmware counts characters from the last ``:`` and
 starts anew after the fourteenth. So a line that lost characters is too short. Two lines become one
 only if fourteen characters in a row are lost (twelve without checksum), among them the end of one
-and the beginning of the next. A loss of up to two characters never makes another line. The board is
-deaf for 13 ms while it sends a group, and set-points are at least 18 ms apart, so one deaf time
-does not take both the end of one and the beginning of the next.
+and the beginning of the next. A loss of up to two characters never makes another line. While the
+board sends a group it receives nothing for 13 ms. Set-points are at least 18 ms apart, so such a
+pause does not remove both the end of one line and the beginning of the next.
 
 Choice of zero. In the firmware both zeros take the power away with the controller's next step. Duty
 0/0 leaves the hidden RPM target, so ticks continue to count while a robot that drove forward rolls
-out: its standstill can be proved. RPM 0/0 ends the counting, and clears the measured speed. It must
-be sent before the wheels turn again: for the controller, a wheel at rest keeps its last speed, and
-a slower set-point in the same direction would never start it. So Stop is duty 0/0, the emergency
-stop is RPM 0/0 (while it is latched both alternate), and RPM 0/0 precedes the first set-points
-after a Stop.
+out: its standstill can be proved. RPM 0/0 ends the counting, and clears the measured speed. RPM 0/0
+must be sent before the wheels turn again: for the controller, a wheel at rest keeps its last speed,
+and a slower set-point in the same direction would never start it. So Stop is duty 0/0, the
+emergency stop is RPM 0/0 (while it is latched both alternate), and RPM 0/0 precedes the first
+set-points after a Stop.
 """
 
 from typing import Final

@@ -30,9 +30,9 @@ NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Chances that the wheel is at rest, by the number of repetitions: after a fall to a speed beyond
 ``FAST_RPM``, after a far fall, after a far fall from a speed that was reported once, and after a
-shorter fall; ``TUNED``: after each of them with gains that the user set. Such a wheel hardly ever
-comes to rest unasked, and often rolls at a steady speed after it has overshot. Counted on the
-public firmware."""
+shorter fall; ``TUNED``: after each of them with gains that the user set. A wheel with such gains
+rarely comes to rest without a Stop, and often rolls at a steady speed after it has overshot. The
+chances were counted on the public firmware."""
 
 
 class RestingWheel:

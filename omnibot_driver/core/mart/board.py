@@ -3,7 +3,7 @@
 """The MART controller as a ``Board`` of the driver, backed by its pilot.
 
 The controller sends nothing by itself: each measurement is the reply to a query of the pilot.
-During a controlled move the controller answers nothing, so silence is expected then.
+During a controlled move the controller answers nothing, so silence is expected.
 """
 
 import math

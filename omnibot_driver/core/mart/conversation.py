@@ -127,7 +127,7 @@ class Conversation:
             self._owed_until_s.pop(reply.form, None)
 
     def certain_from_s(self, word: Word) -> float:
-        """Return the time from which no late reply can be taken for the reply to ``word``."""
+        """Return the time from which no late reply can be mistaken for the reply to ``word``."""
         return max(map(self.late_until_s, word.forms)) - word.least_s
 
     def late_until_s(self, form: Form) -> float:

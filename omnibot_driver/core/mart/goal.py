@@ -71,7 +71,7 @@ class Done:
     def may_have_run_twice(self, delay_s: float) -> bool:
         """Return whether the server may have run the move twice, as its datagram was duplicated.
 
-        The encoder count then covers the second run alone.
+        The encoder count then covers only the second run.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         number = float(self.request.data.split()[-1])
@@ -85,8 +85,8 @@ class Done:
 class Surplus:
     """The measured excess of controlled moves over the requested distances and turns.
 
-    The excess of turns is a number of degrees. That of straight moves is a ratio, as the server
-    ends them by time.
+    The excess of turns is a number of degrees. The excess of straight moves is a ratio, as the
+    server ends them by time.
     """
 
     def __init__(self) -> None:

@@ -38,13 +38,13 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 STARTS_UP_S: Final = 1.5
 """Time in s from the first reply after an absence within which no motion is started.
 
-The server opens its ports before it is complete. A server that has just started crashes by VOLTS
-and by most motions, RM with the motors on.
+The server opens its ports before it is complete. VOLTS and most motions crash a server that has
+just started; a crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Time in s, plus a number of exchange durations, without a reply that shows an absence."""
 ABSENT_BUSY_S: Final = 2.5
-"""The same while the server is busy or may be busy, as with a stop."""
+"""Time in s without a reply that shows an absence of a server that may be busy, as by a stop."""
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which stops are sent while the e-stop is latched.
 
@@ -88,7 +88,7 @@ class Ground:
     def connect(self) -> None:
         """Begin a new connection: the server may be moving the robot."""
         self.conversation.connect()
-        self.jobs.cancel("the connection was lost; call again when it is back")
+        self.jobs.cancel("the connection was lost meanwhile; call again once it is back")
         self.jobs.logging = self.jobs.ended = False
         self.odometry.connect()
         self._polls.connect()
@@ -198,7 +198,7 @@ class Ground:
     def _require(self, word: Word) -> None:
         """Raise AssertionError if the command is not allowed in the present state."""
         if not may_say(self.state, word, self.motion):
-            raise AssertionError(f"{word.text} must not be said while {self.state.value}")
+            raise AssertionError(f"{word.text} must not be sent while {self.state.value}")
 
     def _send(self, said: tuple[Word, ...], now: float) -> Packets:
         """Return the packets of commands whose replies are not awaited, and note their times."""

@@ -174,7 +174,10 @@ class Health:
     def refusal(self) -> str:
         """The reason why motion is refused, with a remedy; empty while motion is allowed."""
         if self.stranger:
-            return f"the server is not a motion controller; it calls itself '{self.stranger}'"
+            return (
+                f"the server is not a motion controller; it calls itself '{self.stranger}'; check"
+                " `port`"
+            )
         if self.tripped:
             return f"the motor board reports {self.tripped}: check motors, wiring and power"
         if self._imu.dead:

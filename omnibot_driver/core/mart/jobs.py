@@ -107,7 +107,9 @@ class Jobs:
         not started.
         """
         if self.job is not None:
-            raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
+            raise RequestRefused(
+                f"a {self.job.value} is under way; wait for its answer, then call again"
+            )
         if job is Job.LOG_FILE and not self.logging:
             raise RequestRefused(
                 "no log was started: call ~/start_log first; without a log the server would end"
@@ -152,7 +154,9 @@ class Jobs:
         if self.job in REPEATED and self._tries < TIMES:
             self._waiting = False
         else:
-            self._finish(False, f"the controller did not answer {word.text}")
+            self._finish(
+                False, f"the controller did not answer {word.text}; check controller and network"
+            )
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
         """Evaluate the reply to a controlled move, and end the docking job if it was its move."""
@@ -180,7 +184,10 @@ class Jobs:
         if self.collecting and now >= self._piece_s:
             self._close_file()
         elif self.job is not None and now >= self._until_s:
-            self._finish(False, f"the {self.job.value} took too long")
+            limit_s = WITHIN_S.get(self.job, USUAL_S)
+            self._finish(
+                False, f"the controller did not complete the {self.job.value} within {limit_s:g} s"
+            )
 
     def cancel(self, why: str) -> None:
         """End the job as failed, for the reason ``why``."""
@@ -197,7 +204,7 @@ class Jobs:
             self._finish(False, f"pieces of {self._name} came twice; call again")
         else:
             content = b"".join(self._pieces)
-            ended = "; the controller has ended and must be started again" if self.ended else ""
+            ended = "; the server has ended and must be started again" if self.ended else ""
             self._finish(True, f"{self._name}, {came} bytes{ended}", content=content)
 
     def _finish(self, success: bool, message: str, content: bytes = b"") -> None:

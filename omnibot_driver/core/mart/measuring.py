@@ -50,7 +50,7 @@ class Measuring(Starts):
         """Process a reported heading; return whether it is plausible and has changed."""
         changed = self.odometry.turned(degrees, when)
         if self.state is State.DRIVING and not abs(math.radians(degrees)) < MOST_RAD:
-            self._halt(now, "the relative heading is useless, as the controller's clock was set")
+            self._halt(now, "the relative heading is not usable: the controller's clock was set")
         return changed
 
     def _counted(self, count: int, when: Moment, now: float) -> None:
@@ -101,8 +101,8 @@ class Measuring(Starts):
             )
             return
         self._notice(
-            "robot moves without a command; the driver stops it (a late copy of a command, another"
-            " client, or a push)",
+            "robot moves without a command (a late copy of a command, another client, or a push);"
+            " the driver stops the robot",
             halt=True,
         )
         self.motion = Motion.UNKNOWN

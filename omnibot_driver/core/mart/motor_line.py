@@ -47,7 +47,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def move(self, slope: float, offset: float) -> None:
-        """Change the line by these differences, as the line of a like motor has changed."""
+        """Change the line by these differences, by which the other motor's line has changed."""
         self._set(self.slope + slope, self.offset + offset)
 
     def _set(self, slope: float, offset: float) -> None:

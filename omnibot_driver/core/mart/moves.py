@@ -50,20 +50,20 @@ class Moves(Asking):
         self.jobs.moved(reply, now)
         self._rest(now)
         if isinstance(reply, Fail):
+            discarded = ""
             if self._move is not None:
                 self._move.given_up = True
-            self._notice(
-                f"controlled move ended: {reply.reason or 'fail'}; the goal is discarded; clear the"
-                " cause, then send it again",
-                halt=True,
-            )
+                discarded = (
+                    "; the goal of cmd_pose is discarded: remove the cause, then send it again"
+                )
+            self._notice(f"controlled move failed: {reply.reason or 'fail'}{discarded}", halt=True)
             if reply.reason == words.IMU_LOST:
                 self.imu.lost()
 
     def _doubt_a_copy(self, now: float) -> None:
         """Add uncertainty if the server may have run the last controlled move twice.
 
-        The encoder count then begins anew, and covers the second run alone.
+        The encoder count then begins anew, and covers only the second run.
         """
         move, self._last_move = self._last_move, None
         if move is None or not self.conversation.disturbed(now):

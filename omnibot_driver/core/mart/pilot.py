@@ -31,11 +31,14 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 STOPS_S: Final = 1.0
 """Time in s within which a stop is usually answered."""
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
-"""Time in s from the first reply after an absence to the first VOLTS; the first start knows it."""
+"""Time in s from the first reply after an absence to the first VOLTS.
+
+It is shorter than STARTS_UP_S, so that the first motion uses the measured voltage.
+"""
 VOLTS_S: Final = 10.0
 """Longest time in s for which VOLTS waits for a network that loses nothing."""
 COPY_S: Final = 0.25
-"""Time in s after a controlled move; if ENC stays unanswered longer, a duplicate may be running."""
+"""If ENC is unanswered for this time in s after a controlled move, a duplicate may be running."""
 BLIND_PART: Final = 0.15
 """Largest unanswered change of motor units while the heading is unknown, as a part of the units.
 
@@ -49,7 +52,9 @@ class Pilot(Measuring):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``; a new command cancels the present job."""
         if wanted is not None:
-            self.jobs.cancel("a command arrived meanwhile; call again when none is active")
+            self.jobs.cancel(
+                "a motion command or a stop arrived; end the commands, then call again"
+            )
         if wanted is not self._wanted:
             self._move = None
             if self._wanted is None or wanted is None or stands(wanted):
@@ -195,10 +200,10 @@ class Pilot(Measuring):
             self._answered(answer, now)
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
-        """Return whether the reply to a stop may be that to an earlier request, or a copy of one.
+        """Return whether a reply after a stop may answer an earlier request, or be a copy.
 
-        A bare ``ok`` may be that of the start or the check. A number, with which a stop of a turn
-        on the spot is answered, may be a count that was asked for before.
+        A bare ``ok`` may answer the start or the check. A number, which is also the reply to a stop
+        of a turn on the spot, may be a count that was requested before the stop.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -208,8 +213,8 @@ class Pilot(Measuring):
     def _named(self, reply: Ok, now: float) -> None:
         if reply.text != "BBB":
             self._once(
-                f"another server answers HELLO with '{reply.text}', not with 'BBB': check `port`;"
-                " motion is refused"
+                f"another server answers HELLO with '{reply.text}' instead of 'BBB'; motion is"
+                " refused; check `port`"
             )
             self.health.stranger = reply.text
             return
@@ -270,7 +275,7 @@ class Pilot(Measuring):
     def _may_ask_volts(self, now: float) -> bool:
         """Return whether the server is certainly complete, as VOLTS crashes one that starts up.
 
-        A server that is absent for less than ABSENT_S shows it by an unanswered request at most.
+        The only possible sign of an absence shorter than ABSENT_S is an unanswered request.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

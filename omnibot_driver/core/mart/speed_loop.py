@@ -50,7 +50,7 @@ A change may come twice where an exchange takes longer than SLOW_TRIP_S (s). The
 larger than is probable, as a wrong guess stays for the complete motion.
 """
 BALANCE_UNITS: Final = 20
-"""Fewest units at which the two motors are compared: below, an error of a line weighs too much."""
+"""Fewest units at which the motors are compared; with less, a line's error has too much effect."""
 
 
 @dataclass(slots=True)
@@ -75,8 +75,8 @@ class SpeedLoop:
     """The controller of both motors' speeds in one motion.
 
     ``settings`` may be replaced; ``volts``: battery voltage as last reported; ``trip_s``: duration
-    of an exchange, by which the times of measurements are uncertain; ``part``: how much the last
-    change has changed the two sides against each other, as a part of their units.
+    of an exchange, by which the times of measurements are uncertain; ``part``: sum of the last
+    changes of both sides, each without sign and as a part of that side's units.
     """
 
     def __init__(self, settings: MartSettings) -> None:

@@ -28,9 +28,9 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""Time in s after which a constant heading is made to change, and the motor units used for that.
+"""Time in s of constant heading after which the driver turns the robot a little; units for that.
 
-The change shows whether the robot drives straight or the IMU is dead.
+A change of the heading then shows that the IMU is alive and the robot has driven straight.
 """
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
@@ -152,8 +152,8 @@ class Starts(Moves):
             return
         self._custom_refused = True
         self._once(
-            "the server cannot turn on the spot at a given speed; its own speeds are faster than"
-            " commanded (`spin_speed`: fixed)"
+            "the server does not set the speed of turns on the spot; they have its own speed SLOW,"
+            " which is faster than most commands, as with `spin_speed`: fixed (reported once)"
         )
 
     def _check(self, now: float) -> Packets:

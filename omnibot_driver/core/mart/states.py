@@ -53,7 +53,7 @@ class State(Enum):
 
     UNKNOWN = "not known: the server may be moving the robot"
     STILL = "still"
-    CHECKING = "still, while the IMU is proved"
+    CHECKING = "still, while the IMU is checked"
     STARTING = "starting"
     DRIVING = "driving by RM"
     REVERSING = "driving by B"

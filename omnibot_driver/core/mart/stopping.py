@@ -6,8 +6,9 @@ The stop command is sent at once, even if another request is pending, and repeat
 answered. The stop may overtake a start that is still on its way. So a reply is accepted only if it
 must answer a stop that was sent when no duplicate of the start could come any more. A bare ``ok``
 is accepted only if it cannot be the reply to the start; else the stop is repeated. The stop port is
-the last resort, and is not used right after SM or SRM, as the race could hang a port. This module
-knows commands, replies and times; it does not know why the robot is stopped.
+the last resort. It is not used right after SM or SRM, because both commands would run at the same
+time and could hang a port. This module knows commands, replies and times; it does not know why the
+robot is stopped.
 """
 
 import math

@@ -123,7 +123,7 @@ class Stops(Ground, ABC):
             odometry.wheel.told_s - self._begun_s > NO_START_S
             and sum(map(abs, odometry.speeds.means)) < 1e-3
         ):
-            return "the robot is driven and does not move"
+            return "the robot is commanded to move and does not move"
         longest_s = FROZEN_S + 2 * self.conversation.trip_s
         if self._heading_is_told and self._frozen_s > longest_s:
             return "the relative heading does not change: the IMU is dead"
@@ -252,8 +252,8 @@ class Stops(Ground, ABC):
         self.lost += 1
         why = why or f"the server does not answer the stop of {NAMES[self.motion]}"
         self._notice(
-            f"lost: {why}; motion is refused; cut the motor power if the robot moves, then restart"
-            " the server",
+            f"server lost: {why}; motion is refused; cut the motor power if the robot moves, then"
+            " restart the server",
             halt=True,
         )
 
@@ -283,15 +283,15 @@ class Stops(Ground, ABC):
             self.imu.lost()
             self._notice(self.health.refusal, halt=True)
         else:
-            self._notice(f"the controller reports: {reply.reason or 'fail'}", halt=True)
+            self._notice(self._obstacle(reply, motion), halt=True)
 
     def _block(self, motion: Motion, why: str) -> None:
-        """Refuse this direction until another one is wanted or the command has ended."""
+        """Refuse this direction until the command has ended or is zero."""
         if self._blocked is not motion:
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"
             self._notice(
-                f"obstacle {where} ({why}); this direction is refused until another command",
+                f"obstacle {where} ({why}); this direction is refused until the command ends",
                 halt=False,
             )
 

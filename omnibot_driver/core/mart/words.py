@@ -37,7 +37,7 @@ class Kind(Enum):
     CHANGE = "changes a motion"
     MOVE = "starts a controlled move, and answers when it is over"
     HALT = "stops a motion"
-    SERVICE = "takes its time while the robot stands"
+    SERVICE = "takes some time, while the robot is at rest"
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,11 +172,11 @@ KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if 
 
 NEVER_SAID: Final = {
     "F": "RM drives forward as well, and can turn",
-    "SDR": "no move without a distance is ever started",
+    "SDR": "the driver never starts a move without a distance",
     "TFSFC": "undocumented; changes the clearance that stops the robot",
     "MCS": "undocumented; no check for obstacles, and no heading",
     "MSM": "undocumented; stops MCS",
-    "MNLV": "undocumented; a calibrated speed that the encoder tells better",
+    "MNLV": "undocumented; a calibrated speed, which the encoder measures better",
     "MD": "undocumented; a distance computed from time",
     "MCF": "undocumented; like TF, without the check of the clearance",
     "MCB": "undocumented; like TB",
@@ -187,8 +187,8 @@ NEVER_SAID: Final = {
     "REC START": "undocumented; records the IMU into a file",
     "REC STOP": "undocumented",
     "RST MC": "undocumented",
-    "SFR": "undocumented; ends the server where its number is missing",
-    "SRR": "undocumented; the same",
+    "SFR": "undocumented; without its number it ends the server",
+    "SRR": "undocumented; without its number it ends the server",
     "SSR": "undocumented; stops SFR and SRR",
     "SMCST": "undocumented; a test that moves the motors",
     "STPMCST": "undocumented",

@@ -203,7 +203,7 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
-        """Do nothing after a stall: the board drives only the wheels, which are stopped then."""
+        """Do nothing after a stall: the board has only wheels, which the driver stops itself."""
 
     def due(self, now: float) -> Packets:
         """Return no packets, because the board sends without polling."""
@@ -217,7 +217,7 @@ class OmniBot:
         """Do nothing: the board does not have a command that resets only its odometry."""
 
     def leave(self) -> None:
-        """Do nothing when the driver ends: ``due`` never returns packets to leave out then."""
+        """Do nothing when the driver ends: ``due`` returns no packets that could be left out."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Return the stream that encodes commands and repeats their frames."""

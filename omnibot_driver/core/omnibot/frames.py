@@ -133,10 +133,10 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
                 return command(mode, *values)
             case PausedFrame(count):
                 if not 0 <= count <= 255:
-                    raise FrameError(f"{frame} does not fit the wire: the count is 0..255")
+                    raise FrameError(f"{frame} cannot be encoded: the count must be 0 to 255")
                 return b"Paused: %d \n" % count
     except (struct.error, OverflowError) as error:
-        raise FrameError(f"{frame} does not fit the wire: {error}") from error
+        raise FrameError(f"{frame} cannot be encoded: {error}") from error
 
 
 def measure(data: bytes | bytearray, at: int) -> int:

@@ -45,7 +45,7 @@ SENT: Final = np.arange(0.0, 1.0, 0.125)
 They decide which ticks are delayed by sending, which changes a response too.
 """
 DISTURBED: Final = 0.02
-"""Overshoot that is allowed beyond the goal for the step that sending disturbs most."""
+"""Extra overshoot allowed for the step that the board's sending of ticks disturbs most."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)

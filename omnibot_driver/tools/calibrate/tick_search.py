@@ -142,7 +142,7 @@ class Search:
         return np.split(off, np.cumsum(self._lengths)[:-1])
 
     def with_marks(self, marks: Marks, values: Column) -> Column:
-        """Fit the places of the marks too, and use them from now on; return the plant's values."""
+        """Fit the marks' positions too, and use them from now on; return the plant's values."""
         self._marks, own = len(marks.steps), len(values)
         self._first_marks = [marks.first(row) for row in self.off(values)]
         values = np.concatenate((values, marks.places))

@@ -266,7 +266,7 @@ def _name_states(axes: Axes, log: Log) -> None:
 
 
 def _stretches(series: Series) -> list[Span]:
-    """Return the spans in which a command was in force."""
+    """Return the spans of time in which a command was active."""
     if not len(series):
         return []
     times_s = series.arrived_s

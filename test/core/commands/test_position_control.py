@@ -171,7 +171,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The robot then rests until a newer goal, converted with the new board frame."""
+    """The robot rests until a newer goal, which is converted with the new board frame."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)

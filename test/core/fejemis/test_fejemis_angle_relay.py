@@ -41,9 +41,9 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """The exceptions are angles to the right with a digit 6: they become less than 10° to the left.
+    """Angles to the right with a digit 6 are exceptions: they become less than 10° to the left.
 
-    These are fewer than a tenth of all angles.
+    Fewer than a tenth of all angles are exceptions.
     """
     across = 0
     for angle_deg in EVERY:
@@ -60,7 +60,7 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """Characters of the checksum and the line end may be lost too; the reader is a lenient one."""
+    """Characters of the checksum and the line end may be lost too; the reader is lenient."""
     text = relayed(angle_deg)
     data = line(text, sums=True)
     for count in (1, 2):

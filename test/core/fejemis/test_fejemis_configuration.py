@@ -124,7 +124,7 @@ def test_what_was_written_and_read_once_is_not_written_again() -> None:
 
 
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
-    """No question becomes a command when it loses one or two characters."""
+    """A query that loses one or two characters does not become a command."""
     bench = nominal(Simulated(firmware=Firmware(sums=False)))
     bench.run(8.0)
     texts = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -147,7 +147,7 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:
-    """One of two boards with different geometries must compute wrong wheel speeds or angles."""
+    """If the geometries of two boards differ, one of them computes wrong speeds or angles."""
     bench = nominal()
     bench.robot.receive(b"confs 0.4 0.5\n", bench.now, FRONT)
     bench.session.closed(bench.now)

@@ -57,7 +57,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """Otherwise a sender that continues would move the robot for 1 s, again and again."""
+    """Without the refusal, repeated commands would move the robot for 1 s, again and again."""
     follower = Follower()
     at = blocked(follower, 0.0)
     assert follower.refusal == UNTIL_IT_MOVES
@@ -96,7 +96,7 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """This firmware does not reverse: it turns the front wheel across instead.
+    """Firmware that clamps the angle turns the front wheel across instead of reversing.
 
     The robot rolls less than 12 cm before the second fault stops it for good.
     """
@@ -108,7 +108,7 @@ def test_a_clamped_reverse_is_stopped(w: float) -> None:
     assert bench.robot.standing
     assert math.hypot(bench.robot.truth.x_m, bench.robot.truth.y_m) < 0.12
     assert any("allow_reverse" in text for text in bench.notices)
-    with pytest.raises(CommandRefused, match="second time within a minute"):
+    with pytest.raises(CommandRefused, match="second time within 60 s"):
         bench.drive(-0.2, w)
     assert bench.ask(Request.START).success
     bench.run(0.5)

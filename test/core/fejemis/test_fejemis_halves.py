@@ -69,7 +69,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
 
 @pytest.mark.parametrize("lost", [(), (DRIVE,), (FRONT,)])
 def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]) -> None:
-    """A board that is really silent is reported when it sends nothing after the stall either."""
+    """A board that is really silent is reported when it still sends nothing after the stall."""
     bench = nominal()
     bench.drive_on()
     bench.now += 3.0
@@ -84,7 +84,7 @@ def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
-    """Until then the robot stands still; it moves again only on a new command."""
+    """The robot stands still until the half sends again; it moves again only on a new command."""
     bench = nominal()
     bench.drive_on()
     before = dict(bench.robot.half(half).subscriptions)
@@ -103,7 +103,7 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """The link then closes both ports, and opens those that are present again."""
+    """The link closes both ports, and opens those that are present again."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -172,7 +172,7 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
-    """When lines begin or cease to have checksums, the robot stops once, then drives as before."""
+    """When lines begin or no longer have checksums, the robot stops once, then drives as before."""
     bench = nominal(Simulated(firmware=Firmware(sums=not begins)))
     bench.drive_on()
     bench.robot.drive.sums = bench.robot.front.sums = begins
@@ -247,7 +247,7 @@ def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_t
 
 
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
-    """Such lines are skipped, and an unknown line is shown in diagnostics."""
+    """Lines of help text are skipped, and an unknown line is shown in diagnostics."""
     bench = nominal()
     bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
     bench.robot.receive(b"help\nxyz\n", bench.now, FRONT)

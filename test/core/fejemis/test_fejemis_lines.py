@@ -135,7 +135,7 @@ def test_every_message_is_understood(text: str) -> None:
 
 @pytest.mark.parametrize("text", DAMAGED)
 def test_what_no_board_says_is_no_message(text: str) -> None:
-    """Such lines have too few fields, implausible numbers or unknown keywords."""
+    """Lines with too few fields, implausible numbers or unknown keywords are rejected."""
     assert parse(text) is None
 
 
@@ -168,7 +168,7 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A cut line also spoils the line that is joined to it, but not the next one."""
+    """A line that lost its end also damages the line that is joined to it, but not later lines."""
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
     assert feed(decoder, good[:9] + good + good) == [Gyro(1.0, 2.0, 3.0)]

@@ -55,7 +55,7 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The driver chooses the digits of its lines to prevent exactly this."""
+    """The driver chooses the digits of its lines so that a loss of two characters is detected."""
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
     assert motions(damaged) == [(0.25, 1.459, 0.0)]
@@ -108,7 +108,7 @@ def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) 
 
 
 def test_what_three_lost_characters_leave() -> None:
-    """Less than 1 % of such losses make another motion; see docs/boards/fejemis.md."""
+    """Less than 1 % of the losses make another motion; see docs/boards/fejemis.md."""
     passed = total = 0
     for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
         for text in (front_line(v, w, FRONT_M), drive_line(v, w)):

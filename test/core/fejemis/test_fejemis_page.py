@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each line of both boards' help has a golden line, and a use or a reason for having none."""
+"""Each command in both boards' help has a golden line, and a use or a reason for having none."""
 
 import math
 import re

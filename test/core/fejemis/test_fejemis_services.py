@@ -66,7 +66,7 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
 
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
-    """Each job is refused then, except loading a configuration, which stops the robot first."""
+    """Only the loading of a configuration is accepted, because it stops the robot first."""
     bench = nominal()
     bench.drive_on()
     if job is not Job.LOAD:

@@ -105,7 +105,7 @@ def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> N
 
 
 def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
-    """Without a current angle the board would compute with an old one, so it is stopped."""
+    """Without a current angle the board would compute with an old one, so the driver stops it."""
     told = steer(BodyTwist(0.3, 0.0, 0.1), ROBOT, None, turning=False)
     assert told.part == 0.0
     assert told.speed_mps > 0.3
@@ -113,7 +113,7 @@ def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
 
 @given(speeds, rates)
 def test_the_steered_wheel_rolls_without_slip(v: float, w: float) -> None:
-    """The velocity at the wheel is along its own direction, forward or backward."""
+    """The front wheel's velocity is along the wheel's own direction, forward or backward."""
     assume(math.hypot(v, w) > 1e-3)
     wheels = SteeredKinematics(0.1, 0.4, 0.5)
     theta = wheels.steering_rad(BodyTwist(v, 0.0, w))

@@ -154,7 +154,10 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """The time of a delayed voltage begins when it is sent; a stop before that discards it."""
+    """The time of a delayed voltage begins when the voltage is sent.
+
+    A stop before that discards it.
+    """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
     machine.due(0.0)
@@ -301,7 +304,7 @@ def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
 
 
 def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
-    """The front board may have restarted in its silence, which its second heartbeat shows."""
+    """The front board may have restarted while it was silent; its second heartbeat shows that."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -345,7 +348,7 @@ def test_the_brush_is_off_as_soon_as_the_driver_begins_to_end() -> None:
 
 
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
-    """One line may be lost, and the driver cannot repeat it after the exit."""
+    """A single line may be lost, and the driver cannot repeat it after the exit."""
     bench = nominal()
     front = [data for channel, data in bench.board.switch_off() if channel == FRONT]
     assert b"".join(front).count(b"brush 0") == 3

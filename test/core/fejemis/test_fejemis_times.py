@@ -129,7 +129,7 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """The times of a restarted board go back; those after the waiting lines only jump ahead."""
+    """A restarted board's time goes back; after lines that waited, the time only jumps ahead."""
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)

@@ -50,7 +50,7 @@ def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -
 
 
 def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
-    """The board sends nothing meanwhile, but its cable is not the reason."""
+    """The board sends nothing during the reset, but its cable is not the reason."""
     bench = running()
     bench.session.request(Request.RESET, "reset", bench.now)
     bench.settle()
@@ -155,7 +155,7 @@ def test_a_parameter_that_is_set_otherwise_replaces_the_bias_and_others_do_not()
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """It covers half the distance in 15 s at rest, and keeps its value while the robot drives."""
+    """The estimate covers half the distance in 15 s at rest, and does not change during motion."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Calibration of the gyro's bias, and motions that must not be taken for a bias."""
+"""Calibration of the gyro's bias, and motions that must not be mistaken for a bias."""
 
 import itertools
 import math

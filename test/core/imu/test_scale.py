@@ -36,7 +36,7 @@ def test_ten_degrees_a_second_are_the_datasheets_counts(
 
 
 def test_two_g_and_250_degrees_a_second_are_the_default() -> None:
-    """The sensor starts with these ranges."""
+    """The sensor's ranges at power-up are 2 g and 250 °/s."""
     assert ImuScale().specific_force((0, 0, 16384))[2] == pytest.approx(9.80665)
     assert ImuScale().angular_velocity((131, 0, 0))[0] == pytest.approx(math.radians(1.0))
 

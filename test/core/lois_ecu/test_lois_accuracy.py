@@ -20,7 +20,7 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @BOTH
 @pytest.mark.parametrize("name", ["straight", "curve"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
-    """This accuracy is promised for wheels of the right size."""
+    """The limits are the accuracy that is promised for wheels of the right size."""
     one = driven(firmware, name)
     assert one.way_m > 5.0
     assert off_m(one) < max(0.02, 0.02 * one.way_m)

@@ -81,7 +81,7 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """A feed-forward that is too much for the motor; ticks do not show it, 0x20 does."""
+    """The feed-forward is too large for the motor; ticks do not show that, but report 0x20 does."""
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
     assert one.way_m > 11.0

@@ -13,7 +13,7 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 
 @pytest.mark.parametrize("lost", [0.0, 0.067], ids=["goes on", "stands while it sends"])
 def test_a_read_that_is_late_is_told(lost: float) -> None:
-    """Every 0.2 s the board sends eleven lines of 1.2 ms; its clock may stop meanwhile."""
+    """Every 0.2 s the board sends eleven lines of 1.2 ms; its clock may stop while it sends."""
     board = BoardTime()
     found = []
     for step in range(60):
@@ -27,7 +27,7 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """Dates stay in order even if the delay of the first group is implausible (over 0.25 s)."""
+    """The times of groups stay in order even if the first delay is implausible (over 0.25 s)."""
     board = BoardTime()
     taken_s = []
     for step in range(60):

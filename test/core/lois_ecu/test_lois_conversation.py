@@ -100,9 +100,9 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """Value 4 of command 0x11 selects this, and overwrites the left short correction.
+    """Value 4 of command 0x11 selects lines without checksum.
 
-    The driver then restores that correction.
+    It overwrites the left short correction, which the driver then restores.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     for _ in range(140):
@@ -150,7 +150,10 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """This is why RPM 0/0 precedes the first set-points after a Stop; here without feed-forward."""
+    """For this reason RPM 0/0 precedes the set-points after a Stop.
+
+    The test is without feed-forward.
+    """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
     rig.order(-30, -30, 4.0)

@@ -136,7 +136,7 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """Only the group that lost the line is discarded; the odometry, or the ticks, survive."""
+    """Only the group that lost the line is discarded, not the other one (odometry or ticks)."""
     decoder = LoisDecoder()
     found: list[Report] = []
     sent: list[bytes] = []
@@ -190,7 +190,7 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """A single leap is an error; two groups that fit each other are a restart, which costs one."""
+    """A single jump is an error; two groups that agree show a restart, and one is discarded."""
     decoder = LoisDecoder()
     said = [
         Ticks(400, 1000, 1001),
@@ -220,7 +220,7 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """It is out of range or of an unknown kind, so it gives no report in spite of its checksum."""
+    """A line out of range or of unknown kind gives no report in spite of its correct checksum."""
     total = 0
     for character in line[:11]:
         total ^= character

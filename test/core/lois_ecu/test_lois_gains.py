@@ -46,5 +46,5 @@ def test_gains_that_are_set_need_no_words() -> None:
 
 
 def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
-    """Commands of duty bypass the speed controllers, so no notice is needed."""
+    """Duty commands bypass the speed controllers, so no notice is needed."""
     assert told(opened(LoisEcuSettings(drive_mode="duty"))) == []

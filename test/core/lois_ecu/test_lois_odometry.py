@@ -37,7 +37,7 @@ def settled(firmware: Firmware) -> Rig:
 
 
 def test_the_boards_own_odometry_would_be_wrong() -> None:
-    """It misses more than 15 % of a straight drive, so it is not passed on as it is."""
+    """The board's odometry misses more than 15 % of a straight drive, so it is not passed on."""
     rig = settled("firmware")
     rig.order(20, 20, 8.0)
     board = rig.board.odometry.pose
@@ -107,7 +107,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The displacements add up to the way, and each step stays below 1 m/s plus 3 cm."""
+    """The displacements add up to the distance, and each step stays below 1 m/s plus 3 cm."""
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
     rig.order(*STOP, 2.0)
@@ -119,7 +119,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 
 
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
-    """Its counters restart at zero, which is not motion; rolling out adds at most 5 cm."""
+    """The counters restart at zero, which is not motion; rolling out adds at most 5 cm."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
     for step in range(1, 11):
@@ -161,7 +161,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
-    """The way until then is not scaled again."""
+    """The distance until then is not scaled again."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -219,7 +219,7 @@ def test_a_velocity_that_is_no_number_is_no_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """The estimate is poor, and its standard deviation exceeds 20 % of the way."""
+    """The estimate is poor, and its standard deviation exceeds 20 % of the distance."""
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
     found: list[FusedOdometry] = []

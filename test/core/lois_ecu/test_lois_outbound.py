@@ -83,7 +83,7 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """So set-points are sent 18 ms apart, since the board may be deaf for 13 ms at once."""
+    """The driver sends set-points 18 ms apart, since the board may be deaf for 13 ms at once."""
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
     assert heard(joined, with_sum=True, lenient=False) == [(2, 17 << 16)]

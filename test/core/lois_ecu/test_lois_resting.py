@@ -25,7 +25,7 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """This wheel falls from 41 to 20 RPM within 0.4 s, and then its ticks end."""
+    """The tested wheel falls from 41 to 20 RPM within 0.4 s, and then its ticks end."""
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
     assert 0.0 < told(43, 41, 29, 20, 20, 20).chance < 1.0
@@ -33,17 +33,17 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
-    """Such wheels overshoot, and then roll at a steady speed; they hardly ever rest unasked."""
+    """Wheels with other gains overshoot, then roll steadily; they rarely rest without a stop."""
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """This does not depend on the number of repetitions."""
+    """The number of repetitions does not change the result."""
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """The tick after it seems to be early, so the board reports a high speed once."""
+    """The tick after the late one seems to be early, so the board reports a high speed once."""
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 

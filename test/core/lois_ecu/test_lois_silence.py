@@ -55,7 +55,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """Ticks count forward motion during the outage: the error is at most a tenth of the way."""
+    """Ticks count forward motion in the outage: the error is at most a tenth of the distance."""
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)
     assert error_m <= 0.1 * bench.robot.way_m
@@ -63,7 +63,7 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
-    """It grows by the speed at which the robot may still be driving."""
+    """The covariance grows by the speed at which the robot may still be driving."""
     bench = nominal(firmware)
     bench.drive_on(0.3, 4.0)
     bench.speaks = bench.hears = False

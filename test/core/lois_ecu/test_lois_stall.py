@@ -45,7 +45,7 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
 
 
 def test_a_wheel_that_is_to_turn_forward_and_does_not_tick_looks_stalled() -> None:
-    """This is reported every 2 s as long as the wheel stands still."""
+    """The driver reports the stall every 2 s as long as the wheel stands still."""
     assert watched(SetRpm(20, 10), ticks=(3, 0), ways_m=0.1) == [2.0, 4.0, 6.0]
 
 
@@ -55,7 +55,7 @@ def test_wheels_that_tick_do_not() -> None:
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """The public firmware does not count its ticks."""
+    """The public firmware does not count ticks of a wheel that turns backward."""
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
 
@@ -90,13 +90,16 @@ def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> N
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """The controller gives it no power, so it would slow down if it rolled."""
+    """The controller gives the wheel no power, so a wheel that rolled would slow down."""
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """Its power does not end at the set-point. A changing speed beside it still shows a rest."""
+    """With feed-forward, the wheel has power even at its set-point.
+
+    A changing speed of the other wheel still shows a rest.
+    """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)], settings=HOST_GAINS)
@@ -123,7 +126,7 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """The controller gives it power: it starts again by itself."""
+    """The controller gives the wheel power, so the wheel starts again by itself."""
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
 

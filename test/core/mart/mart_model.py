@@ -132,8 +132,8 @@ def steps(world: World, rules: Rules = table) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the ways in which a controlled move ends.
 
-    It took longer than a copy of it can be late. So a copy of it has been lost, or is in the
-    server's queue and begins at once.
+    The move took longer than a copy of its command can be late. So a copy has been lost, or is
+    in the server's queue and begins at once.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -201,7 +201,7 @@ def _asked(world: World) -> Step:
 
 
 def _said(word: str, world: World) -> Iterator[Step]:
-    """Yield the possible fates of a datagram that the driver sends."""
+    """Yield what may happen to a datagram that the driver sends."""
     driver = world.driver
     row = BY_TEXT[word]
     if row in STARTS:
@@ -233,7 +233,7 @@ def _said(word: str, world: World) -> Iterator[Step]:
 
 
 def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
-    """Yield the possible fates of a reply: lost, late or received."""
+    """Yield what may happen to a reply: it is lost, late or received."""
     if reply is None:
         yield what, world
         return

@@ -18,9 +18,9 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 
 
 def trouble(world: World) -> str:
-    """Return what must never be; empty if nothing is wrong.
+    """Return what must never occur; empty if nothing is wrong.
 
-    A dead IMU, or a driver that has given up, excuses all but a crash of the server.
+    With a dead IMU, or a driver that has given up, only a crash of the server is wrong.
     """
     server, driver = world.server, world.driver
     if server.crashed:
@@ -83,7 +83,7 @@ FOUND_MOVING: Final = (
 
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
-    """Search everything that can happen, breadth first, up to the first trouble."""
+    """Search everything that can happen, breadth first, up to the first failure."""
     row = [World(server) for server in FOUND_MOVING]
     came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
     count = 0

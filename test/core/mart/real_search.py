@@ -80,7 +80,7 @@ class Trial(NamedTuple):
 
 
 class Carrier:
-    """A network, in place of the robot's, that does to each datagram what the trial prescribes."""
+    """A network that replaces the robot's, and treats each datagram as the trial prescribes."""
 
     def __init__(self, bench: MartBench, trial: Trial) -> None:
         self.bench, self.robot, self.trial = bench, bench.robot, trial
@@ -148,7 +148,7 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Yield every pair of wishes, with each fate of each datagram."""
+    """Yield every pair of wishes, and for each datagram each fate: lost, late, duplicated."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 

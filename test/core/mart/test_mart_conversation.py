@@ -140,7 +140,7 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 
 
 def test_every_motion_is_stopped_by_its_own_word() -> None:
-    """The running server obeys these alone; the stop port (SL, SS) is for controlled moves."""
+    """Each motion is stopped by its own command alone; the stop port is for controlled moves."""
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
         Motion.NONE: [],
@@ -182,7 +182,10 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """Both are a bare ok, which may come twice; the second stop brings an unambiguous reply."""
+    """Both replies are a bare ok, which may come twice.
+
+    The second stop brings an unambiguous reply.
+    """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
     assert not stop.hear(parse(b"ok"), 10.05)
@@ -191,9 +194,9 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """Both may answer the first stop, which the start may have overtaken.
+    """Both copies may answer the first stop, which the start may have overtaken.
 
-    Such a copy comes at most 0.6 s after that stop was sent.
+    A copy comes at most 0.6 s after that stop was sent.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -204,7 +207,7 @@ def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
 
 
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
-    """It is used after three stops without an answer, and the longest time that they may take."""
+    """The stop port is used after three stops and the longest time that their answers may take."""
     stop = stopping(Motion.REVERSE)
     said = [word for tick in range(60) for word in stop.due(10.0 + 0.1 * tick)]
     before = said.index(words.SL)
@@ -224,7 +227,7 @@ def at(at_s: float, spread_s: float = 0.01) -> Moment:
 
 
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
-    """The distance is continued from the plausible count before it."""
+    """The distance is continued from the last plausible count."""
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
@@ -233,7 +236,7 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 
 
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
-    """Such a count is a late reply, or that of a server that did not receive the start."""
+    """A count from before the motion is a late reply, or the server did not receive the start."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -260,7 +263,7 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """A reported turn of 3° does not fit the wheel, as a late count was taken for the angle."""
+    """A reported turn of 3° contradicts the wheel, as the number was a late count, not an angle."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)

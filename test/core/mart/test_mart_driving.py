@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     volts: float, unequal: float, firmware: Firmware
 ) -> None:
-    """The means over the two seconds after that are compared with the command."""
+    """The means over the two seconds after the start are compared with the command."""
     bench = MartBench(firmware, volts=volts, motor_inequality=unequal).ready()
     for vx, yaw_rate in STEPS:
         if firmware == "documented" and not vx:
@@ -45,7 +45,7 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
 
 @pytest.mark.parametrize("dead_units", [0.0, 2.0, 6.0])
 def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: float) -> None:
-    """The inner wheel turns at 0.01 m/s to 0.02 m/s, by units of which most do not turn it.
+    """The inner wheel turns at 0.01 m/s to 0.02 m/s; most of its units are below the dead zone.
 
     The last curve leads backward, where the heading is unknown.
     """
@@ -84,7 +84,7 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 def test_a_quiet_gyro_on_a_straight_way_is_no_dead_imu(firmware: Firmware) -> None:
     """A heading that does not change for long is a sign of a dead IMU.
 
-    On a straight way without gyro noise it changes only because the driver steers a little.
+    On a straight drive without gyro noise, it changes only because the driver steers a little.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -94,7 +94,7 @@ def test_a_quiet_gyro_on_a_straight_way_is_no_dead_imu(firmware: Firmware) -> No
 
 
 def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
-    """Each has one IMU check, one start and one stop; a turn on the spot also needs SSP."""
+    """Each motion has one IMU check, one start and one stop; a turn on the spot also needs SSP."""
     bench = MartBench().ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.17, 0.0), (0.0, 0.5), (0.3, 0.0)):
         bench.command(vx, yaw_rate, 2.0)
@@ -113,7 +113,10 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """The age is taken from what the server received, on a slow network that loses datagrams."""
+    """The age is computed from the requests that the server received.
+
+    The network is slow and loses datagrams.
+    """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:
         bench.command(vx, yaw_rate, 3.0)

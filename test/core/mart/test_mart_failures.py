@@ -40,7 +40,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 
 
 def test_one_failed_reset_of_the_imu_is_no_dead_imu() -> None:
-    """A failed RST IMU leaves the IMU closed, so it is repeated; the third failure is believed."""
+    """A failed RST IMU leaves the IMU closed, so it is repeated; the third failure is accepted."""
     bench = MartBench("source").ready()
     bench.server.imu.alive = False
     bench.try_command(0.3, 0.0)
@@ -85,9 +85,10 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The frozen heading shows it: half a second, plus the time of a stop.
+    """The constant heading shows the dead IMU within half a second, plus the time of a stop.
 
-    In the public source the heading changes during RM only, so other motions cannot show it there.
+    In the public source the heading changes during RM only, so other motions cannot show it
+    there.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -97,7 +98,7 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     assert bench.robot.stands
     bench.run(6.0)
     assert any("heading does not change" in notice for notice in bench.notices)
-    assert any(notice.startswith("lost: ") for notice in bench.notices)
+    assert any(notice.startswith("server lost: ") for notice in bench.notices)
     assert bench.try_command(0.3, 0.0)
     bench.server.imu.alive = True
     bench.server.restart()
@@ -132,7 +133,10 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 
 @pytest.mark.parametrize("stuck", ["left", "right", "both"])
 def test_a_stuck_motor_is_no_motion_that_goes_on(stuck: str) -> None:
-    """Both motors are off in the end; RM may hang because of it, and then the server is lost."""
+    """Both motors are off in the end.
+
+    RM may hang because of the stuck motor; then the server is lost.
+    """
     bench = MartBench(stuck=stuck).ready()
     bench.command(0.3, 0.0, 8.0)
     bench.run(3.0)
@@ -156,7 +160,10 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
     wanted: tuple[float, float], boot_s: float
 ) -> None:
-    """They would crash it. The robot, whose motors the restart did not stop, is stopped."""
+    """Voltage queries and motions would crash the server.
+
+    The robot, whose motors the restart did not stop, is stopped.
+    """
     for offset_s in (0.0, 0.23, 0.46, 0.71):
         bench = MartBench().ready()
         bench.command(*wanted, 2.0 + offset_s)

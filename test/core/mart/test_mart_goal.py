@@ -16,7 +16,7 @@ from omnibot_driver.core.mart.words import MCR, TB, TF
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """A turn by 1° that turns the robot by 7° would otherwise repeat until the moves run out."""
+    """A turn by 1° that turns the robot by 7° is not repeated until no moves are left."""
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
         goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))

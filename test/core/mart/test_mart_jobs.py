@@ -136,7 +136,7 @@ def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
 
 
 def test_another_server_is_refused_by_its_name() -> None:
-    """It answers HELLO with a name that is not this controller's."""
+    """The other server answers HELLO with a name that is not this controller's."""
     bench = MartBench()
     bench.open()
     bench.run(0.5)

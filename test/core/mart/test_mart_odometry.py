@@ -35,7 +35,7 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
 ) -> None:
     """Two equal motions end with equal counts, and all replies to the second were lost.
 
-    The equal count must not be taken for that of a robot whose start was lost.
+    The equal count must not be read as a sign that the start was lost.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     for _ in range(2):
@@ -118,9 +118,9 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """The unchanged count may also be that of an equal second motion.
+    """The unchanged count may also come from an equal second motion.
 
-    The covariance covers it before the end is counted for certain, and from then on.
+    The covariance includes that motion before the end is counted for certain, and afterwards.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -159,7 +159,7 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 
 
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """It remains unknown if the reply may be that to the second stop.
+    """The result is unknown if the reply may answer the second stop.
 
     The reply to the first stop may then have been lost.
     """
@@ -177,7 +177,7 @@ def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: flo
 
 
 def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
-    """A copy of the count is not taken for the range, and the range is not marked doubtful."""
+    """A copy of the count is not regarded as the range, and the range is not marked doubtful."""
     talk = Conversation(0.3)
     asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
     asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
@@ -189,7 +189,7 @@ def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
 
 
 def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
-    """A robot that has not moved yet, and a motor board without a fault, both report 0."""
+    """Two queries are answered by 0: by a robot that has not moved, and a board without a fault."""
     talk = Conversation(0.3)
     for n in range(3):
         asked(talk, words.MCSTAT, b"ok 0", 1.0 + 0.1 * n, 0.01)
@@ -205,7 +205,7 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """The missing reply may still come, so a query of its form still waits."""
+    """The missing reply may still come, so a query with the same form of reply still waits."""
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
     talk.ask(words.SFC.request(), 1.1)
@@ -217,7 +217,7 @@ def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
 
 
 def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
-    """Both report -1 if nothing is near, so a copy could not be recognised by its value."""
+    """Both sonars report -1 if nothing is near, so a copy could not be recognised by its value."""
     polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
     for tick in range(1000):
         now = tick * 0.01
@@ -230,7 +230,7 @@ def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -
 
 
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
-    """It may be the reply of a sonar; the third doubtful count in a row is believed."""
+    """A doubtful count may be the reply of a sonar; the third one in a row is accepted."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(1167, at(1.0))
     assert odometry.counted(152, at(1.1, doubtful=True)) is None

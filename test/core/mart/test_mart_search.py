@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""No sequence of wishes, losses, copies and delays hangs the server or leaves it moving."""
+"""No sequence of wishes, losses, copies and delays hangs the server or keeps the robot moving."""
 
 from collections.abc import Callable
 from typing import Final
@@ -62,7 +62,7 @@ TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
 
 @pytest.mark.parametrize("trap", TRAPS)
 def test_a_planted_trap_is_found(trap: str) -> None:
-    """A table that allows one command too many must lead to trouble."""
+    """The search must find a failure if a table allows one command too many."""
     more, trouble = TRAPS[trap]
     found = search(lambda *asked: model.table(*asked) or more(*asked))
     assert trouble in found.bad[-1]
@@ -80,7 +80,7 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """If the driver does not ask what moves: SL has ended RM, and SRM then hangs the server."""
+    """A driver that does not ask what moves ends RM by SL, and SRM then hangs the server."""
 
     def sweeps(world: World) -> model.Step:
         return "sweeps", world._replace(driver=model.Driver(State.STOPPING))

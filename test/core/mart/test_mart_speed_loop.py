@@ -54,7 +54,7 @@ def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
 def test_whatever_is_measured_the_units_rise_with_the_speed(
     measured: list[tuple[float, float]],
 ) -> None:
-    """The units also stay positive and below 200."""
+    """The motor units stay positive and below 200, too."""
     line = MotorLine()
     for units, speed in measured:
         line.learn(units, speed)
@@ -75,7 +75,7 @@ def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
 
 
 def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
-    """It stands at 6 units. In a second, it gets enough units to turn."""
+    """The wheel does not turn at 6 units. In a second, it gets enough units to turn."""
     loop, now = SpeedLoop(MartSettings()), 0.0
     loop.begin(4, False, now)
     loop.changed(30, 2, now)

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 def test_a_stop_leaves_the_robot_standing_within_half_a_second(
     firmware: Firmware, motion: tuple[float, float]
 ) -> None:
-    """The time is that from the e-stop to standstill, for each kind of motion."""
+    """The time from the e-stop to standstill is measured for each kind of motion."""
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
     assert not bench.robot.stands
@@ -97,7 +97,7 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """The copy keeps the command port silent, which is its only sign."""
+    """The copy keeps the command port silent; it has no other sign."""
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
     bench.run_until(lambda: b"TF" in bench.server.executed[-1].encode(), 10.0)
@@ -164,7 +164,7 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
-    """It is sent ten times a second, so a motion that another program starts is stopped soon."""
+    """The stop is sent ten times a second, which also stops a motion of another program soon."""
     bench = MartBench(firmware).ready()
     bench.estop(True)
     bench.run(1.0)
@@ -181,7 +181,7 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """Directly after SM or SRM it would race with them, and hang a port."""
+    """Directly after SM or SRM, a stop on the stop port would race with them and hang a port."""
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)
     bench.server.imu.alive = False
@@ -194,7 +194,7 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 
 
 def test_a_restarted_driver_stops_what_it_meets() -> None:
-    """It meets an uncontrolled motion, or a controlled move, which keeps the port silent."""
+    """The server runs an uncontrolled motion, or a controlled move, which keeps the port silent."""
     for begun in (b"RM 30", b"B SLOW", b"L SLOW", b"TF 200", b"MCR 300"):
         bench = MartBench()
         bench.server.receive(begun, 0, None, 0.0)

@@ -167,7 +167,7 @@ def test_what_is_refused_is_counted_and_told() -> None:
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("byte", range(4))
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
-    """This holds for any bit of the heading: the next two poses agree and are accepted."""
+    """Any bit of the heading may be wrong: the next two poses agree and are accepted."""
     start = BoardPose(3000.0, -2000.0, 700.0)
     drive = Drive.__new__(Drive)
     drive.bench = Bench(BoardSettings(running=True, initial_pose=start))

@@ -32,7 +32,7 @@ def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
 
 
 def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
-    """This includes displacements that waited for the first pose."""
+    """Displacements that waited for the first pose have these stamps too."""
     stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
     assert len(bench.odometry) > 30
     assert {estimate.stamp_s for estimate in bench.odometry} <= stamps

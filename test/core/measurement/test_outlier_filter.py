@@ -107,7 +107,7 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 def test_a_knock_of_one_reading_that_is_no_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
-    """Neither its short duration nor a single axis makes it suspicious."""
+    """A knock that is short, or on a single axis, is not suspicious."""
     readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
 
@@ -130,7 +130,7 @@ def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
 def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
-    """The force is not back at once at its old value."""
+    """The force does not return to its old value at once."""
     readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
     through = gate()
     assert list(chain(*admitted(readings, through))) == readings
@@ -164,14 +164,14 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
 
 
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
-    """So the refused motion is not bridged a second time."""
+    """The pose is delivered first, so the rejected motion is not bridged a second time."""
     pose = PoseReading(0.0, 0.0, 0.0)
     came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
     assert came == [[ahead()], [], [replace(pose, lost=1)], [ahead()]]
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """It jumps from 0.25 to 1.5 m/s and back in 80 ms; poses wait with it."""
+    """The displacement jumps from 0.25 to 1.5 m/s and back in 80 ms; poses wait with it."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
@@ -179,7 +179,7 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """Such a jump may be real, whatever its cause."""
+    """A jump that stays may be real, whatever its cause."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
     assert came[3:] == [[], [], [ahead(0.06), pose, ahead(0.05)], [ahead(0.05)]]
@@ -195,14 +195,14 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """The board has restarted, and the duration of its rest is unknown."""
+    """The next displacement says that the board has restarted, and has no known duration."""
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
     assert came[2:] == [[replace(ahead(), duration_s=None, restarted=True)], [ahead()]]
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """It may be as large as the distance that the robot can cover during the pause."""
+    """A displacement may be as large as the distance that the robot can cover during the pause."""
     through = gate()
     through.admit(ahead(), 1.0)
     rolled_out = replace(ahead(0.5), duration_s=None)
@@ -230,7 +230,7 @@ readings = st.one_of(
 
 @given(st.lists(readings, max_size=60))
 def test_what_is_not_refused_comes_out_once_in_order_and_unchanged(given: list[Reading]) -> None:
-    """This holds for each kind separately; only losses, restarts and durations may be moved."""
+    """Readings of each kind keep their order; only losses, restarts and durations may be moved."""
     through = gate()
     came = list(chain(*admitted(given, through)))
     came += [reading for reading, _ in through.release()]
@@ -288,7 +288,7 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 
 
 def test_an_estimate_that_is_put_right_may_leap() -> None:
-    """It is a correction by the board's own odometry, not a bit that changed on the line."""
+    """The jump is a correction by the board's own odometry, not a bit that changed on the line."""
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
@@ -296,7 +296,10 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 
 
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
-    """Such a step is passed on as not measured; only the value that is not finite is rejected."""
+    """A step that no robot can drive is passed on as not measured.
+
+    Only a value that is not finite is rejected.
+    """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]
     came = admitted(list(steps), through)

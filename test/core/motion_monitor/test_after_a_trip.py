@@ -18,7 +18,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """A calibration needs it switched off, since it measures wrong settings."""
+    """A calibration needs the motion monitor switched off, since it measures wrong settings."""
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
     bench.configure(motion_monitor=False)
@@ -30,7 +30,7 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_a_refused_command_says_why() -> None:
-    """It also says what to do."""
+    """The refusal also says what to do."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
@@ -38,7 +38,7 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """A zero command does so once; after the second trip within a minute only ~/start does."""
+    """A zero command ends the refusal once; after the second trip in a minute only ~/start does."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 3.0) == 0
@@ -68,7 +68,7 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_the_e_stop_works_while_motion_is_refused() -> None:
-    """Its release does not end the refusal."""
+    """The release of the e-stop does not end the refusal."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert estop(bench, True) == "e-stop latched"

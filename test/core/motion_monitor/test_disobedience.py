@@ -167,7 +167,7 @@ def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> N
 
 
 def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
-    """Signs that are wrong for commands and displacements alike are not visible in either."""
+    """Signs that are wrong both for commands and for displacements cannot be noticed."""
     bench = started(BoardSettings(running=True, axis_signs=(-1, 1, 1)))
     for _ in range(10):
         bench.drive(0.3)
@@ -177,7 +177,7 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """Otherwise a sender of goals could restart it again and again."""
+    """Without the trip, a node that sends goals could restart the robot again and again."""
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)

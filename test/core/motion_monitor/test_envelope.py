@@ -77,7 +77,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """It has its full weight at first, and none after a second."""
+    """The set-point has its full weight at first, and none after a second."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -102,7 +102,7 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """The same holds for a while after it, and while the robot moves to a goal."""
+    """Nothing is known just after a first set-point either, nor while the robot moves to a goal."""
     history = SetpointHistory()
     assert not history.known(0.0)
     history.add(AT_REST, 10.0)
@@ -123,7 +123,10 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """It grows by 1.2 times the loss, up to the integrator's limit; normal motion reduces it."""
+    """The wind-up grows by 1.2 times the loss, up to the integrator's limit.
+
+    Normal motion reduces it.
+    """
     wind_up = WindUp()
     for _ in range(10):
         wind_up.follow(AT_REST, 0.04, [FORWARD], heading_known=True)
@@ -137,14 +140,14 @@ def test_a_held_robot_winds_up_by_what_it_loses() -> None:
 
 
 def test_a_robot_that_speeds_up_is_not_held() -> None:
-    """It has not reached the set point yet, and rest was commanded a moment ago."""
+    """The robot has not reached the set-point yet, and rest was commanded a moment ago."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
     assert wind_up.way_m == 0.0
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """The robot may have turned round within it; a second one confirms both."""
+    """The robot may have turned round during the displacement; a second one confirms both."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
     assert wind_up.way_m == 0.0
@@ -156,7 +159,7 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """It is subtracted until the wind-up is zero."""
+    """Motion that was made good is subtracted until the wind-up is zero."""
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)
     assert wind_up.pay(0.5, 0.0, 0.1)

@@ -66,7 +66,7 @@ DISOBEYING = {
 def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
     commanded: Triple, motion: Triple, fault: Fault
 ) -> None:
-    """This holds for a robot that never obeyed, and for one that obeyed for a while."""
+    """The robot may never have obeyed, or have obeyed for a while."""
     for obeyed_s in (0.0, 2.0):
         drive = Drive()
         drive.command(*commanded)
@@ -122,7 +122,7 @@ def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: 
 
 @given(motions=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=2, max_size=2))
 def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -> None:
-    """This holds for any size of the displacements."""
+    """The displacements may have any size."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -173,7 +173,7 @@ def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None
 
 
 def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
-    """The board itself chooses the way."""
+    """The board itself chooses how to drive to the goal."""
     drive = Drive()
     drive.monitor.set_point(None, drive.now)
     assert drive.move((-1.5, 0.0, 3.0), 5.0) == []
@@ -218,7 +218,7 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """The board does not receive just now, but may do so again."""
+    """The board does not receive at present, but may receive again."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -231,7 +231,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_no_second_fault() -> None:
-    """Its motion until Stop can have arrived is not a fault either."""
+    """The motion before Stop can have arrived is not a fault either."""
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)
     assert first(drive.move((-0.3, 0.0, 0.0), 0.2))[1] is Fault.WRONG_WAY
@@ -253,7 +253,7 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """After that, the same fault is reported again."""
+    """When the robot has obeyed, the same fault is reported again."""
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
     assert not drive.monitor.is_news(Fault.BLOCKED)

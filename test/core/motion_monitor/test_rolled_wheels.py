@@ -85,7 +85,7 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """They are right within a few degrees.
+    """The angles are right within a few degrees.
 
     After seconds of curves only the shortest way is known.
     """
@@ -119,7 +119,7 @@ def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_boar
 
 
 def test_what_took_an_unknown_time_has_no_rate() -> None:
-    """This is the first displacement after a pause; its way is still added."""
+    """The first displacement after a pause has no rate; its distance is still added."""
     odometry = Odometry(OdometrySettings())
     (estimate,) = odometry.displace(DisplacementReading(0.1, 0.0, 0.0, "body", None, 0), 1.0)
     assert estimate.rolling is None

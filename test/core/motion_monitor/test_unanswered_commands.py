@@ -34,7 +34,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     held_s: float, gains: WheelGains
 ) -> None:
-    """Its wheel controllers have wound up, and Stop would not unwind them."""
+    """The wheel controllers have wound up, and Stop would not unwind them."""
     bench = driving(wheel_gains=gains)
     bench.board.grip()
     for _ in range(round(held_s / PERIOD_S)):
@@ -131,7 +131,7 @@ def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
 def test_the_stops_for_a_robot_that_moves_without_a_command_do_not_hinder_the_next_one(
     bench: Bench,
 ) -> None:
-    """They are harmless, and a command replaces them."""
+    """The repeated stops are harmless, and a command replaces them."""
     bench.hears = False
     bench.run(4.0)
     bench.hears = True

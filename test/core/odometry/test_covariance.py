@@ -41,7 +41,7 @@ def minors(c: Covariance) -> Triple:
 
 @given(st.lists(displacements("body"), max_size=60))
 def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
-    """Neither its determinant nor the variance of yaw shrinks, since slip is not corrected."""
+    """The covariance's determinant and the variance of yaw never shrink: slip is not corrected."""
     odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0, wheel_slip=0.0)))
     before = Covariance()
     for reading in readings:
@@ -119,7 +119,7 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """After 10 m it is ten times that after 1 m; back at the start it is zero."""
+    """The error after 10 m is ten times that after 1 m; back at the start it is zero."""
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))

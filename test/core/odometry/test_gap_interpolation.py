@@ -50,7 +50,7 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 
 
 def test_what_took_an_unknown_time_is_no_side_of_a_gap() -> None:
-    """It may include all motion of a pause; the gap is filled from the displacement after it."""
+    """The displacement may include all motion of a pause; the next one is used to fill the gap."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     assert bridge.tangents(after(0, 0.5, None), None) == (Pose(), Pose(0.5))

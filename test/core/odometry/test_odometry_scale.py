@@ -58,7 +58,7 @@ def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> N
 
 
 def test_the_twist_is_the_true_one() -> None:
-    """A filter that fuses it with a gyro gets consistent inputs."""
+    """A filter that fuses the twist with a gyro gets consistent inputs."""
     on = bench(TRUE)
     on.drive(0.2, 0.1, 0.4)
     on.run(3.0)
@@ -73,7 +73,7 @@ def test_the_twist_is_the_true_one() -> None:
 
 
 def test_what_has_rolled_is_the_true_way() -> None:
-    """The joints' angles are computed from it with the wheels' true radius."""
+    """The joints' angles are computed from the true distance with the wheels' true radius."""
     on = bench(TRUE)
     on.drive(0.2, 0.0, 0.0)
     on.run(3.0)
@@ -84,7 +84,7 @@ def test_what_has_rolled_is_the_true_way() -> None:
 
 
 def test_a_goal_in_odom_is_reached_in_truth() -> None:
-    """The board receives the place at which its own odometry will have it then."""
+    """The board receives the goal as a position in its own odometry."""
     on = bench(TRUE, control="position")
     on.go_to(0.6, -0.4, 0.0)
     on.run(8.0)

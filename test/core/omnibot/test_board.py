@@ -121,7 +121,7 @@ def test_readings_come_in_the_order_of_the_line() -> None:
 
 
 def test_readings_are_finite_but_for_poses() -> None:
-    """They are scaled integers, but a pose consists of floats, which may have any value."""
+    """Readings are scaled integers, but a pose consists of floats, which may have any value."""
     edge = (32767, -32768, -32768)
     found = readings(bot(), ImuFrame(edge, edge), DeltaFrame(*edge, 0))
     assert isinstance(found[0], ImuReading)
@@ -150,7 +150,10 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """SEQ wraps in them, and between the reads three deltas are lost with all around them."""
+    """SEQ wraps within each read.
+
+    Between the reads three deltas are lost, and all frames near them.
+    """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
     board.receive(b"".join(periods[:58]), 10.0)

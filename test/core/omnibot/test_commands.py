@@ -42,7 +42,7 @@ def encoder(**settings: object) -> CommandEncoder:
 def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
     twist: tuple[float, float, float], typed: str
 ) -> None:
-    """These are the vendor's scales, in mode 1."""
+    """The scales are the vendor's, in mode 1."""
     assert bare(encoder().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
 
 
@@ -81,7 +81,7 @@ def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -
 
 @pytest.mark.parametrize("tiny", [0.0, -0.0, 0.005, -0.007, 5e-324])
 def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
-    """This holds for body velocities and for wheel rates."""
+    """Body velocities and wheel rates that are almost zero give the Stop frame."""
     assert encoder().velocity(BodyTwist(tiny, -tiny, tiny / 10)) == STOP
     assert encoder().wheels((tiny, -tiny, tiny)) == STOP
 

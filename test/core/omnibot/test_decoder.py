@@ -127,7 +127,7 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """It waits for one byte, not for one frame."""
+    """The frame waits for one byte, not for one frame."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -204,7 +204,7 @@ def test_one_whole_text_is_enough_to_believe() -> None:
 
 
 def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
-    """They are out of step, and no frame follows them, so both are rejected."""
+    """The two frames are out of step, and no frame follows them, so both are rejected."""
     look_alike = encode(DeltaFrame(1, 2, 3, 4)) + encode(DeltaFrame(5, 6, 7, 8))
     assert decoded([look_alike + b"\x00" + LEAD_IN * 2]) == [REST] * 4
 

@@ -80,7 +80,10 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """Its content and count follow the frame before; only a last byte like a header's must wait."""
+    """The frame's content and count follow the frame before.
+
+    Only a last byte like a header's must wait.
+    """
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
     for number, frame in enumerate(frames, 1):

@@ -203,7 +203,7 @@ def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> N
 
 @EVERY_PERIOD
 def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
-    """Fewer may be lost on the line, so IMU frames alone do not change the mode sooner."""
+    """Fewer deltas may be lost on the line, so IMU frames alone do not change the mode sooner."""
     schedule = Schedule(period_s)
     assert schedule.imus_alone > max(24, 6 * schedule.imus_per_delta)
     assert ModeTracker(schedule).imus_to_come == schedule.imus_alone

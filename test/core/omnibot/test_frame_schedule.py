@@ -37,7 +37,7 @@ def test_damaged_bytes_tell_how_many_imu_frames_they_were(
 
 
 def test_a_damaged_pose_is_no_imu_frame() -> None:
-    """Its length of 15 bytes is close to the 14 bytes of an IMU frame."""
+    """The damaged pose has 15 bytes, which is close to the 14 bytes of an IMU frame."""
     rhythm = nominal(0)
     for _ in range(5):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -58,7 +58,7 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """This holds although deltas came before: 30 IMU frames in a row show the mode."""
+    """Deltas have come before, but 30 IMU frames in a row show the mode."""
     rhythm = nominal(0)
     for _ in range(30):
         rhythm.hear(ImuFrame, 0)

@@ -214,7 +214,7 @@ def moved(lost: int = 0) -> DisplacementReading:
     "bad", [(math.nan, 0.0, 0.0), (1e9, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 1.0)]
 )
 def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None:
-    """It is not finite, out of reach, or a jump that the next pose does not confirm."""
+    """The pose is not finite, out of reach, or a jump that the next pose does not confirm."""
     odometry = attached()
     still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
     for pose in (bad, (0.0, 0.0, 0.0), bad, (0.0, 0.0, 0.0)):
@@ -249,7 +249,7 @@ losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
     pattern: list[tuple[int, int]], seed: int, frame: str
 ) -> None:
-    """No step on the way exceeds 2 m/s."""
+    """No step until then exceeds 2 m/s."""
     on = line(seed, frame=frame)
     fate = iter([lost for come, gone in pattern for lost in [False] * come + [True] * gone])
     on.loses = lambda _data, _now: next(fate, False)

@@ -45,7 +45,7 @@ def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
 @pytest.mark.parametrize(("sent", "read"), [("earth", "body"), ("body", "earth")])
 @pytest.mark.parametrize("period_s", DELTA_PERIODS_S)
 def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: float) -> None:
-    """It is noticed as soon as the robot has turned and drives, at any rate of deltas."""
+    """The warning comes as soon as the robot has turned and drives, at any rate of deltas."""
     turned = BoardPose(0.0, 0.0, 1500.0)
     board = BoardSettings(running=True, frame=sent, initial_pose=turned, delta_period_s=period_s)
     told = advice(board, OmniBotSettings(delta_frame=read, delta_period_s=period_s))

@@ -34,7 +34,7 @@ def tracker(mode: Mode) -> ModeTracker:
 
 
 def test_the_public_names_are_those_of_the_interface() -> None:
-    """They are the values of ~/state."""
+    """The names are the values of ~/state."""
     assert {mode.value for mode in Mode} == {"connecting", "paused", "nominal", "imu_only"}
     assert {mode for mode in Mode if mode.running} == {Mode.NOMINAL, Mode.IMU_ONLY}
 
@@ -77,7 +77,7 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """It does not change sooner, as five missing deltas may be chance, but six may not."""
+    """The mode does not change sooner, as five missing deltas may be chance, but six may not."""
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
         made.hear(DELTA)
@@ -101,7 +101,7 @@ def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_r_makes_the_mode_unknown(mode: Mode) -> None:
-    """It stays unknown until data arrives after the reboot."""
+    """The mode stays unknown until data arrives after the reboot."""
     made = tracker(mode)
     made.apply(Happening.SENT_RESET)
     assert made.mode is Mode.UNKNOWN

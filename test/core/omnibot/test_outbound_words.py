@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Zeros before frames to the board, and payload words that it could take for commands."""
+"""Zeros before frames to the board, and payload words that could act as commands."""
 
 import re
 
@@ -75,7 +75,7 @@ def test_words_that_would_act_take_the_nearest_value_that_does_not(
 
 
 def test_everything_goes_out_behind_zeros() -> None:
-    """They complete a frame that was cut, and wake a board that has booted."""
+    """The zeros complete a frame that was cut, and wake a board that has booted."""
     board = OmniBot(OmniBotSettings())
     zeros = "00 00 00 00 00 00 00 00 "
     stop = zeros + "ff fe 02 00 00 00 00 00 00"
@@ -107,7 +107,7 @@ def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
 @example([0.5, -0.5, 1.5])
 @example([0.49999999999999994, 2.5, -2.4999])
 def test_words_are_the_nearest_integers(counts: list[float]) -> None:
-    """They are not truncated towards zero."""
+    """Values are not truncated towards zero."""
     for word, count in zip(words_of(counts), counts, strict=True):
         assert isinstance(word, int)
         assert abs(word - count) <= 0.5
@@ -115,13 +115,13 @@ def test_words_are_the_nearest_integers(counts: list[float]) -> None:
 
 @given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
 def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
-    """Otherwise a robot would drift."""
+    """With other rounding, a robot would drift."""
     mirrored = words_of([-count for count in counts])
     assert mirrored == tuple(-word for word in words_of(counts))
 
 
 def test_halves_are_rounded_away_from_zero() -> None:
-    """This includes halves above even numbers: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
+    """Halves above even numbers are included: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
     assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
 
 

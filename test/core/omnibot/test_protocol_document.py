@@ -151,12 +151,12 @@ def test_no_line_of_bytes_escapes_the_check() -> None:
 
 
 def test_every_kind_of_frame_and_letter_has_an_example() -> None:
-    """A document that loses its examples fails here."""
+    """The test fails for a document that loses its examples."""
     assert {example.word for example in EXAMPLES} == FRAMES.keys() | SENT_AS_IT_IS.keys()
 
 
 def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
-    """Their bytes are those printed in the manual."""
+    """The bytes are those printed in the manual."""
     shown = {example.remark: example.data.hex(" ").upper() for example in EXAMPLES}
     assert {name: shown.get(name) for name in APPENDIX} == APPENDIX
 

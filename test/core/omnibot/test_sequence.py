@@ -35,7 +35,7 @@ def test_the_next_count_is_no_gap_however_late_it_comes(count: int, late_s: floa
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """Its duration is unknown; a count of 0 after 255 may also be a restart."""
+    """The duration of the pause is unknown; a count of 0 after 255 may also be a restart."""
     sequence = begun(count)
     sequence.pause()
     step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
@@ -108,7 +108,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_no_gap() -> None:
-    """If it were a gap, the gap would be longer than the time since the last delta."""
+    """A gap of this size would be longer than the time since the last delta."""
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -125,7 +125,7 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
 
 
 def test_a_count_that_comes_again_is_no_wrap() -> None:
-    """A false delta came too early; the true one has the same count."""
+    """The first delta is false and came too early; the true one has the same count."""
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)
     assert sequence.delta(10, 100.04, imus=2) == Step(0)
@@ -142,7 +142,7 @@ def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it
 
 
 def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
-    """Its count is near zero, but the next true delta continues the old count."""
+    """The false count is near zero, but the next true delta continues the old count."""
     sequence = begun(88)
     assert sequence.delta(1, 100.02, imus=1).restarted
     assert sequence.delta(89, 100.04, imus=2) == Step(0)

@@ -266,7 +266,7 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
 
 
 def test_what_a_board_does_not_send_has_no_figures() -> None:
-    """Its diagnostics have no IMU status, and no rates and counts of IMU and poses."""
+    """The diagnostics have no IMU status, and no rates and counts of IMU and poses."""
     robot = Robot()
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}
     robot.set(board=BoardFigures(rates_hz=rates_hz))

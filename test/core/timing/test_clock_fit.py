@@ -40,7 +40,7 @@ def test_between_near_bounds_the_middle_is_taken() -> None:
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """The bounds are those of a timer: for 8 s they drift from the truth by 0.1 ms per second."""
+    """The bounds of the timer drift from the true time by 0.1 ms per second for 8 s."""
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
         start = 0.0 if drift[-1] > 0.0 else 0.87e-3

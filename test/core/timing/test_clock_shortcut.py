@@ -52,7 +52,7 @@ def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:
 @pytest.mark.parametrize("loss", [0.0, 0.01])
 @pytest.mark.parametrize("chunker", [ftdi(latency_s=0.001), bursts, singles, crumbs])
 def test_lines_are_stamped_alike(chunker: Chunker, loss: float) -> None:
-    """This holds with and without losses."""
+    """The stamps are equal with and without losses."""
     reads = heard(Board(seconds=12, skew=1e-4, loss=loss), chunker, 1)
     assert stamped(reads, quick=True) == stamped(reads, quick=False)
 
@@ -102,7 +102,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the tests above would compare the slow way with itself."""
+    """If calm lines took the slow way, the tests above would compare the slow way with itself."""
     compared = 0
     compare = DeviceClock._compare
 

@@ -204,7 +204,7 @@ def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
 
 @pytest.mark.parametrize("skew", [*SKEWS, 0.0])
 def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
-    """It is positive if the board's crystal is faster, so that its ticks are shorter."""
+    """The skew is positive if the board's crystal is faster, so that its ticks are shorter."""
     clock = DeviceClock(0.01)
     for tick in range(1000):
         clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew))
@@ -213,7 +213,7 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """Its phase and SEQ are new; the stamps increase and keep the same constant offset."""
+    """Phase and SEQ are new; the stamps increase and keep the same constant offset."""
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
     before = run(Board(seconds=10, skew=skew), adapter, 1, clock=clock)

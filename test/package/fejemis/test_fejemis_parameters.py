@@ -56,19 +56,19 @@ def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
     ],
 )
 def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
-    """A part alone is refused, since the rest would have to be guessed."""
+    """A command with only some of its values is refused: the others would have to be guessed."""
     with pytest.raises(ParameterError, match=f"parameter '{missing}' must be set too"):
         check(**given)
 
 
 def test_a_track_alone_is_refused() -> None:
-    """Two commands contain it, both with other values."""
+    """Two commands contain the track, both with other values."""
     with pytest.raises(ParameterError, match="set 'steering_distance' too"):
         check(track=0.4)
 
 
 def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
-    """This includes a port that is given by another name."""
+    """The second parameter may give the same port by another name."""
     link = tmp_path / "front"
     link.symlink_to("/dev/ttyACM0")
     for front in ("/dev/ttyACM0", str(link)):
@@ -77,12 +77,12 @@ def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
 
 
 def test_ports_are_not_compared_for_a_simulated_pair() -> None:
-    """``front_port`` is not used then."""
+    """A simulated pair does not use ``front_port``."""
     assert check(port="sim://")["front_port"] == "/dev/ttyACM1"
 
 
 @pytest.mark.parametrize("name", ["baudrate", "max_wheel_speed", "axis_signs", "low_pass"])
 def test_what_the_robot_has_no_use_for_is_refused(name: str) -> None:
-    """It belongs to other boards."""
+    """The parameter belongs to other boards."""
     with pytest.raises(ParameterError, match=f"parameter '{name}' belongs to board"):
         check(**{name: 1})

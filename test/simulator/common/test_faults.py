@@ -19,7 +19,7 @@ def bits(value: int) -> int:
 
 
 def test_a_line_without_faults_changes_nothing() -> None:
-    """Its fault counters stay at zero, too."""
+    """The line's fault counters stay at zero, too."""
     line = FaultyLine(LineFaults())
     assert line.carry(SENT) == SENT
     assert (line.lost, line.flipped) == (0, 0)

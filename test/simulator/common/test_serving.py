@@ -111,7 +111,7 @@ def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
 
 
 def test_datagram_channels_stand_on_ports_in_a_row() -> None:
-    """They listen on the loopback address only; the first port can be chosen."""
+    """The ports listen on the loopback address only; the first port can be chosen."""
     sockets = open_sockets(2)
     first, second = (place(one.address) for one in sockets)
     for one in sockets:

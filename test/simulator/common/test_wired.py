@@ -22,7 +22,7 @@ def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
 
 
 def test_each_channel_has_its_own_faults() -> None:
-    """One line loses all bytes, the other none."""
+    """The first line loses all bytes, the other none."""
     cut = FaultyLine(LineFaults(lose=1.0))
     wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
     packets = [packet for _ in range(20) for packet in wired.advance()]
@@ -31,7 +31,7 @@ def test_each_channel_has_its_own_faults() -> None:
 
 
 def test_a_request_is_answered_when_its_move_is_done() -> None:
-    """Other requests are answered meanwhile, and another move is refused."""
+    """During the move, other requests are answered, and another move is refused."""
     wired = WiredBoard(ToyServer())
     wired.receive(b"move 0.02", 5.0)
     wired.receive(b"odo", 5.0)
@@ -60,7 +60,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """Its arrival time continues the clock of the caller, which here began at 1000 s."""
+    """The arrival time continues the clock of the caller, which here began at 1000 s."""
     at: list[float] = []
 
     class Watch(ToyServer):
@@ -75,7 +75,7 @@ def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
 
 
 def test_lines_that_do_not_match_the_channels_are_a_defect() -> None:
-    """One line for two channels, or a line of the wrong kind."""
+    """The refused transports are one line for two channels, and a line of the wrong kind."""
     for lines in ([FaultyLine()], [FaultyLine(), FaultyNetwork()]):
         with pytest.raises(ValueError, match="do not match"):
             WiredBoard(ToyLines(), lines)

@@ -54,7 +54,7 @@ def test_distances_to_a_wall() -> None:
 
 
 def test_the_sonar_measures_when_it_is_triggered() -> None:
-    """``hcsr`` triggers it; before that, it repeats the last distance."""
+    """``hcsr`` triggers the sonar; before that, the sonar repeats the last distance."""
     rig = Rig(front_m=2.0).booted()
     rig.drive("rc 2 0.5 0", 2.0)
     assert rig.ask(DRIVE, "sr04i") == ["sr04 2.000"]
@@ -88,7 +88,7 @@ def test_the_accelerometer_is_calibrated_as_level() -> None:
 
 
 def test_the_yaw_of_the_imu_follows_the_robot() -> None:
-    """The gyro has no bias here; one that is not calibrated would add to the yaw."""
+    """The gyro of this test has no bias; a bias that is not calibrated would add to the yaw."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 0.0)).booted()
     rig.drive("rc 2 0.3 20", 4.0)
     yaw = float(rig.ask(DRIVE, "imuposei")[0].split()[3])
@@ -99,7 +99,7 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """Both load a configuration without offset, so the yaw grows by the gyro's bias again."""
+    """``eer`` and ``setid 0`` load a configuration without offset: the bias turns the yaw."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -120,7 +120,7 @@ def test_the_answer_to_confs_has_the_steering_first() -> None:
 
 
 def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
-    """``eew`` saves it; ``eer`` and a restart load it."""
+    """``eew`` saves the configuration; ``eer`` and a restart load it."""
     rig = Rig().booted()
     rig.say(DRIVE, "confw 0.08 0.081 20 64 0.41")
     rig.run(0.01)
@@ -151,7 +151,7 @@ def test_id_zero_erases_the_configuration() -> None:
 
 
 def test_gains_of_the_steering_count() -> None:
-    """``cssteer`` sets them in the order of ``cpsteer``; a lower gain steers more slowly."""
+    """``cssteer`` sets the gains in the order of ``cpsteer``; a lower gain steers more slowly."""
     times = []
     for gain in (43, 10):
         rig = Rig().booted()

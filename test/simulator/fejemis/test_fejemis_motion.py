@@ -38,7 +38,7 @@ def test_the_body_moves_by_the_equations_of_the_manual(
 
 
 def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
-    """The same equations, on the complete robot, after its front wheel has turned across."""
+    """The complete robot moves by the same equations after its front wheel has turned across."""
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 4.0)
     truth = rig.board.truth
@@ -106,7 +106,7 @@ def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
 
 
 def test_the_steering_follows_a_small_step_at_12_radians_a_second() -> None:
-    """As the manual's controller: 63 % after about 1/12 s, without overshoot."""
+    """The angle reaches 63 % after about 1/12 s, without overshoot, as in the manual."""
     rig = Rig(angle_noise_deg=0.0).booted()
     rig.say(FRONT, "rc 2 1 10")
     wanted = steered_degrees(1.0, radians(10))

@@ -24,7 +24,7 @@ def angle_line(rig: Rig) -> tuple[float, int, int]:
 
 
 def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
-    """Meanwhile rcSource is -1, and commands have no effect."""
+    """Until ``start``, rcSource is -1, and commands have no effect."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.3 0")
     rig.run(0.5)
@@ -72,7 +72,7 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 
 
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
-    """It no longer sends the angle, and the drive half continues with the last one it received."""
+    """The front half no longer sends the angle; the drive half uses the last one it received."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 4")
     rig.drive("rc 2 0.3 20", 1.0)
@@ -86,7 +86,7 @@ def test_front_that_restarts_switches_brush_and_lift_off() -> None:
 
 
 def test_what_is_sent_while_a_half_boots_is_lost() -> None:
-    """The boot takes 0.4 s."""
+    """The half boots for 0.4 s."""
     rig = Rig()
     rig.say(DRIVE, "stop")
     rig.run(1.0)
@@ -96,7 +96,7 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """Meanwhile the other half sends as usual, and the robot still drives."""
+    """The other half sends as usual, and the robot still drives."""
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
     port = DRIVE if half == "drive" else FRONT
@@ -122,7 +122,7 @@ def test_sums_can_begin_and_end_in_each_half() -> None:
 
 
 def test_faults_can_be_planned() -> None:
-    """They occur at their times, in whatever order the options list them."""
+    """Faults occur at their times, in whatever order the options list them."""
     late = Fault(at_s=2.0, half="front", what="well")
     rig = Rig(faults=(late, Fault(at_s=1.0, half="front", what="silent")))
     rig.run(0.99)
@@ -197,7 +197,7 @@ def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
 
 
 def test_the_offset_of_the_sensor_is_configured() -> None:
-    """``fwoffset`` sets it; its second number reverses the sign of the angle."""
+    """``fwoffset`` sets the zero of the angle; its second number reverses the sign."""
     rig = Rig(sensor_zero_deg=7.0, angle_noise_deg=0.0).booted()
     assert angle_line(rig)[0] == 0.0
     rig.say(FRONT, "fwoffset 0 1")
@@ -240,7 +240,7 @@ def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> 
 
 
 def test_options_reach_the_board_by_a_url() -> None:
-    """The names are those of the command line."""
+    """The fault names are those of the command line."""
     url = (
         "sim://?sums=off&reverse=clamped&swapped&ids=90,7&fault=1:front:silent&fault=2:drive:hung"
         "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100"
@@ -256,7 +256,7 @@ def test_options_reach_the_board_by_a_url() -> None:
 
 @pytest.mark.parametrize("wrong", ["fault=5:rear:silent", "fault=5:drive:hall-broken", "ids=a,b"])
 def test_a_wrong_option_is_refused(wrong: str) -> None:
-    """For example a fault of the angle sensor in the drive half, which does not have one."""
+    """An example is a fault of the angle sensor in the drive half, which does not have one."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{wrong}", options.load(MODULE))
 

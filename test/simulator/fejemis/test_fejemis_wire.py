@@ -24,13 +24,13 @@ SUMS = Firmware(sums=True)
     ],
 )
 def test_sums_are_those_of_the_public_hosts(line: str) -> None:
-    """The examples are typed from these hosts."""
+    """The examples are typed from the public host programs."""
     assert wire.checked(line)[0] is wire.Check.GOOD
     assert wire.line(line[3:], sums=True, carriage_return=False) == line.encode() + b"\n"
 
 
 def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
-    """Their layout is that of the manual."""
+    """The layout of heartbeats is that of the manual."""
     rig = Rig()
     rig.run(2.5)
     beats = [(at, text) for at, port, text in rig.lines if text.startswith("hbt") and port == DRIVE]
@@ -61,7 +61,7 @@ def test_a_line_without_a_sum_is_executed_under_protest() -> None:
 
 
 def test_firmware_without_sums_does_not_know_them() -> None:
-    """It treats the line as an unknown command, and its own lines have no checksum."""
+    """The firmware treats the line as an unknown command, and its own lines have no checksum."""
     rig = Rig().booted()
     (answer,) = rig.ask(DRIVE, ";19rc 1 0.5 65")
     assert answer.startswith("# 1.0")
@@ -147,7 +147,7 @@ def test_help_is_a_flood_of_text_that_is_no_comment() -> None:
 
 
 def test_a_line_of_more_than_200_characters_is_cut() -> None:
-    """The rest is read as a new line, in this case a command."""
+    """The rest of a long line is read as a new line, in this case a command."""
     rig = Rig().booted()
     rig.say(DRIVE, "x" * 200 + "stop")
     rig.run(0.01)
@@ -174,7 +174,7 @@ def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: flo
 
 
 def test_lines_end_with_or_without_a_carriage_return() -> None:
-    """This applies in both directions; the manual shows neither."""
+    """The rule applies in both directions; the manual shows neither."""
     rig = Rig().booted()
     rig.board.receive(b"stop\r\n", 0.0, DRIVE)
     rig.run(0.01)
@@ -186,7 +186,7 @@ def test_lines_end_with_or_without_a_carriage_return() -> None:
 
 
 def test_variants_of_messages() -> None:
-    """A time before the wheel speeds, a tilt after the pose, acceleration in g."""
+    """Variants have a time before the wheel speeds, a tilt after the pose, acceleration in g."""
     usual = Rig(accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
     assert len(usual.ask(DRIVE, "veli")[0].split()) == 3
     assert len(usual.ask(DRIVE, "posei")[0].split()) == 5
@@ -217,7 +217,7 @@ def test_the_two_clocks_run_apart() -> None:
 
 
 def test_bytes_to_the_boards_can_be_lost() -> None:
-    """The seed determines which ones."""
+    """The seed determines which bytes are lost."""
     heard = []
     for _ in range(2):
         rig = Rig(firmware=SUMS, lose_inbound=0.05, seed=3).booted()

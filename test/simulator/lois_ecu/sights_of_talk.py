@@ -258,7 +258,7 @@ def lenient_hex(quirks: Quirks) -> bool:
 
 
 def slow_boot(quirks: Quirks) -> bool:
-    """The board is silent for 2 s after power-up, and reads afterwards what arrived meanwhile."""
+    """The board is silent for 2 s after power-up, and then reads what has arrived before."""
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))
     early = rig.run(1.9)

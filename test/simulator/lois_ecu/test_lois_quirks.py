@@ -43,7 +43,7 @@ def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
 
 
 def test_ticks_are_reported_as_they_are() -> None:
-    """The other tests rely on these reports."""
+    """The other tests of this module rely on the reports."""
     rig = Rig().booted()
     rig.drive(20, 20, 3.0)
     assert isinstance(ticks_in(rig.run(0.5))[-1], Ticks)

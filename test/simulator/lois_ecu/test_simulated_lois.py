@@ -76,7 +76,7 @@ def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -
 @pytest.mark.slow
 @BOTH
 def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
-    """Zero RPM and zero duty both stop it within 0.5 s."""
+    """Zero RPM and zero duty both stop the robot within 0.5 s."""
     rig = Rig(quirks).booted()
     for drive in (SetRpm(30, 30), SetRpm(-30, 30), SetDuty(45, 45), SetDuty(-45, 45)):
         for stop in (SetRpm(0, 0), SetDuty(0, 0)):
@@ -91,7 +91,10 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
-    """Its release does not move the robot, but a new set point does, even while it is pressed."""
+    """The button's release does not move the robot.
+
+    A new set-point does, even while the button is pressed.
+    """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 4.0)
     rig.board.press(True)
@@ -182,7 +185,7 @@ def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
 
 @BOTH
 def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
-    """A period of 0xfffe requests it once, and 0xffff turns it off."""
+    """A period of 0xfffe requests the report once, and 0xffff turns it off."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetPeriod(Stream.TICKS, PERIOD_OFF), SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))

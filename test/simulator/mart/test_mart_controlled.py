@@ -37,7 +37,7 @@ def test_tf_24_slow_runs_at_normal_speed() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TF x", "TF SLOW x", "TB 0", "TB NORMAL y", "TF FAST 12"])
 def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
-    """The robot drives until it is stopped."""
+    """The robot drives on until a stop."""
     rig = Rig()
     assert rig.ask(text, 60.0) is None
     assert rig.moving
@@ -66,7 +66,7 @@ def test_a_negative_distance_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TB 0", "MCF 0", "MCB 0", "MCF far"])
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
-    """It depends on the server's quirk; a word counts as zero."""
+    """The result depends on the server's quirk; a word counts as zero."""
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"
     rig = Rig()
@@ -108,7 +108,7 @@ def test_near_an_obstacle_tb_fails_likewise() -> None:
 
 @pytest.mark.parametrize("text", ["TF SLOW NCC 30", "TF DOCK 30"])
 def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
-    """These options switch the clearance check off, so the robot hits the wall."""
+    """The options NCC and DOCK switch the clearance check off, so the robot hits the wall."""
     rig = Rig(front_m=20 * INCH_M)
     assert rig.ask(text, 60.0) == "ok 30"
     assert rig.server.hit_wall
@@ -136,7 +136,7 @@ def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
 
 
 def test_tf_holds_its_course_with_unequal_motors() -> None:
-    """It corrects its heading by the gyro; F does not."""
+    """TF corrects its heading by the gyro; F does not."""
     rig = Rig(motor_inequality=0.05)
     assert rig.ask("TF 80", 60.0) == "ok 80"
     assert abs(rig.yaw_deg) < 4
@@ -156,7 +156,7 @@ def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
 
 @pytest.mark.parametrize(("text", "sign"), [("MCR 90", -1), ("MCL 90", 1), ("MCL SLOW 90", 1)])
 def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
-    """The manual says otherwise of MCL."""
+    """The manual describes MCL differently."""
     rig = Rig()
     assert rig.ask(text) == "ok"
     assert sign * rig.yaw_deg == pytest.approx(93, abs=5)
@@ -171,7 +171,7 @@ def test_mcr_normal_90_parses_as_0() -> None:
 
 
 def test_less_than_10_degrees_are_turned_slowly() -> None:
-    """This also holds at normal speed."""
+    """The same is seen at normal speed."""
     rig, slow = Rig(), Rig()
     rig.ask("MCR 9")
     slow.ask("MCR SLOW 9")

@@ -46,7 +46,7 @@ def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
 
 @pytest.mark.parametrize("change", ["1 1", "-1 -1", "5 -5", "0 1", "40 40"])
 def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(change: str) -> None:
-    """RMCS 0 0 does not stop it."""
+    """RMCS 0 0 does not stop the robot."""
     rig = Rig()
     rig.drive("RM -20")
     assert rig.x_in < -1
@@ -64,7 +64,7 @@ def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(chan
 
 
 def test_rm_200_drives_backward_at_56() -> None:
-    """After the smallest RMCS it drives forward at full speed."""
+    """After the smallest RMCS the robot drives forward at full speed."""
     rig = Rig()
     rig.drive("RM 200")
     assert rig.server.chassis.right == 128 + 56
@@ -83,7 +83,7 @@ def test_rm_1_to_127_drives_forward(speed: int) -> None:
 
 
 def test_a_stuck_motor_can_hang_rm() -> None:
-    """This happens after a fast drive; the motors keep power, and the other wheel turns."""
+    """RM hangs after a fast drive; the motors keep power, and the other wheel turns."""
     rig = Rig()
     rig.drive("RM 110")
     assert rig.ask("SRM") == "ok"
@@ -109,7 +109,7 @@ def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
 
 
 def test_rm_0_is_a_motor_that_does_not_turn() -> None:
-    """So is a speed within the dead zone of the motors."""
+    """A speed within the dead zone of the motors does not turn a motor either."""
     assert Rig().ask("RM 0") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 3") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 5") == "ok"
@@ -137,7 +137,7 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """This also holds in B."""
+    """Order and sign are the same in B."""
     rig = Rig()
     rig.drive(start)
     before = rig.server.chassis.copy()
@@ -152,7 +152,7 @@ def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, ch
 
 
 def test_cs_5_minus_5_turns_left() -> None:
-    """The true heading shows it."""
+    """The true heading shows the turn to the left."""
     rig = Rig()
     rig.drive("F")
     assert rig.ask("CS 5 -5") == "ok"
@@ -180,7 +180,7 @@ def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int
 
 
 def test_rmcs_0_0_just_reads_the_angle() -> None:
-    """It replies as RMRA does."""
+    """RMCS 0 0 replies as RMRA does."""
     rig = Rig()
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -192,7 +192,7 @@ def test_rmcs_0_0_just_reads_the_angle() -> None:
 
 @pytest.mark.parametrize("turn", ["RMCS 4 -4", "RMCS -4 4"])
 def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
-    """It agrees with the true heading within the noise of the gyro."""
+    """The angle agrees with the true heading within the noise of the gyro."""
     rig = Rig(gyro_bias_dps=0.0)
     rig.drive("L")
     rig.ask("SM")
@@ -207,7 +207,7 @@ def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30", "R"])
 def test_rmra_works_at_any_time(start: str) -> None:
-    """It also works before the first motion, and in motions other than RM."""
+    """RMRA also works before the first motion, and in motions other than RM."""
     rig = Rig()
     assert rig.number("RMRA") == 0.0
     rig.drive(start)
@@ -221,7 +221,7 @@ def test_rmra_works_at_any_time(start: str) -> None:
 
 
 def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
-    """It replies in 5 ms."""
+    """ENC replies in 5 ms."""
     rig = Rig(metres_per_count=0.001)
     rig.drive("R")
     spun = rig.number("ENC")
@@ -235,7 +235,7 @@ def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30", "R", "L", "TF 2", "MCR 5", "MCR 0"])
 def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
-    """After the motion it keeps its value."""
+    """The count keeps its value after the motion."""
     rig = Rig()
     rig.drive("F")
     rig.ask("SM")
@@ -248,7 +248,7 @@ def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
 
 @pytest.mark.parametrize(("start", "side"), [("F", "front_m"), ("B", "rear_m")])
 def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str) -> None:
-    """Only the reply to the next SM reports it."""
+    """Only the reply to the next SM reports the obstacle."""
     rig = Rig(**{side: 45 * INCH_M})
     rig.drive(start, 10.0)
     assert not rig.moving
@@ -260,7 +260,7 @@ def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str
 
 
 def test_an_obstacle_ends_rm_and_srm_tells() -> None:
-    """Its reason is spelt differently from that of SM; RMCS fails with it, too."""
+    """The reason is spelt differently from that of SM; RMCS fails with it, too."""
     rig = Rig(front_m=45 * INCH_M)
     rig.drive("RM 30", 10.0)
     assert not rig.moving

@@ -49,7 +49,7 @@ def test_a_file_comes_in_datagrams_of_512_bytes(
 
 
 def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
-    """Decoding them as UTF-8 fails."""
+    """Files cannot be decoded as UTF-8."""
     rig = Rig()
     rig.ask("TF 12")
     content = b"".join(download(rig, "LAST MOVE")[2])
@@ -72,7 +72,7 @@ def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
 
 
 def test_exit_downloads_the_log_if_log_was_given() -> None:
-    """It also ends the server."""
+    """EXIT also ends the server."""
     rig = Rig()
     rig.ask("LOG")
     rig.ask("HELLO")

@@ -10,7 +10,7 @@ LOST = "fail MPU6050 connection lost"
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24", "SB"])
 def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
-    """Later requests are not answered either."""
+    """The server does not answer later requests, either."""
     rig = Rig(imu_dies_s=0.0)
     rig.say(text, "HELLO", "SM")
     rig.stop("SL")
@@ -22,7 +22,7 @@ def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24"])
 def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: str) -> None:
-    """This may happen minutes later."""
+    """The move may start minutes later."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=300.0)
     rig.say(text)
     rig.run(299.0)
@@ -52,7 +52,7 @@ def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
 
 @pytest.mark.parametrize("text", ["RM 30", "R"])
 def test_the_start_timeout_is_dead_without_an_imu(text: str) -> None:
-    """Therefore a stuck motor is not noticed."""
+    """A stuck motor is not noticed without samples of the IMU."""
     rig = Rig(imu_dies_s=0.0, stuck="both")
     assert rig.ask(text) is None
     assert rig.server.chassis.powered
@@ -66,7 +66,7 @@ def test_the_obstacle_check_is_dead_without_an_imu() -> None:
 
 
 def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
-    """Later requests are executed then, too."""
+    """Later requests are executed when the IMU responds again."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
     rig.say("RM 30", "SRM")
     assert rig.run(29.0) == []
@@ -93,7 +93,7 @@ def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() ->
 
 
 def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
-    """Therefore a constant RMRA reveals a dead IMU."""
+    """A constant RMRA during RM thus reveals a dead IMU."""
     for seed in range(8):
         rig = Rig(seed=seed)
         rig.drive("RM 30", 0.0)
@@ -113,7 +113,7 @@ def test_mcr_slow_0_proves_in_half_a_second_whether_it_lives(
 
 
 def test_rst_imu_proves_it_in_0_13_s() -> None:
-    """The server refuses it while the robot moves."""
+    """The server refuses RST IMU while the robot moves."""
     rig = Rig()
     assert rig.ask("RST IMU") == "ok"
     rig.server.imu.alive = False
@@ -126,7 +126,7 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 
 
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
-    """The server does not use it even if it responds again."""
+    """The server does not use a closed IMU even if it responds again."""
     for cure in ("RST IMU", "SB"):
         rig = Rig()
         rig.server.imu.alive = False
@@ -139,7 +139,7 @@ def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -
 
 
 def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
-    """The motors stop then."""
+    """The motors stop when MCR fails."""
     rig = Rig(imu_dies_s=0.0)
     assert rig.ask("MCR 90") == LOST
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -149,7 +149,7 @@ def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
 
 @pytest.mark.parametrize("text", ["TF 200", "TB 200", "MCR 1000", "MCL 1000"])
 def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
-    """Until then the move continues."""
+    """The move continues until it fails."""
     rig = Rig(imu_dies_s=2.0)
     assert rig.ask(text) == LOST
     assert rig.took_s == pytest.approx(3.5, abs=0.05)

@@ -42,7 +42,7 @@ def walk(rig: Rig, seed: int, steps: int) -> None:
 
 @pytest.mark.parametrize("seed", range(15))
 def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -> None:
-    """This holds for both kinds of copies, and for steps of any size."""
+    """Both kinds of copies of the server reply as the original does, for steps of any size."""
     rig = Rig(seed=seed, front_m=3.0, rear_m=3.0)
     walk(rig, seed, 40)
     twins = [rig.server.copy(), copy.deepcopy(rig.server)]
@@ -73,7 +73,7 @@ def test_the_size_of_the_steps_does_not_matter() -> None:
 
 
 def test_it_runs_faster_than_a_hundredth_of_real_time_even_while_it_drives() -> None:
-    """In processor time; an idle computer runs it about 1000 times faster than real time."""
+    """The limit is in processor time; an idle computer is about 1000 times as fast."""
     rig = Rig()
     rig.drive("RM 30")
     began = time.process_time()
@@ -90,7 +90,7 @@ def test_a_robot_that_stands_costs_nothing_as_time_passes() -> None:
 
 
 def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
-    """In both directions, in simulated time."""
+    """Faults occur in both directions, in simulated time."""
 
     def talk(seed: int) -> tuple[list[bytes], list[bytes]]:
         faults = NetworkFaults(lose=0.2, duplicate=0.2, delay_s=0.3)
@@ -165,7 +165,7 @@ def test_it_answers_on_two_udp_ports() -> None:
 
 
 def test_it_answers_in_process() -> None:
-    """A sim:// URL runs it; it can also be rebooted."""
+    """A sim:// URL runs the controller, which can also be rebooted."""
     transport = SimulatedTransport("sim://?volts=25", "omnibot_driver.simulator.mart")
     try:
         transport.write([(0, b"VOLTS")])
@@ -178,7 +178,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """The console and the tests use them."""
+    """The console and the tests use these facts."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

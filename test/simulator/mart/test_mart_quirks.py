@@ -47,7 +47,7 @@ def early_stop_is_ignored(quirks: Quirks) -> bool:
 
 
 def left_spin_in_reference_move(quirks: Quirks) -> bool:
-    """L during RM starts a spin, and the server is silent."""
+    """The command L during RM starts a spin, and the server no longer answers."""
     rig = Rig(quirks)
     rig.drive("RM 30")
     if rig.ask("L") == CONFLICT:
@@ -121,7 +121,7 @@ def crashes_on_missing_numbers(quirks: Quirks) -> bool:
 
 
 def crashes_early(quirks: Quirks) -> bool:
-    """VOLTS ends a server that has just started; later it does not."""
+    """VOLTS ends a server that has just started, but not one that runs for a while."""
     rig = Rig(quirks)
     rig.server.restart(boot_s=0.0)
     early = rig.ask("VOLTS")
@@ -245,7 +245,7 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """It still answers afterwards."""
+    """The server still answers afterwards."""
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":
         rig.drive("F")
@@ -263,7 +263,7 @@ def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """Its reply comes within 1 s of the stop."""
+    """The move's reply comes within 1 s of the stop."""
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):
             rig = Rig(DOCUMENTED)
@@ -283,7 +283,7 @@ def test_the_ports_are_numbered_as_they_stand() -> None:
 
 
 def test_by_the_source_a_probe_of_a_living_imu_turns_the_robot_a_little() -> None:
-    """Each probe turns it by 1 to 2.5 degrees to the right."""
+    """Each probe turns the robot by 1 to 2.5 degrees to the right."""
     rig = Rig(SOURCE)
     for probes in (1, 2, 3):
         assert rig.ask("MCR SLOW 0") == "ok"

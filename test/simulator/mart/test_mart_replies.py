@@ -81,14 +81,14 @@ def test_what_is_not_a_command_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["RMCS 5", "RMCS x"])
 def test_rmcs_with_one_number_is_refused(text: str) -> None:
-    """It is the only command that checks the count of its numbers."""
+    """RMCS is the only command that checks the count of its numbers."""
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask(text) == "fail improper command format"
 
 
 def test_only_49_bytes_are_taken_of_a_request() -> None:
-    """The rest is discarded."""
+    """The bytes after the 49th are discarded."""
     rig = Rig()
     assert rig.ask("TIME 7 4 2024 12 30 0" + " " * 40 + "7") == "ok"
     assert rig.ask("HELLO" + "\0" * 60) == "ok BBB"
@@ -108,7 +108,7 @@ def test_only_49_bytes_are_taken_of_a_request() -> None:
     ],
 )
 def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str | None) -> None:
-    """Afterwards it does not answer, and the motors keep their speed."""
+    """The server no longer answers, and the motors keep their speed."""
     rig = Rig()
     if start:
         rig.drive(start)
@@ -138,7 +138,7 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """It does not know of the motion; a power cycle stops the robot."""
+    """The server does not know of the motion; a power cycle stops the robot."""
     rig = Rig()
     rig.drive("RM 30")
     rig.say("")
@@ -158,14 +158,14 @@ def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
     ("inches", "seen"), [(100.7, 100), (254.5, 254), (255.5, -1), (300, -1), (0.5, -1)]
 )
 def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen: int) -> None:
-    """This holds for both sonars."""
+    """Both sonars are tested."""
     rig = Rig(front_m=inches * INCH_M, rear_m=inches * INCH_M)
     assert rig.number("SFC") == seen
     assert rig.number("SRC") == seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """Therefore its reply takes longer."""
+    """The reply takes longer because of the three measurements."""
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"
     assert rig.took_s == pytest.approx(0.165)
@@ -174,7 +174,7 @@ def test_a_sonar_measures_three_times_what_is_near() -> None:
 
 
 def test_sonars_turn_with_the_robot() -> None:
-    """After half a turn each one measures what the other one did."""
+    """After half a turn each sonar measures what the other one measured before."""
     rig = Rig(front_m=100 * INCH_M, rear_m=40 * INCH_M)
     rig.ask("MCL 174")
     assert rig.yaw_deg == pytest.approx(178, abs=5)
@@ -208,7 +208,7 @@ def test_a_motor_that_tripped_does_not_turn() -> None:
 
 
 def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> None:
-    """It does not obey commands either."""
+    """The motor board does not obey commands either."""
     rig = Rig(motor_board_silent=True)
     assert rig.ask("ENC") == "fail"
     assert rig.took_s == pytest.approx(0.2)
@@ -219,7 +219,7 @@ def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> No
 
 
 def test_an_unknown_reset_repeats_the_previous_reply() -> None:
-    """RST MC is a known one."""
+    """RST MC is one of the known commands."""
     rig = Rig()
     assert rig.ask("RST x") is None
     assert rig.ask("RST MC") == "ok"
@@ -249,14 +249,14 @@ def test_an_unknown_reset_repeats_the_previous_reply() -> None:
     ],
 )
 def test_undocumented_commands_are_known(text: str, answer: str) -> None:
-    """None of them switches the motors on."""
+    """The undocumented commands in this list do not switch the motors on."""
     rig = Rig()
     assert rig.ask(text) == answer
     assert not rig.server.chassis.powered
 
 
 def test_a_record_refuses_motions_until_it_is_stopped() -> None:
-    """REC START begins it, and REC STOP ends it."""
+    """REC START begins a recording, and REC STOP ends it."""
     rig = Rig()
     assert rig.ask("REC START") == "ok"
     assert rig.ask("F") == "fail conflicting action in progress"
@@ -280,7 +280,7 @@ def test_parameters_that_are_set_change_the_next_f_and_r_custom() -> None:
 
 
 def test_a_reply_goes_to_the_sender_of_its_request() -> None:
-    """This holds even if another host has sent a request meanwhile."""
+    """The sender gets the reply even if another host has sent a request meanwhile."""
     rig = Rig()
     rig.server.receive(b"SFC", COMMAND, "one", 0.0)
     rig.server.receive(b"VOLTS", COMMAND, "other", 0.01)

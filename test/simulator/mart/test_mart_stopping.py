@@ -93,7 +93,7 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """It hangs for ever, but the motors do stop."""
+    """The port hangs for ever, but the motors do stop."""
     rig = Rig()
     rig.drive(start)
     rig.stop(stop)
@@ -122,7 +122,7 @@ def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str
 
 
 def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
-    """SM itself is answered."""
+    """The server still answers SM."""
     rig = Rig()
     rig.drive("F")
     rig.say("SM")
@@ -159,7 +159,7 @@ def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
 @pytest.mark.parametrize("start", ["F", "B SLOW", "RM 30"])
 @pytest.mark.parametrize("after_s", [0.001, 0.03, 0.06])
 def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: float) -> None:
-    """SS is ignored, too."""
+    """SS before ok is ignored, too."""
     rig = Rig()
     rig.say(start)
     rig.run(after_s)
@@ -172,7 +172,7 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 
 
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
-    """At first it is ignored; during the bias measurement it ends the move late, as a failure."""
+    """An early stop is ignored; during the bias measurement it ends the move late, as a failure."""
     rig = Rig()
     rig.say("TF 24")
     rig.run(0.03)
@@ -220,7 +220,7 @@ def test_everything_is_refused_during_f_and_r(start: str, text: str) -> None:
 
 
 def test_a_command_port_that_is_busy_executes_later_in_order() -> None:
-    """This holds for requests for values and for motions."""
+    """Requests for values and for motions are executed later."""
     rig = Rig()
     rig.say("TF 12", "VOLTS", "R", "HELLO")
     assert rig.run(1.0) == []
@@ -237,7 +237,7 @@ def test_nothing_stops_by_itself_when_the_host_is_lost() -> None:
 
 
 def test_the_stop_port_is_never_answered() -> None:
-    """This holds for every request to it."""
+    """The server sends no reply to any request there."""
     rig = Rig()
     for text in ("SL", "SS", "SDR 10", "HELLO", ""):
         rig.stop(text)
@@ -261,7 +261,7 @@ def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> N
 
 @pytest.mark.parametrize("start", ["TF 0", "TF 24"])
 def test_sdr_without_a_number_crashes_the_server(start: str) -> None:
-    """It does so in a controlled move only; the motors keep their speed."""
+    """The server crashes in a controlled move only; the motors keep their speed."""
     rig = Rig()
     rig.stop("SDR")
     assert not rig.server.crashed

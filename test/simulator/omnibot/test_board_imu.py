@@ -82,7 +82,7 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
 def test_a_curve_is_felt_as_centripetal_acceleration(
     x: int, y: int, felt_mps2: tuple[float, float]
 ) -> None:
-    """At 0.5 m/s and 1 rad/s it is 0.5 m/s² towards the left of the motion; y is reversed."""
+    """At 0.5 m/s and 1 rad/s the IMU shows 0.5 m/s² to the left of the motion; y is reversed."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(x, y, 500))
     run(board, 2.0)

@@ -31,7 +31,10 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
-    """It sends and obeys nothing before the end of the boot; then it sends a text at once."""
+    """The board sends and obeys nothing before the end of the boot.
+
+    Then it sends a text at once.
+    """
     board = SimulatedBoard(BoardSettings(boot_time_s=0.3))
     board.receive(WAKE_UP + b"S")
     assert run(board, 0.29) == b""

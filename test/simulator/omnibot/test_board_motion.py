@@ -99,7 +99,7 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 
 
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
-    """Only a reset releases it, not a command, pause or start; refused motion is not logged."""
+    """Only a reset releases the stop, no command, pause or start. Refused motion is not logged."""
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))
     run(board, 2.0)
@@ -142,7 +142,7 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """This is why Stop is a frame of mode 2."""
+    """For this reason Stop is a frame of mode 2."""
     board = SimulatedBoard(
         BoardSettings(running=True, control="position", initial_pose=BoardPose(1000.0))
     )

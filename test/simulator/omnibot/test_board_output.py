@@ -33,7 +33,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
-    """In 10 s it sends 1000 IMU frames, 250 deltas and 50 poses, and nothing else."""
+    """In 10 s the board sends 1000 IMU frames, 250 deltas and 50 poses, and nothing else."""
     board = SimulatedBoard(RUNNING)
     data = run(board, 10.0)
     counts = [len(sent(board, header)) for header in (IMU, DELTA, POSE)]
@@ -42,7 +42,7 @@ def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
 
 
 def test_a_board_may_send_its_deltas_at_10_hz() -> None:
-    """The manual's other rate: one delta for ten IMU frames, with the motion of all ten ticks."""
+    """Each ten IMU frames have one delta with the motion of all ten ticks, as in the manual."""
     board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     board.receive(velocity(35, 0, 0))
     run(board, 10.0)
@@ -53,7 +53,7 @@ def test_a_board_may_send_its_deltas_at_10_hz() -> None:
 
 
 def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
-    """In this mode the board obeys the same commands as in nominal mode."""
+    """In IMU-only mode the board obeys the same commands as in nominal mode."""
     board = booted(BoardSettings(imu_only=True))
     board.receive(WAKE_UP + b"S" + velocity(35, 0, 0))
     data = run(board, 2.0)
@@ -72,7 +72,7 @@ def test_within_a_tick_the_order_is_imu_delta_pose() -> None:
 
 
 def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
-    """Its frames, joined in order, are the bytes that ``step`` returned."""
+    """The recorded frames, joined in order, are the bytes that ``step`` returned."""
     board = SimulatedBoard(BoardSettings())
     first = run(board, 1.0)
     board.receive(WAKE_UP + b"S")
@@ -134,7 +134,7 @@ def drive_square(board: SimulatedBoard) -> None:
 
 
 def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
-    """Without slip and scale errors, they agree to 1 mm after 4 m."""
+    """Without slip and scale errors, pose and truth agree to 1 mm after 4 m."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     truth, odometry = board.truth, board.odometry
@@ -158,7 +158,7 @@ def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
 
 
 def test_earth_frame_deltas_add_up_to_the_pose() -> None:
-    """Their sum, without rotation, is the board's pose within half an LSB per delta."""
+    """The sum of deltas, without rotation, is the board's pose within half an LSB per delta."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     run(board, 0.2 - 0.01 * (board.tick % 20))
@@ -201,7 +201,7 @@ def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
 
 
 def test_the_heading_is_sent_unwrapped() -> None:
-    """After more than two turns it exceeds 4 pi, in mrad."""
+    """After more than two turns the heading exceeds 4 pi, in mrad."""
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(-40, -40, -40))
     run(board, 4.0)

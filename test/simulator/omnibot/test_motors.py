@@ -33,7 +33,7 @@ class Wheel:
 
 @pytest.mark.parametrize("target", [12.2, 41.6, 73.4, -41.6])
 def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target: float) -> None:
-    """It reaches 90 % within 0.2 s, overshoots by at most 5 %, and is within 0.5 % after 2 s."""
+    """The speed reaches 90 % in 0.2 s, overshoots by at most 5 %, and is within 0.5 % after 2 s."""
     speeds = [speed / target for speed in Wheel().hold(target, 300)]
     assert speeds[20] > 0.9
     assert max(speeds) < 1.05

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[3]
 def test_a_name_is_found_where_it_was_with_a_warning(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is the same object, and the warning gives the new place."""
+    """The old name gives the same object, and the warning gives the new place."""
     monkeypatch.delitem(vars(simulator), name, raising=False)
     with pytest.warns(DeprecationWarning, match=r"from omnibot_driver\.simulator\.omnibot"):
         assert getattr(simulator, name) is getattr(omnibot, name)

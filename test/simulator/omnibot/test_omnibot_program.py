@@ -56,7 +56,7 @@ def test_the_end_of_the_input_does_not_end_it() -> None:
 
 
 def test_the_options_reach_the_board() -> None:
-    """With ``--running`` and ``--imu-only`` it starts in IMU only mode."""
+    """With ``--running`` and ``--imu-only`` the board starts in IMU-only mode."""
     with simulator("--running", "--imu-only") as process:
         line(process)
         say(process, "truth")

@@ -26,7 +26,7 @@ def read(transport: SimulatedTransport) -> bytes:
 
 
 def test_a_board_boots_and_obeys() -> None:
-    """It sends its paused text, and data frames after it is woken and started."""
+    """The board sends its paused text, and data frames after it is woken and started."""
     with closing(SimulatedTransport("sim://", OMNIBOT)) as transport:
         assert read(transport) == b"Paused: 0 \n"
         transport.write([(0, bytes(8)), (0, b"S")])

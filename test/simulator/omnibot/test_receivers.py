@@ -162,7 +162,10 @@ def test_a_pause_of_less_than_five_milliseconds_is_no_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """It keeps the bytes, so it also finds the header whose first byte it used as a value."""
+    """The receiver keeps the bytes.
+
+    So it also finds the header whose first byte it used as a value.
+    """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
         STOP,
@@ -195,7 +198,7 @@ def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
 
 
 def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None:
-    """It discards the second FF; the payload is then read as letters."""
+    """The receiver discards the second FF; the payload is then read as letters."""
     assert understood("FF FF FE 02 00 20 00 00 00 00", kind=NAIVE) == []
     assert understood("FF FF FE 02 00 52 00 00 00 00", kind=NAIVE) == [RESET]
 

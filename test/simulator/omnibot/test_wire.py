@@ -65,6 +65,6 @@ def test_the_pose_frame_can_be_little_endian() -> None:
 
 
 def test_the_paused_text_is_the_one_of_the_manual() -> None:
-    """It has a space before the line feed."""
+    """The text has a space before the line feed."""
     assert paused_text(0) == b"Paused: 0 \n"
     assert paused_text(255) == b"Paused: 255 \n"

@@ -81,7 +81,7 @@ def test_the_twist_is_the_derivative_of_the_pose() -> None:
 
 
 def test_a_force_moves_the_robot_in_its_direction() -> None:
-    """It acts like motor efforts that command a motion in this direction."""
+    """A force along x or y, or one that turns the robot, moves it in that direction only."""
     for force, moved in (((500.0, 0.0, 0.0), 0), ((0.0, 500.0, 0.0), 1), ((0.0, 0.0, 500.0), 2)):
         world = World(BoardSettings())
         world.force = Force(*force)
@@ -94,7 +94,7 @@ def test_a_force_moves_the_robot_in_its_direction() -> None:
 
 
 def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
-    """It pulls along the floor's x axis."""
+    """The slope pulls along the floor's x axis."""
     world = World(BoardSettings(slope_pwm=500.0))
     world.gripped = Twist(0.0, 0.0, pi / 2)
     for _ in range(100):
@@ -110,7 +110,10 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """The motors have no effect while it is gripped; afterwards they continue from there."""
+    """The motors have no effect while the robot is gripped.
+
+    Afterwards they continue from its place.
+    """
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
     for _ in range(100):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What tests of the driver with a simulated Fejemis do: start it, and drive."""
+"""Helpers of tests of the driver with a simulated Fejemis: they start it, and drive."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -29,14 +29,14 @@ def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Drive
 
 @contextmanager
 def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Commanded ten times a second; begins when it moves."""
+    """Command this motion ten times a second; the context begins when the robot moves."""
     with probe.commanding(vx, yaw):
         robot.wait_until(lambda board: not board.standing)
         yield
 
 
 def moves_again(probe: Probe, robot: TwoPorts) -> None:
-    """By a fresh command."""
+    """Return whether the robot moves again on a fresh command."""
     with driven(probe, robot):
         pass
     robot.stands_for_good()

@@ -27,7 +27,7 @@ Start = Callable[..., Any]
 
 
 def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:
-    """Ahead, then on the spot, then in a curve; commands that cease stop it."""
+    """The robot drives ahead, on the spot and in a curve, and stops when the commands end."""
     odometry = probe.listen(Odometry, "odom")
     joints = probe.listen(JointState, "joint_states")
     with driven(probe, robot):
@@ -52,7 +52,7 @@ def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> 
 def test_its_sensors_are_published(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """In SI units, in the frames of the description."""
+    """The values are in SI units, and their frames are those of the description."""
     robot = robot_of(stack, tmp_path, front_m=1.5)
     probe: Probe = probe_of(started(robot, start_driver))
     heard = {
@@ -94,7 +94,7 @@ def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: 
 
 
 def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe: Probe) -> None:
-    """None comes back by itself."""
+    """Brush, lift and light do not come back by themselves."""
     lift, led = probe.publisher(Float32, "lift_cmd"), probe.publisher(ColorRGBA, "led_cmd")
     led.publish(ColorRGBA(r=1.0, g=0.5, b=0.0, a=1.0))
     robot.wait_until(lambda board: board.front.leds[5] == (255, 128, 0))
@@ -117,7 +117,7 @@ def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe
 
 
 def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) -> None:
-    """Although commands go on: ``stop`` on drive, which shows it in its heartbeat."""
+    """Commands continue, but the drive half gets ``stop`` and shows that in its heartbeat."""
     with driven(probe, robot):
         assert probe.call(SetBool, "estop", data=True).success
         robot.stands_for_good()
@@ -127,7 +127,7 @@ def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) 
 
 
 def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None:
-    """It ends with ``~/pause`` false; an earlier command has no effect."""
+    """The pause ends with ``~/pause`` false; an earlier command has no effect."""
     with driven(probe, robot):
         assert probe.call(SetBool, "pause", data=True).success
         robot.stands_for_good()
@@ -143,7 +143,7 @@ def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     robot: TwoPorts, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """Its own exit, or the guard: the robot stands, brush and lift are off."""
+    """The driver's own exit or the guard stops it: the robot stands, brush and lift are off."""
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
         driver.process.send_signal(number)
@@ -155,7 +155,7 @@ def test_whatever_ends_the_driver_stops_it(
 
 
 def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
-    """Calibrations, and the configuration."""
+    """The jobs are the calibrations, and saving and loading the configuration."""
     for service in ("calibrate_gyro", "calibrate_accelerometer", "save_configuration"):
         answer = probe.call(Trigger, service)
         assert answer.success, (service, answer.message)
@@ -170,7 +170,7 @@ def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
 def test_power_off_is_refused_while_driving(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """At rest both boards lose their power after the delay."""
+    """Both boards of a robot at rest lose their power after the delay."""
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))
     probe.wait_for_state("nominal")
@@ -183,7 +183,7 @@ def test_power_off_is_refused_while_driving(
 
 
 def test_diagnostics_name_the_boards(probe: Probe) -> None:
-    """Version, name and id of each."""
+    """The diagnostics have version, name and id of each half."""
     diagnoses = probe.listen(DiagnosticArray, "/diagnostics")
 
     def told() -> set[str]:

@@ -23,7 +23,10 @@ Start = Callable[..., Any]
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """The other half hears it, and the lost one once it is back; the brush stays off."""
+    """The other half gets the stop, and so does the lost one once it is back.
+
+    The brush stays off.
+    """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
         robot.unplug(channel)
@@ -64,7 +67,7 @@ def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
 def test_a_broken_angle_sensor_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, what: str
 ) -> None:
-    """One sentence says what is wrong with it."""
+    """One sentence says what is wrong with the sensor."""
     with driven(probe, robot):
         robot.do(lambda board: board.befall("front", what))
         robot.stands_for_good()
@@ -76,7 +79,7 @@ def test_a_broken_angle_sensor_stops_the_robot(
 def test_swapped_ports_are_found_out(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """By the ids in the heartbeats; the robot drives as usual."""
+    """The ids in the heartbeats show the swap; the robot drives as usual."""
     robot = robot_of(stack, tmp_path, swapped=True)
     driver = started(robot, start_driver)
     probe: Probe = probe_of(driver)
@@ -88,7 +91,7 @@ def test_swapped_ports_are_found_out(
 def test_it_drives_without_sums(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """Learnt from the heartbeats: the firmware complains of no line once that is done."""
+    """The driver learns the form from heartbeats; from then on the firmware accepts each line."""
     robot = robot_of(stack, tmp_path, firmware=Firmware(sums=False))
     probe: Probe = probe_of(started(robot, start_driver))
     probe.wait_for_state("nominal")
@@ -98,7 +101,7 @@ def test_it_drives_without_sums(
 
 
 def test_the_same_port_twice_ends_the_start(robot: TwoPorts, start_driver: Start) -> None:
-    """In one sentence."""
+    """The driver ends with one sentence that gives the reason."""
     driver: Driver = start_driver(robot.ports[0], board="fejemis", front_port=robot.ports[0])
     driver.wait_for_line("'front_port' must not be .* have a port each")
     assert driver.end() == 2
@@ -116,7 +119,7 @@ def test_a_teensy_of_another_kind_is_named_and_nothing_moves(
     ids: tuple[int, int],
     wrong: str,
 ) -> None:
-    """By its id."""
+    """The notice names the id of the other board."""
     robot = robot_of(stack, tmp_path, ids=ids)
     driver = started(robot, start_driver)
     probe: Probe = probe_of(driver)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""config/fejemis.policy.xml against the node as it really is with this board."""
+"""Comparison of config/fejemis.policy.xml with the running node of this board."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -21,7 +21,7 @@ POLICY: Final = Path(__file__).parents[3] / "config" / "fejemis.policy.xml"
 
 
 def rules() -> dict[str, Rules]:
-    """By the path of the enclave."""
+    """Return the rules by the path of their enclave."""
     enclaves = ElementTree.parse(POLICY).getroot().iter("enclave")
     return {one.attrib["path"]: allowed(next(one.iter("profile"))) for one in enclaves}
 
@@ -49,7 +49,7 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
-    """Navigation drives; it neither sweeps nor lifts."""
+    """Navigation may drive, but may not use brush and lift."""
     every = rules()
     driver = every.pop("/omnibot/driver")
     everywhere = {"/rosout", "/parameter_events", "/clock"}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A recorded wire of both Teensys is heard again, line by line, and says the same."""
+"""A replay of both Teensys' recorded bytes gives the same messages again."""
 
 import signal
 from contextlib import ExitStack
@@ -24,7 +24,7 @@ RAW: Final = [
 
 
 def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
-    """With the same way in odom at its end."""
+    """The replay ends at the same place in odom as the recorded drive."""
     with ExitStack() as stack:
         driver = stack.enter_context(Driver(port="sim://", board="fejemis", publish_raw="true"))
         probe = stack.enter_context(Probe(driver.namespace))

@@ -2,7 +2,7 @@
 
 """A simulated Fejemis on two pseudo-terminals, each of which can be unplugged alone.
 
-Knows descriptors; bytes only as bytes.
+The module knows descriptors and bytes, but not the meaning of the bytes.
 """
 
 import select
@@ -53,35 +53,35 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
             self.unplug(channel)
 
     def plug(self, channel: int) -> None:
-        """A new terminal, hardly of the old name, behind the old link."""
+        """Plug a cable in again: the old link leads to a new terminal, usually of another name."""
         with self._plugging:
             self.heard[channel] = bytearray()
             self._terminals[channel] = Terminal(self.ports[channel])
 
     def unplug(self, channel: int) -> None:
-        """The terminal goes away; the Teensy goes on with its last command."""
+        """Remove the terminal; the Teensy continues with its last command."""
         with self._plugging:
             terminal, self._terminals[channel] = self._terminals[channel], None
             if terminal is not None:
                 terminal.close()
 
     def wait_until(self, predicate: Callable[[SimulatedFejemis], object]) -> None:
-        """It comes to hold in time."""
+        """Wait until the condition holds; fail if it does not hold in time."""
         found = self.wait_for(lambda board: bool(predicate(board)), PATIENCE_S)
         assert found, {**self.facts, "last": self.last()}
 
     def do(self, action: Callable[[SimulatedFejemis], Any]) -> Any:
-        """Between two ticks."""
+        """Call ``action`` with the board between two ticks, and return its result."""
         with self.lock:
             return action(self.board)
 
     def last(self) -> list[list[str]]:
-        """What both halves executed last."""
+        """Return the lines that each half executed last."""
         halves = (self.board.drive, self.board.front)
         return [[obeyed.text for obeyed in list(half.commands)[-12:]] for half in halves]
 
     def stands_for_good(self) -> None:
-        """For a second and a half; then brush and lift are off too."""
+        """Wait until the wheels were at rest for 1.5 s; then brush and lift must be off too."""
         since: list[int] = []
 
         def stood(board: SimulatedFejemis) -> bool:

@@ -44,8 +44,10 @@ GAINS: Final = {
 def test_it_drives_and_odometry_tells_how_far(
     ecu: Ecu, start_driver: Start, probe_of: Start
 ) -> None:
-    """Odometry is within 4 cm after 1 m, and the robot stops when the commands cease. With the
-    board's own gains the robot swerves; other tests measure that in simulated time."""
+    """Odometry is within 4 cm after 1 m, and the robot stops when the commands end.
+
+    With the board's own gains the robot swerves; other tests measure that in simulated time.
+    """
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
     probe.wait_for_state("nominal")
     ecu.wait_for(lambda board: board.wheels[1].controller.gains.kp == pytest.approx(0.470583))

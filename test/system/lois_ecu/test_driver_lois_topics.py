@@ -63,7 +63,7 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 def test_a_fix_of_the_public_firmware_is_none(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """This firmware sends zeros in place of a position."""
+    """The public firmware sends zeros in place of a position."""
     probe: Probe = probe_of(start_driver(ecu_of("firmware", stack).path, board="lois_ecu"))
     fixes = probe.listen(NavSatFix, "fix")
     probe.wait_for(lambda: fixes)

@@ -79,14 +79,14 @@ def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[None]:
-    """Commanded ten times a second; begins when it moves."""
+    """Command this motion ten times a second; the context begins when the robot moves."""
     with probe.commanding(vx, yaw_rate):
         mart.wait_for(lambda board: board.server.chassis.moving)
         yield
 
 
 def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
-    """A metre; commands that cease stop it; battery and sonars are published."""
+    """The robot drives a metre and stops without commands. Battery and sonars are published."""
     odometry = probe.listen(Odometry, "odom")
     batteries = probe.listen(BatteryState, "battery_state")
     ranges = probe.listen(Range, "range/front")
@@ -104,7 +104,7 @@ def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
 
 
 def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
-    """By its own word, and the server answers on."""
+    """Each motion is ended by its own stop command, and the server still answers."""
     for motion in MOTIONS.values():
         with driven(probe, mart, *motion):
             assert probe.call(SetBool, "estop", data=True).success
@@ -118,7 +118,7 @@ def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
 def test_whatever_ends_the_driver_stops_each_motion(
     mart: Mart, driver: Driver, probe: Probe, motion: str, number: signal.Signals
 ) -> None:
-    """Its own exit, or the guard, which has the word of the present motion."""
+    """The driver's own exit stops it, or the guard, which has the motion's stop command."""
     with driven(probe, mart, *MOTIONS[motion]):
         driver.process.send_signal(number)
         mart.stands_for_good()
@@ -128,7 +128,7 @@ def test_whatever_ends_the_driver_stops_each_motion(
 def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
     mart: Mart, driver: Driver, probe: Probe, word: str
 ) -> None:
-    """The command is on its way, or a controlled move is under way."""
+    """The driver is killed while a command is on its way, or while a controlled move runs."""
     if word == "TF":
         goal = PoseStamped()
         goal.header.frame_id = "odom"
@@ -147,7 +147,7 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
 
 
 def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe) -> None:
-    """Half a second without a heartbeat."""
+    """The guard stops the robot after half a second without a heartbeat."""
     with driven(probe, mart, 0.3, 0.0):
         driver.process.send_signal(signal.SIGSTOP)
         mart.stands_for_good()
@@ -156,7 +156,10 @@ def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe
 
 
 def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
-    """Bias, log and downloads; the last ends the server."""
+    """The services measure the bias, start the log and download files.
+
+    The last one ends the server.
+    """
     with driven(probe, mart, 0.3, 0.0):
         pass
     mart.stands_for_good()
@@ -177,7 +180,7 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """An integer will do for a real number; 0.1 m are 3 whole inches."""
+    """An integer is accepted for a real number; 0.1 m are 3 whole inches."""
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
     real = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.1)
@@ -194,6 +197,6 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 
 
 def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """Nothing listens there."""
+    """No server listens at this address."""
     driver = start_driver("udp://127.0.0.1:9", board="mart")
     driver.wait_for_line("no data from the board")

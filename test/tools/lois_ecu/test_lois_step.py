@@ -61,7 +61,7 @@ def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Co
 
 @pytest.mark.parametrize("fast_s", [0.0, 0.1, 0.3])
 def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
-    """This holds for a first order and for two equal time constants too."""
+    """A first order and two equal time constants are tested too."""
     times_s = np.linspace(0.0, 3.0, 3001)
     slope = np.gradient(turned(times_s, 0.3, fast_s), times_s)
     assert slope[1:-1] == pytest.approx(speed(times_s, 0.3, fast_s)[1:-1], abs=2e-3)
