@@ -22,10 +22,10 @@ from omnibot_driver.tools.needs import ToolError
 @pytest.fixture(autouse=True)
 def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (
-        ("JOG_S", 0.8),
+        ("JOG_S", 1.5),
         ("HELD_S", 0.5),
         ("TURN_BY_HAND_S", 2.0),
-        ("SETTLING_S", 0.3),
+        ("SETTLING_S", 0.5),
     ):
         monkeypatch.setattr(commission, name, value)
 

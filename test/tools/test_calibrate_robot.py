@@ -87,6 +87,11 @@ def test_what_happens_on_the_way_ends_it_at_rest(
         "wheels": lambda: wheels.publish(Float32MultiArray(data=[0.0, 0.0, 0.0])),
         "signal": lambda: os.kill(os.getpid(), signal.SIGINT),
     }
+    publishers = [(estop, 1), (other, 2), (wheels, 2)]  # the driver, and the tool but for estop
+    assert robot._wait(
+        lambda: all(each.get_subscription_count() >= count for each, count in publishers),
+        PATIENCE_S,
+    )
     with pytest.raises(ToolError, match=sentence) as caught:
         robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=once(actions[what]))
     assert rigged.port.wait_for(stands, PATIENCE_S)

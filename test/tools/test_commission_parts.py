@@ -245,6 +245,19 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     assert control_method(slow, fast, 0.06) == "position"
 
 
+@pytest.mark.parametrize(
+    ("slow", "fast"),
+    [
+        (steady(0.06), Drift(0.09, 0.0, 0.0, 0.06, 0.12)),  # the second command came late
+        (Drift(0.03, 0.0, 0.0, 0.01, 0.06), steady(0.12)),  # the first command came late
+        (steady(0.06), steady(0.2)),
+    ],
+)
+def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
+    """A robot that becomes faster under one command is not taken for one that drives to a pose."""
+    assert control_method(slow, fast, 0.06) is None
+
+
 @given(angles, st.floats(0.9, 2.0), st.sampled_from([-1, 1]))
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int

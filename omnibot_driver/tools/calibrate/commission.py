@@ -11,11 +11,15 @@ import math
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
+import numpy as np
+
 from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.calibrate.commission_result import Found, result_of
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.meaning import (
+    ControlMethod,
+    Drift,
     control_method,
     deltas_are_understood,
     drift,
@@ -91,16 +95,7 @@ class Walk:
         say = self._console.say
         slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
         say("The mode switch: forward slowly, then twice as fast.")
-        log = self._drive(
-            [(JOG_S, (slow_mps, 0.0, 0.0)), (JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False
-        )
-        began_s = log.commands.stamp_s[0]
-        require_motion(log.odometry)
-        slow, fast = (
-            drift(log.odometry, began_s + after_s + SETTLING_S, began_s + after_s + JOG_S)
-            for after_s in (0.0, JOG_S)
-        )
-        found.control_method = control_method(slow, fast, slow_mps)
+        slow, fast, found.control_method = self._mode_switch(slow_mps)
         if found.control_method == "position":
             say(
                 f"Commanded {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, the robot moved at"
@@ -131,6 +126,29 @@ class Walk:
         found.delta_frame = frame if right else {"earth": "body", "body": "earth"}[frame]
         verdict = "as set" if right else "because a forward drive then shows another direction"
         say(f"Turned by {turned_rad:.2f} rad: the deltas are {found.delta_frame}, {verdict}.")
+
+    def _mode_switch(self, slow_mps: float) -> tuple[Drift, Drift, ControlMethod]:
+        """Return the motions at ``slow_mps`` and at twice that, and what the board controls."""
+        for _ in range(TRIES):
+            log = self._drive(
+                [(JOG_S, (slow_mps, 0.0, 0.0)), (JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False
+            )
+            require_motion(log.odometry)
+            changes = np.flatnonzero(np.diff(log.commands.values[:, 0], prepend=0.0))
+            slow_s, fast_s, end_s = log.commands.stamp_s[changes]
+            slow = drift(log.odometry, slow_s + SETTLING_S, fast_s)
+            fast = drift(log.odometry, fast_s + SETTLING_S, end_s)
+            if method := control_method(slow, fast, slow_mps):
+                return slow, fast, method
+            self._console.say(
+                f"The robot moved at {slow.early_mps:.3f} to {slow.late_mps:.3f} m/s, then at"
+                f" {fast.early_mps:.3f} to {fast.late_mps:.3f}: neither velocity nor positional"
+                " control. Once more."
+            )
+        raise ToolError(
+            f"the robot held no speed in {TRIES} attempts: reduce the load of this computer, check"
+            " that the wheels turn freely, and begin again"
+        )
 
     # Found by looking at the wheels
 

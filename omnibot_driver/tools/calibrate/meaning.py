@@ -20,8 +20,11 @@ ControlMethod = Literal["velocity", "position"]
 STANDS_PART: Final = 0.1
 """Fraction of the commanded speed below which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
-DOUBLED: Final = (1.6, 2.5)
-"""Range of the ratio of speeds when the command is doubled, with friction and rounding."""
+STOPS_PART: Final = 0.5
+"""Fraction of its earlier speed below which the robot is regarded as stopping."""
+DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
+"""Range of the ratio of speeds when the command is doubled, with friction and rounding, and the
+largest ratio of equal speeds."""
 PURE_TURN: Final = 0.5
 """Largest ratio of sideways motion to rim speed in a turn on the spot.
 
@@ -78,22 +81,24 @@ def require_motion(odometry: Odometry) -> None:
         )
 
 
-def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
+def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod | None:
     """Return whether the board controls velocity or position, from the motion at two commands.
 
     ``slow``: the motion with the command for ``slow_mps``; ``fast``: with twice that command. A
     velocity is held, and doubles. In positional control the same command is a place a few
-    millimetres from the origin of the board's frame: the robot drives to that place and stops.
+    millimetres from the origin of the board's frame: the robot drives to that place and stops, or
+    is still on its way at the same speed. Returns None if the motion fits neither, as on a busy
+    computer on which commands arrive late.
     """
-    least_mps = STANDS_PART * slow_mps
-    held = all(
-        min(one.early_mps, one.late_mps) > least_mps
-        and abs(one.late_mps - one.early_mps) < STEADY_PART * one.early_mps
-        for one in (slow, fast)
-    )
-    if held and DOUBLED[0] < fast.speed_mps / slow.speed_mps < DOUBLED[1]:
+    both = slow, fast
+    if any(one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both):
+        return "position"
+    if any(abs(one.late_mps - one.early_mps) >= STEADY_PART * one.early_mps for one in both):
+        return None
+    ratio = fast.speed_mps / slow.speed_mps
+    if DOUBLED[0] < ratio < DOUBLED[1]:
         return "velocity"
-    return "position"
+    return "position" if ratio < UNCHANGED else None
 
 
 def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
