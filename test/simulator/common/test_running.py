@@ -1,0 +1,68 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The thread of a simulated board on a computer that lets it run late."""
+
+import time
+from collections.abc import Iterable
+
+import pytest
+
+from omnibot_driver.simulator.common.board import Channel, Packet
+from omnibot_driver.simulator.common.running import RunningBoard
+
+LATE_S = 0.7
+
+
+class Motor:
+    """A board that is driven until it receives a stop; ``driven`` counts the ticks of that."""
+
+    channels, tick_s = (Channel(),), 0.01
+
+    def __init__(self) -> None:
+        self.driven, self.stopped = 0, False
+
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        self.stopped |= data == b"stop"
+
+    def advance(self) -> list[Packet]:
+        self.driven += not self.stopped
+        return []
+
+    def reboot(self) -> None:
+        """Do nothing: this board never boots."""
+
+    @property
+    def facts(self) -> dict[str, object]:
+        return {}
+
+
+class LateBoard(RunningBoard[Motor]):
+    """Its thread stands still for ``LATE_S`` after a wait; the stop comes in that time."""
+
+    def __init__(self) -> None:
+        super().__init__(Motor())
+        self.now_s, self.calls = 0.0, 0
+
+    def _receive(self, timeout_s: float) -> Iterable[Packet]:
+        self.calls += 1
+        if self.calls == 1:
+            self.now_s += LATE_S
+            return []
+        self.now_s += timeout_s
+        self._stopping.set()
+        return [(0, b"stop")]
+
+    def _send(self, channel: int, data: bytes) -> int:
+        return len(data)
+
+
+def test_what_came_while_the_thread_was_late_precedes_the_ticks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A real board would not have driven on for the time in which its computer was busy."""
+    board = LateBoard()
+    monkeypatch.setattr(time, "monotonic", lambda: board.now_s)
+    board._run()
+    board.check()
+    assert board.board.stopped
+    assert board.board.driven == 0
