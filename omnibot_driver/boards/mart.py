@@ -23,7 +23,6 @@ PARAMETERS: Final = table(
         "Sonars and files": SENSORS,
     },
     without=(
-        "baudrate",
         "axis_signs",
         "odom_wheel_drift",
         "odom_wheel_slip",

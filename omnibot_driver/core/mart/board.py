@@ -36,6 +36,7 @@ TRAITS: Final = Traits(
     own_odometry=True,
     stands_after_s=0.3,
     unproved_s=6.0,
+    baudrate=False,
     stops_within_s=1.0,
     slack_mps=0.15,
     slack_radps=0.6,
