@@ -3,6 +3,7 @@
 """Profiles: each connects a kind of board to the rest of the driver."""
 
 import ast
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -98,6 +99,14 @@ def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> No
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))
     assert ("baudrate" in profile.PARAMETERS.by_name) is board.traits.baudrate
+
+
+@pytest.mark.parametrize("name", boards.PROFILES)
+def test_the_advice_of_a_board_names_its_own_parameters(name: str) -> None:
+    profile = boards.load(name)
+    advice = profile.make(boards.check_all({"board": name})).traits.advice
+    named = {word for text in advice.values() for word in re.findall(r"`(\w+)`", text)}
+    assert named <= profile.PARAMETERS.by_name.keys()
 
 
 FEW = replace(

@@ -21,6 +21,7 @@ from omnibot_driver.core.mart.pilot import Pilot
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import State
 from omnibot_driver.core.mart.stops import SLOWEST_MPS, SLOWEST_RADPS
+from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import NOTHING_MEASURED, Reading
 from omnibot_driver.core.traits import Traits
@@ -40,6 +41,13 @@ TRAITS: Final = Traits(
     stops_within_s=1.0,
     slack_mps=0.15,
     slack_radps=0.6,
+    advice={
+        Fault.WRONG_WAY: "check `encoder_inverted`, and the wiring of motors and encoder",
+        Fault.WRONG_TURN: "check `heading_inverted`, and the wiring of the motors",
+        Fault.TOO_FAST: "check `metres_per_count`",
+        Fault.TURNS_TOO_FAST: "check `track`, `metres_per_count` and `spin_speed`",
+        Fault.BEYOND_LIMITS: "check `metres_per_count` and `track`",
+    },
 )
 UNREAD_S: Final = 0.5
 """Time in s without a reading after which any reply is reported as NOTHING_MEASURED.

@@ -6,6 +6,7 @@ import pytest
 from mart_bench import MartBench
 from mart_campaign import FIRMWARES
 
+from omnibot_driver.core.mart import MartSettings
 from omnibot_driver.simulator.mart import Firmware, Kind
 
 pytestmark = pytest.mark.slow
@@ -189,3 +190,21 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     bench.server.restart()
     bench.command(0.0, 0.5, 6.0)
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("encoder_sign", "settings", "parameter"),
+    [
+        (-1, MartSettings(), "encoder_inverted"),
+        (1, MartSettings(heading_sign=-1), "heading_inverted"),
+        (1, MartSettings(metres_per_count=0.001), "metres_per_count"),
+    ],
+)
+def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
+    encoder_sign: int, settings: MartSettings, parameter: str
+) -> None:
+    """With an inverted heading the robot turns more and more before it is stopped."""
+    bench = MartBench(settings=settings, encoder_sign=encoder_sign, motor_inequality=0.03).ready()
+    bench.command(0.3, 0.0, 6.0)
+    assert bench.robot.stands
+    assert any(f"check `{parameter}`" in notice for notice in bench.notices)
