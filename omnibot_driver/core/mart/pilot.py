@@ -191,6 +191,8 @@ class Pilot(Measuring):
             if isinstance(reply, Ok):
                 self.conversation.heard(reply.form, now)
             if late or self._may_be_count(reply, now):
+                if isinstance(reply, Ok):
+                    self._stopping.doubt(reply)
                 return
             if self._stopping.hear(reply, now):
                 self._stopped(now)

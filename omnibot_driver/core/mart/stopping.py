@@ -65,7 +65,8 @@ class Stopping:
         self._sure_from_s = started_s + delay_s
         self._own_from_s = started_s + 2 * delay_s
         self._unsure_until_s = -math.inf
-        self._owed = owed > 0
+        self._owed = owed
+        self._doubtful: list[Ok] = []
         self._rounds = 0
         self._negative: set[str] = set()
         longest_s = max((word.takes_s for word in HALTS[motion]), default=0.0)
@@ -117,7 +118,8 @@ class Stopping:
                 self.began = True
             elif none and self._rounds == 1:
                 self.began = self.began or False
-        if isinstance(reply, Ok) and self._owed and reply.form is Form.NOTHING:
+        if isinstance(reply, Ok) and self._owed > 0 and reply.form is Form.NOTHING:
+            self.doubt(reply)
             return False
         if isinstance(reply, Ok | Fail) and not none:
             self.result = reply
@@ -126,6 +128,19 @@ class Stopping:
         if none and isinstance(reply, Fail):
             self._negative.add(reply.reason)
         return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
+
+    def doubt(self, reply: Ok) -> None:
+        """Note a reply that may be that to the stop, but also a late one or a copy."""
+        if reply.form in ANSWERS.get(self.motion, ()):
+            self._doubtful.append(reply)
+
+    @property
+    def doubtful_result(self) -> Ok | None:
+        """The reply to the stop if the network delays and duplicates nothing, or None.
+
+        It is one more than the replies that were still to come when the stop began.
+        """
+        return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 
     def _is_answer(self, reply: Reply) -> bool:
         words = HALTS[self.motion]

@@ -187,6 +187,8 @@ class Stops(Ground, ABC):
         if Form.INTEGER in ANSWERS.get(stopping.motion, ()):
             self.conversation.owes(Form.INTEGER, now)
         result, motion = stopping.result, stopping.motion
+        if result is None and motion is not Motion.UNKNOWN and not self.conversation.disturbed(now):
+            result = stopping.doubtful_result  # a repeated stop has found nothing to stop
         if stopping.began:
             self.odometry.wheel.started()
         elif stopping.began is False and not self.conversation.doubles(now):

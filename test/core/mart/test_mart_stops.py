@@ -162,6 +162,28 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
     assert bench.until_it_stands() < 1.0
 
 
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
+    firmware: Firmware,
+) -> None:
+    """The reply to a stop comes so soon after a count or an ``ok`` that it may be a copy.
+
+    The server then knows of no motion to stop, which must not be taken for a restart of the server.
+    """
+    bench = MartBench(firmware, dead_zone_units=2.0).ready()
+    bench.command(0.3, 0.3, 4.0)
+    bench.command(-0.2, 0.0, 4.0)
+    turns = [(0.0, rate) for rate in (0.5, -0.5, 0.3, -0.4, 0.45, -0.45)]
+    reverses = [(-0.2, 0.0), (0.0, 0.5), (-0.1, 0.2), (0.3, 0.0), (-0.15, -0.2), (0.0, -0.5)]
+    for vx, yaw_rate in turns + reverses:
+        bench.command(vx, yaw_rate, 1.5)
+        facts = bench.robot.board.facts
+        assert facts["yaw_rate_radps"] == pytest.approx(yaw_rate, abs=0.1), (vx, yaw_rate)
+        assert facts["speed_mps"] == pytest.approx(vx, abs=0.05), (vx, yaw_rate)
+        bench.command(vx, yaw_rate, 2.0)
+    assert bench.notices == []
+
+
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
     """The stop is sent ten times a second, which also stops a motion of another program soon."""
