@@ -71,6 +71,10 @@ class RelativeHeading:
         self._track.clear()
         self.changed_s = now
 
+    def started(self) -> None:
+        """Note that RM has certainly begun, so that each heading from now on is of this motion."""
+        self._before_rad = 0.0
+
     def tell(self, angle_rad: float, when: Moment, stood_s: float) -> bool:
         """Process a reported heading; return whether it is plausible and has changed.
 

@@ -32,6 +32,8 @@ WAG_S, WAG_UNITS = 0.2, 2
 
 A change of the heading then shows that the IMU is alive and the robot has driven straight.
 """
+CREEP_MPS: Final = 0.01
+"""Measured speed in m/s that shows that a start was not lost on its way."""
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
@@ -57,8 +59,10 @@ class Starts(Moves):
 
     def _adjust(self, now: float) -> Packets:
         """Return the command that corrects the motors' units by the measured speed, if needed."""
-        if self.state is State.DRIVING and not self.odometry.heading.is_known:
-            self._polls.press(words.RMRA)
+        odometry = self.odometry
+        if self.state is State.DRIVING and not odometry.heading.is_known:
+            if abs(odometry.speeds[0]) > CREEP_MPS:
+                odometry.heading.started()
             return NO_PACKETS
         self._fresh = False
         _, twist = self._wish(now)

@@ -158,6 +158,26 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
     assert abs(bench.error.yaw_rad) < 0.05
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.3])
+def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
+    rate: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first sample of RM may lead the heading to its value before RM, by chance.
+
+    It then looks as if RM were lost, until the encoder shows that the robot moves.
+    """
+    bench = MartBench("source", gyro_noise_dps=0.0).ready()
+    bench.command(0.3, 0.4, 3.0)
+    bench.run(2.0)
+    monkeypatch.setattr(bench.server, "zero_heading", lambda: None)
+    yaw_rad = bench.truth.yaw_rad
+    bench.command(0.3, rate, 3.0)
+    assert bench.notices == []
+    assert bench.truth.yaw_rad - yaw_rad == pytest.approx(2.5 * rate, abs=0.1)
+    assert bench.error.way_m < 0.05
+    assert abs(bench.error.yaw_rad) < 0.05
+
+
 def test_a_goal_and_a_job_show_how_far_they_are() -> None:
     """The progress is shown in /diagnostics, under "Goal" and "Job"."""
     bench = MartBench().ready()
