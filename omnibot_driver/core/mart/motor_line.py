@@ -46,6 +46,10 @@ class MotorLine:
         self._oo -= to_offset * to_offset / variance
         self._set(slope, offset)
 
+    def stood(self, units: float) -> None:
+        """Note that the motor does not turn with these units."""
+        self._set(self.slope, min(self.offset, -self.slope * units))
+
     def move(self, slope: float, offset: float) -> None:
         """Change the line by these differences, by which the other motor's line has changed."""
         self._set(self.slope + slope, self.offset + offset)

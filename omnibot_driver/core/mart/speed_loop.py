@@ -33,6 +33,9 @@ SLOWEST_MPS: Final = 0.015
 """Slowest speed of a wheel that certainly turns, in m/s."""
 SLOWEST_START_MPS: Final = 0.03
 """Slowest speed of a wheel for which a motion begins, in m/s, as the server awaits a movement."""
+LEAST_UNITS: Final = 4
+MORE_TIMES: Final = 3
+"""Factor by which the units of a start grow after a start that moved nothing."""
 SLOWEST_TURN_RADPS: Final = 0.05
 """Slowest turn on the spot from which anything is learned, in rad/s."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
@@ -84,6 +87,7 @@ class SpeedLoop:
         self.volts = settings.nominal_volts
         self.trip_s = 0.0
         self._right, self._left = _Side(), _Side()
+        self._least_units = LEAST_UNITS
         self.begin(0, False, 0.0)
 
     def begin(self, units: int, reverse: bool, now: float) -> None:
@@ -103,7 +107,8 @@ class SpeedLoop:
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
-        return max(4, min(60, self._right.wanted_units(slower_mps / self._per_unit_mps)))
+        units = min(60, self._right.wanted_units(slower_mps / self._per_unit_mps))
+        return max(self._least_units, units)
 
     def spin_units(self, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at this rate."""
@@ -119,6 +124,17 @@ class SpeedLoop:
             error = speed - sum(line.speed(units) for line in lines) / 2
             for line in lines:
                 line.learn(units, line.speed(units) + error)
+
+    def stood(self, units: int | None = None) -> None:
+        """Learn that no motor turns with the present units, or with ``units`` on both sides.
+
+        More units than MOST_DEAD turn each motor that is not blocked, so they teach nothing.
+        """
+        for side in (self._right, self._left):
+            each = side.units if units is None else units
+            if 0 < each < MOST_DEAD:
+                side.line.stood(each)
+                self._least_units = max(self._least_units, min(round(MOST_DEAD), MORE_TIMES * each))
 
     @property
     def left_over_right(self) -> float:

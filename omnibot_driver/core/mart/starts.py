@@ -23,6 +23,7 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
+from omnibot_driver.core.mart.stops import CREEP_MPS
 from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
@@ -32,8 +33,10 @@ WAG_S, WAG_UNITS = 0.2, 2
 
 A change of the heading then shows that the IMU is alive and the robot has driven straight.
 """
-CREEP_MPS: Final = 0.01
-"""Measured speed in m/s that shows that a start was not lost on its way."""
+TIMED_OUT_S: Final = 0.5
+"""Shortest time in s in which the server finds that no wheel turns after a start."""
+JUST_SET_S: Final = 2.0
+"""Time in s after SSP within which the server certainly knows the speed of R and L."""
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
@@ -61,7 +64,7 @@ class Starts(Moves):
         """Return the command that corrects the motors' units by the measured speed, if needed."""
         odometry = self.odometry
         if self.state is State.DRIVING and not odometry.heading.is_known:
-            if abs(odometry.speeds[0]) > CREEP_MPS:
+            if abs(odometry.speeds.means[0]) > CREEP_MPS:
                 odometry.heading.started()
             return NO_PACKETS
         self._fresh = False
@@ -237,6 +240,10 @@ class Starts(Moves):
 
     def _started(self, answer: Answer, now: float) -> None:
         if isinstance(answer.reply, Fail):
+            # a restarted server has forgotten the speed of turns on the spot
+            forgot = self.motion is Motion.SPIN and now - self._custom_s > JUST_SET_S
+            if answer.took_s - self.conversation.trip_s > TIMED_OUT_S and not forgot:
+                self._learn_standing()
             self._start_failed(answer.reply, now)
             return
         if self.motion is Motion.REFERENCE:
@@ -248,6 +255,10 @@ class Starts(Moves):
         self.odometry.started(now, sure=not answer.when.doubtful)  # else maybe it answers RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
+
+    def _learn_standing(self) -> None:
+        """Learn that the motors need more units than those of the present motion to turn."""
+        self.loop.stood(self._spin_units if self.motion is Motion.SPIN else None)
 
     def _start_failed(self, reply: Fail, now: float) -> None:
         """Stop the robot after a failed start, as it may move nevertheless."""

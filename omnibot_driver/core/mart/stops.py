@@ -34,6 +34,10 @@ FROZEN_S: Final = 0.5
 """Time in s, plus two exchange durations, after which a constant heading shows a dead IMU."""
 NO_START_S: Final = 1.5
 """Time in s after the start within which the wheel must turn."""
+LATE: Final = " while the robot drives: check the network"
+STUCK: Final = "the robot is driven and does not move: check motors, wheels and power"
+CREEP_MPS: Final = 0.01
+"""Measured speed in m/s of a robot that certainly moves."""
 SPIN_RATIO: Final = 0.35
 """Part by which the commanded turn rate must change to restart a turn on the spot.
 
@@ -116,16 +120,18 @@ class Stops(Ground, ABC):
         odometry = self.odometry
         blind_s = BLIND_S + TRIPS * self.conversation.trip_s
         if self._heading_is_told and now - max(odometry.heading.told_s, self._begun_s) > blind_s:
-            return "the server does not report the relative heading while the robot drives"
+            return f"the server does not report the relative heading{LATE}"
         if now - max(odometry.wheel.told_s, self._begun_s) > blind_s:
-            return "the server does not report the encoder count while the robot drives"
+            return f"the server does not report the encoder count{LATE}"
         if (
             odometry.wheel.told_s - self._begun_s > NO_START_S
             and sum(map(abs, odometry.speeds.means)) < 1e-3
         ):
-            return "the robot is commanded to move and does not move"
+            return STUCK
         longest_s = FROZEN_S + 2 * self.conversation.trip_s
         if self._heading_is_told and self._frozen_s > longest_s:
+            if self.motion is not Motion.SPIN and abs(odometry.speeds.means[0]) < CREEP_MPS:
+                return STUCK
             return "the relative heading does not change: the IMU is dead"
         return ""
 

@@ -192,6 +192,19 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
 
 
+@pytest.mark.parametrize("twist", [(0.15, 0.5), (0.05, 0.0), (0.0, 0.3), (-0.05, 0.1)])
+@pytest.mark.parametrize(("dead_units", "firmware"), [(8.0, "source"), (10.0, "firmware")])
+def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_failed(
+    twist: tuple[float, float], dead_units: float, firmware: Firmware
+) -> None:
+    """The first start is too weak, as nothing is known of the motors yet. The IMU is not blamed."""
+    bench = MartBench(firmware, dead_zone_units=dead_units).ready()
+    bench.command(*twist, 6.0)
+    assert not bench.robot.stands
+    assert not any("stuck" in notice or "IMU" in notice for notice in bench.notices)
+    assert len(bench.notices) <= 1
+
+
 @pytest.mark.parametrize(
     ("encoder_sign", "settings", "parameter"),
     [

@@ -85,3 +85,15 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
     change = loop.change(0.14, 0.5, now)
     assert change is not None
     assert change[1] >= 3
+
+
+def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
+    """It stays so for later starts; 20 units or more do not show that the motors need more."""
+    loop = SpeedLoop(MartSettings())
+    assert loop.first_units(0.1, 0.45) == 4
+    for units, then in ((4, 12), (12, 20), (30, 20)):
+        loop.begin(units, False, 0.0)
+        loop.stood()
+        assert loop.first_units(0.0, 0.0) >= then
+    assert loop.first_units(0.0, 0.0) < 30
+    assert loop.spin_units(0.1) > 12
