@@ -106,7 +106,7 @@ class Ground:
         self._last_move: Request | None = None
         self._started_s = self._begun_s = self._harmful_s = self._halted_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
-        self._spin_radps = self._spin_seen_radps = 0.0
+        self._spin_radps = self._spin_seen_radps = self._corrected_radps = 0.0
         self._spin_units = 0
         self._custom_units: int | None = None
         self._custom_s = -math.inf

@@ -43,6 +43,10 @@ SPIN_RATIO: Final = 0.35
 
 The turn must be restarted because the server cannot change its rate.
 """
+SPIN_OFF: Final = 0.2
+"""Relative error of the rate from which a turn on the spot is begun anew."""
+SPIN_SEEN_S, SPIN_LEARN_RAD = 1.0, 0.3
+"""Shortest turn on the spot that shows how fast the motors turn: a time in s, and an angle."""
 SPIN_RAD, SPIN_PART = 0.15, 0.4
 """Largest difference of a turn reported by a stop from the expected turn: rad, plus a part.
 
@@ -97,7 +101,26 @@ class Stops(Ground, ABC):
             return (
                 rate * self._spin_radps > 0.0
                 and abs(rate - self._spin_radps) <= SPIN_RATIO * abs(self._spin_radps)
+                and not self._spin_is_off(rate, now)
             ) or (self._spin_is_fixed and rate * self._spin_radps > 0.0)
+        return True
+
+    def _spin_is_off(self, rate_radps: float, now: float) -> bool:
+        """Return whether the turn on the spot is so far from its rate that it is begun anew.
+
+        Its stop tells how fast the motors turn with their units, so the next turn is right. This is
+        done once for each rate.
+        """
+        if self.state is not State.TURNING or now < self._begun_s + SPIN_SEEN_S:
+            return False
+        seen_radps = self.odometry.speeds[1]
+        wrong = abs(seen_radps - rate_radps) > SPIN_OFF * abs(rate_radps)
+        turned = abs(self.odometry.spun_rad) > SPIN_LEARN_RAD
+        if not (wrong and turned) or self.conversation.disturbed(now):
+            return False
+        if math.isclose(rate_radps, self._corrected_radps, rel_tol=SPIN_OFF):
+            return False
+        self._corrected_radps = rate_radps
         return True
 
     @property
@@ -241,7 +264,7 @@ class Stops(Ground, ABC):
         spun_rad = odometry.spun_rad
         odometry.spin_told(degrees)
         seconds = now - self._begun_s
-        if seconds > 1.0 and self._spin_units and abs(spun_rad) > 0.3:
+        if seconds > SPIN_SEEN_S and self._spin_units and abs(spun_rad) > SPIN_LEARN_RAD:
             whole_rad = abs(spun_rad + rolled_rad)
             steady_radps = self._spin_seen_radps * abs(math.radians(degrees)) / whole_rad
             self.loop.spun(self._spin_units, steady_radps)

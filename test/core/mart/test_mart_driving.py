@@ -65,6 +65,28 @@ def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: flo
     assert bench.notices == []
 
 
+@pytest.mark.parametrize("firmware", ["source", "firmware"])
+@pytest.mark.parametrize("dead_units", [2.0, 4.0])
+def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
+    dead_units: float, firmware: Firmware
+) -> None:
+    """Nothing is known of the motors yet: without a new start the rate would be 25 % to 40 % off.
+
+    A second start is not worth its pause, even if the rate is still off.
+    """
+    bench = MartBench(firmware, dead_zone_units=dead_units).ready()
+    bench.command(0.0, 0.5, 4.0)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.13)
+    bench.command(0.0, 0.5, 4.0)
+    assert bench.said().count(b"L CUSTOM") == 2
+    bench.command(0.0, 0.0, 1.0)
+    bench.command(0.0, 0.5, 4.0)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.05)
+    assert bench.said().count(b"L CUSTOM") == 3
+    assert bench.error.way_m < 0.03
+    assert abs(bench.error.yaw_rad) < 0.1
+
+
 @pytest.mark.parametrize(("left", "firmware"), [(True, "source"), (False, "firmware")])
 def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmware) -> None:
     """The robot returns to within 5 % of the side, to the left as to the right.
