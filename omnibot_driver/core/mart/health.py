@@ -52,7 +52,8 @@ class Health:
     ``imu``: the results of the IMU's checks; ``stranger``: the name that another server gives, or
     empty; ``heading_told``: motions besides RM in which RMRA was seen to change;
     ``heading_changes``: number of such changes in the present motion; ``reference_fails``: number
-    of bare ``fail`` replies to RM in a row.
+    of bare ``fail`` replies to RM in a row; ``outlived``: whether the server has ended a motion
+    only after the stop port was used, so that its stop port or its next motion may hang.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -65,6 +66,7 @@ class Health:
         """Begin a new connection: nothing is measured yet."""
         self.heading_told: set[Motion] = set()
         self.heading_changes = 0
+        self.outlived = False
         self.stranger = ""
         self.status: int | None = None
         self.volts: float | None = None
@@ -184,6 +186,11 @@ class Health:
             return (
                 "the IMU does not answer (MPU6050 connection lost): check its wiring, and"
                 " restart server and driver if this persists"
+            )
+        if self.outlived:
+            return (
+                "the server was lost and answers again without a restart, but nothing may stop its"
+                " next motion: restart the server, then the driver"
             )
         if self._defective:
             return "this server answers 'fail' to RM although the robot moves: update the server"

@@ -35,7 +35,10 @@ class Measuring(Starts):
         elif word is words.RMRA:
             if answer.when.is_uncertain and self.health.is_voltage(reply.number):
                 return
+            was_zero = self.odometry.heading.is_zero
             changed = self._turned(reply.number, answer.when, now)
+            if self.odometry.heading.is_zero and not was_zero:
+                self.health.outlived = False  # the server has been restarted
             certain = answer.when.from_s >= self._begun_s and not answer.when.doubtful
             if changed and certain and self.state in (State.REVERSING, State.TURNING):
                 self.health.heading_changed(self.motion)

@@ -186,6 +186,8 @@ class Pilot(Measuring):
         if isinstance(reply, Ok) and reply.form is Form.NAME:
             self._named(reply, now)
             return
+        if self.state is State.LOST or (self._stopping is not None and self._stopping.last_port):
+            self._outlives(reply)
         if self.state is State.LOST:
             return
         if self._stopping is not None:

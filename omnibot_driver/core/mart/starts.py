@@ -299,7 +299,7 @@ class Starts(Moves):
         request = self.jobs.next(now, stands=self.proof.proved)
         if request is None:
             return NO_PACKETS
-        if request.word in NEEDS_IMU and self.imu.dead:
+        if request.word in NEEDS_IMU and (self.imu.dead or self.health.outlived):
             self.jobs.cancel(self.health.refusal)
             return NO_PACKETS
         if request.word in NEEDS_IMU and not self.imu.fresh(now):

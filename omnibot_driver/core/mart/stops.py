@@ -288,6 +288,17 @@ class Stops(Ground, ABC):
             halt=True,
         )
 
+    def _outlives(self, reply: Reply) -> None:
+        """Note a reply to a stop on the command port that comes after the stop port was used.
+
+        The server then has not been restarted. Its stop port may await the end of the same motion
+        for good. It would then take the start of the next RM for that end, so that RM is never
+        answered and cannot be stopped.
+        """
+        ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
+        if ends and self.motion is not Motion.SPIN:
+            self.health.outlived = True
+
     def _repeat_lost(self, now: float) -> Packets:
         if now < self._said_lost_s + LOST_REPEAT_S:
             return NO_PACKETS

@@ -108,6 +108,37 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     assert not bench.robot.stands
 
 
+@pytest.mark.parametrize(
+    ("motion", "firmware", "boot_s"),
+    [((0.3, 0.1), "source", 0.3), ((0.3, 0.1), "firmware", 5.0), ((-0.2, 0.0), "source", 5.0)],
+)
+def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
+    motion: tuple[float, float], firmware: Firmware, boot_s: float
+) -> None:
+    """Its IMU is back, so it ends the old motion, but its stop port still awaits that end.
+
+    The next RM would never be answered, and nothing would stop it. A restart shows by a heading of
+    zero, or by a long silence.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(*motion, 2.5)
+    bench.server.imu.alive = False
+    bench.command(*motion, 3.0)
+    bench.run(7.0)
+    assert any(notice.startswith("lost: ") for notice in bench.notices)
+    bench.server.imu.alive = True
+    bench.run(5.0)
+    assert bench.robot.board.facts["stop_port_hung"]
+    way_m = bench.server.chassis.way_m
+    assert "restart the server" in bench.try_command(0.3, 0.0)
+    bench.command(0.3, 0.0, 5.0)
+    assert bench.server.chassis.way_m == way_m
+    bench.server.restart(boot_s)
+    bench.run(boot_s + 5.0)
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
 def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
     """The controller stops by itself without a report; backward motion remains possible."""
     bench = MartBench(front_m=1.4).ready()
