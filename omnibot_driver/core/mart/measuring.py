@@ -19,6 +19,11 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS
 
 STRAY_AGAIN_S: Final = 3.0
+ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
+"""Time in s for which a robot may roll out after a stop, and after a controlled move.
+
+The server reports a controlled move that has failed at once, without awaiting the standstill.
+"""
 
 
 class Measuring(Starts):
@@ -89,7 +94,8 @@ class Measuring(Starts):
         The cause is a late duplicate of a start, another client, or a push.
         """
         self._counted_at_rest += 1
-        if self._counted_at_rest < 2 or now - self._rested_s < 0.3 or before is None:
+        rolls_s = ROLLS_AFTER_MOVE_S if self._moved_last else ROLLS_S
+        if self._counted_at_rest < 2 or now - self._rested_s < rolls_s or before is None:
             return
         if abs(count - before) <= STRAY_COUNTS or now - self._stray_s < STRAY_AGAIN_S:
             return

@@ -223,6 +223,21 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
 
 
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_command(
+    firmware: Firmware,
+) -> None:
+    """The server reports the failure at once, while the wheels still turn."""
+    bench = MartBench(firmware, motor_lag_s=0.12).ready()
+    bench.go_to(1.5, 0.0, 0.0)
+    bench.run(2.4)
+    bench.server.imu.alive = False
+    bench.run(5.0)
+    assert bench.robot.stands
+    assert [notice for notice in bench.notices if "MPU6050 connection lost" in notice]
+    assert not [notice for notice in bench.notices if "without a command" in notice]
+
+
 @pytest.mark.parametrize("twist", [(0.15, 0.5), (0.05, 0.0), (0.0, 0.3), (-0.05, 0.1)])
 @pytest.mark.parametrize(("dead_units", "firmware"), [(8.0, "source"), (10.0, "firmware")])
 def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_failed(
