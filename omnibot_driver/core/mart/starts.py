@@ -186,6 +186,7 @@ class Starts(Moves):
         reason = reply.reason if isinstance(reply, Fail) else ""
         why = f"the check of the IMU failed: {reason or 'fail'}"
         if reason == words.CONFLICT:
+            why += "; look for another program that commands the robot"
             self.motion = Motion.UNKNOWN
             self._halt(now, why)
         else:
@@ -267,7 +268,7 @@ class Starts(Moves):
         self._again_s = now + AGAIN_S
         if reply.reason == words.CONFLICT:
             self.motion = Motion.UNKNOWN
-            why = "another motion is in progress"
+            why = "another motion is in progress; look for another program that commands the robot"
         elif word is words.RM and self._is_of_another(reply, now):
             self.health.reference_fails += reply.reason == ""
             why = "the driver tries again"
@@ -277,6 +278,8 @@ class Starts(Moves):
                     "the motors may be stuck or without power; forward motion is refused until"
                     " another command"
                 )
+        elif reply.reason == words.NO_START:
+            why = "no wheel has turned, so the driver tries again; check motors and power"
         else:
             why = self._obstacle(reply, self.motion)
         if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:

@@ -35,7 +35,10 @@ FROZEN_S: Final = 0.5
 NO_START_S: Final = 1.5
 """Time in s after the start within which the wheel must turn."""
 LATE: Final = " while the robot drives: check the network"
-STUCK: Final = "the robot is driven and does not move: check motors, wheels and power"
+STUCK: Final = (
+    "the robot is driven and does not move: check motors, wheels and power, and whether another"
+    " program stops it"
+)
 CREEP_MPS: Final = 0.01
 """Measured speed in m/s of a robot that certainly moves."""
 SPIN_RATIO: Final = 0.35
@@ -315,7 +318,15 @@ class Stops(Ground, ABC):
         if reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
             return f"the controller reports an obstacle ({reply.reason})"
-        return f"the controller has ended the motion ({reply.reason or 'no reason given'})"
+        if reply.reason in (words.NO_MOTION, words.NOT_IN_MOTION):
+            return (
+                "the server knows of no motion: it was restarted, or another program has stopped"
+                " the robot"
+            )
+        return (
+            f"the controller has ended the motion ({reply.reason or 'no reason given'}): look for"
+            " an obstacle, or another program that commands the robot"
+        )
 
     def _failed(self, motion: Motion, reply: Fail, now: float) -> None:
         """Report the failure with which the server has ended a motion."""

@@ -91,8 +91,9 @@ OBSTACLES: Final = frozenset(
     }
 )
 """The failure texts for an obstacle, in all the server's spellings."""
-STARTING: Final = frozenset({CONFLICT, UNSUPPORTED, "", "start timedout"})
-STOPPING: Final = frozenset({"stop timedout", "stop time out", "start timedout"})
+NO_START: Final = "start timedout"
+STARTING: Final = frozenset({CONFLICT, UNSUPPORTED, "", NO_START})
+STOPPING: Final = frozenset({"stop timedout", "stop time out", NO_START})
 GYRO: Final = "excessive gyro correct"
 MOVING: Final = STARTING | STOPPING | OBSTACLES | {IMU_LOST, GYRO}
 

@@ -223,6 +223,17 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
 
 
+def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
+    """RMCS fails then, as the server knows of no motion."""
+    bench = MartBench("source").ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.server.receive(b"SRM", 0, None, bench.robot.board.now_s)
+    bench.command(0.2, 0.2, 1.0)
+    assert any("another program has stopped the robot" in notice for notice in bench.notices)
+    bench.command(0.2, 0.2, 3.0)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.2, rel=0.1)
+
+
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_command(
     firmware: Firmware,
