@@ -44,6 +44,8 @@ OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
 """Similar readings in a row needed to accept one that may be the reply to another query."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
+STRAYS_S: Final = 3.0
+"""Time in s after an RM that failed within which a motion is that of this RM."""
 
 
 class Health:
@@ -59,7 +61,6 @@ class Health:
     def __init__(self, imu: ImuProof) -> None:
         self._imu = imu
         self.reference_fails = 0
-        self._defective = False
         self.connect()
 
     def connect(self) -> None:
@@ -67,6 +68,8 @@ class Health:
         self.heading_told: set[Motion] = set()
         self.heading_changes = 0
         self.outlived = False
+        self._defective = False
+        self._reference_failed_s = -math.inf
         self.stranger = ""
         self.status: int | None = None
         self.volts: float | None = None
@@ -148,9 +151,17 @@ class Health:
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
 
-    def reference_moves(self) -> None:
-        """Note that the robot moves after an RM that failed, which is a defect of the server."""
-        self._defective |= self.reference_fails > 0
+    def reference_failed(self, now: float) -> None:
+        """Note that RM was answered by a bare ``fail``."""
+        self.reference_fails += 1
+        self._reference_failed_s = now
+
+    def strays(self, now: float) -> None:
+        """Note that the robot moves without a command.
+
+        Soon after an RM that failed, this shows a defect of the server.
+        """
+        self._defective |= now < self._reference_failed_s + STRAYS_S
 
     def volts_or(self, nominal: float) -> float:
         """Return the battery voltage in V, or ``nominal`` before the first report."""

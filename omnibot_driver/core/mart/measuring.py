@@ -99,7 +99,7 @@ class Measuring(Starts):
             return
         if abs(count - before) <= STRAY_COUNTS or now - self._stray_s < STRAY_AGAIN_S:
             return
-        self.health.reference_moves()
+        self.health.strays(now)
         if self._negative_sweep and now - self._swept_s < 2.0:
             self._stray_s = now
             self._rescue = True

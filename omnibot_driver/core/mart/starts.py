@@ -270,7 +270,8 @@ class Starts(Moves):
             self.motion = Motion.UNKNOWN
             why = "another motion is in progress; look for another program that commands the robot"
         elif word is words.RM and self._is_of_another(reply, now):
-            self.health.reference_fails += reply.reason == ""
+            if not reply.reason:
+                self.health.reference_failed(now)
             why = "the driver tries again"
             if self.health.reference_fails >= REFERENCE_FAILS:
                 self._blocked, self.health.reference_fails = Motion.REFERENCE, 0

@@ -223,6 +223,21 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
 
 
+def test_a_push_long_after_an_rm_that_failed_is_no_defect_of_the_server() -> None:
+    """A server that answers ``fail`` although it moves shows this at once."""
+    bench = MartBench("source").ready()
+    bench.server.motions[Kind.REFERENCE].samples = 58
+    bench.command(0.3, 0.0, 0.3)
+    bench.command(0.0, 0.0, 5.0)
+    assert any("RM failed" in notice for notice in bench.notices)
+    bench.server.receive(b"RM 30", 0, None, bench.robot.board.now_s)
+    bench.run(5.0)
+    assert any("moves without a command" in notice for notice in bench.notices)
+    assert bench.try_command(0.3, 0.0) == ""
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
     """RMCS fails then, as the server knows of no motion."""
     bench = MartBench("source").ready()
