@@ -36,8 +36,8 @@ NO_START_S: Final = 1.5
 """Time in s after the start within which the wheel must turn."""
 LATE: Final = " while the robot drives: check the network"
 STUCK: Final = (
-    "the robot is driven and does not move: check motors, wheels and power, and whether another"
-    " program stops it"
+    "the robot is commanded to move and does not: check motors, wheels and power, and whether"
+    " another program stops it"
 )
 CREEP_MPS: Final = 0.01
 """Measured speed in m/s of a robot that certainly moves."""
@@ -116,7 +116,7 @@ class Stops(Ground, ABC):
         """
         if self.state is not State.TURNING or now < self._begun_s + SPIN_SEEN_S:
             return False
-        seen_radps = self.odometry.speeds[1]
+        seen_radps = self.odometry.speeds.means[1]
         wrong = abs(seen_radps - rate_radps) > SPIN_OFF * abs(rate_radps)
         turned = abs(self.odometry.spun_rad) > SPIN_LEARN_RAD
         if not (wrong and turned) or self.conversation.disturbed(now):

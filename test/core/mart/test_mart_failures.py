@@ -125,7 +125,7 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     bench.server.imu.alive = False
     bench.command(*motion, 3.0)
     bench.run(7.0)
-    assert any(notice.startswith("lost: ") for notice in bench.notices)
+    assert any(notice.startswith("server lost: ") for notice in bench.notices)
     bench.server.imu.alive = True
     bench.run(5.0)
     assert bench.robot.board.facts["stop_port_hung"]
