@@ -24,7 +24,7 @@ from omnibot_driver.core.mart.states import (
     State,
 )
 from omnibot_driver.core.mart.stopping import REPEAT_S
-from omnibot_driver.core.mart.stops import LOST_REPEAT_S, STUCK, stands
+from omnibot_driver.core.mart.stops import HALF_STUCK, LOST_REPEAT_S, STUCK, stands
 from omnibot_driver.core.mart.words import Form, Kind, Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
@@ -146,6 +146,8 @@ class Pilot(Measuring):
         if why := self._why_stop(now):
             if why is STUCK:
                 self._learn_standing()
+            elif why is HALF_STUCK:
+                self._blocked = Motion.REFERENCE
             self._halt(now, "" if why == "wanted" else why)
             return self._keep_stopping(now)
         if now >= self._copy_stop_s:

@@ -61,10 +61,12 @@ class _Side:
     """One motor.
 
     ``units``: commanded units; ``line``: the learned speed for each number of units;
-    ``window_units_s``, ``window_m``: units and distance summed over the present window.
+    ``window_units_s``, ``window_m``: units and distance summed over the present window;
+    ``stood_s``: time for which the wheel has stood although it must turn.
     """
 
     units: int = 0
+    stood_s: float = 0.0
     line: MotorLine = field(default_factory=MotorLine)
     window_units_s: float = 0.0
     window_m: float = 0.0
@@ -93,6 +95,7 @@ class SpeedLoop:
     def begin(self, units: int, reverse: bool, now: float) -> None:
         """Begin a motion with these units on both sides."""
         self._right.units = self._left.units = units
+        self._right.stood_s = self._left.stood_s = 0.0
         self._direction = -1.0 if reverse else 1.0
         self._rate_radps = self._error_rad = 0.0
         self._rate_changed_s = now
@@ -107,19 +110,19 @@ class SpeedLoop:
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
-        units = min(60, self._right.wanted_units(slower_mps / self._per_unit_mps))
+        units = min(60, self._right.wanted_units(slower_mps / self.per_unit_mps))
         return max(self._least_units, units)
 
     def spin_units(self, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at this rate."""
-        speed = abs(rate_radps) * self.settings.track_m / 2 / self._per_unit_mps
+        speed = abs(rate_radps) * self.settings.track_m / 2 / self.per_unit_mps
         units = (self._right.line.units(speed) + self._left.line.units(speed)) / 2
         return max(2, min(MOST_UNITS, round(units)))
 
     def spun(self, units: int, rate_radps: float) -> None:
         """Learn from a turn on the spot with these units and this mean rate."""
         if abs(rate_radps) > SLOWEST_TURN_RADPS:
-            speed = abs(rate_radps) * self.settings.track_m / 2 / self._per_unit_mps
+            speed = abs(rate_radps) * self.settings.track_m / 2 / self.per_unit_mps
             lines = self._right.line, self._left.line
             error = speed - sum(line.speed(units) for line in lines) / 2
             for line in lines:
@@ -135,6 +138,16 @@ class SpeedLoop:
             if 0 < each < MOST_DEAD:
                 side.line.stood(each)
                 self._least_units = max(self._least_units, min(round(MOST_DEAD), MORE_TIMES * each))
+
+    @property
+    def units(self) -> int:
+        """The larger of the units of both sides."""
+        return max(self._right.units, self._left.units)
+
+    @property
+    def blocked_s(self) -> float:
+        """Time in s for which a wheel has stood with units that turn each wheel."""
+        return max(self._right.stood_s, self._left.stood_s)
 
     @property
     def left_over_right(self) -> float:
@@ -215,9 +228,11 @@ class SpeedLoop:
     def _learn(self, side: _Side) -> None:
         """Learn a side's line from the finished window."""
         units = side.window_units_s / self._window_s
-        speed = side.window_m / self._window_s / self._per_unit_mps
-        slowest = SLOWEST_MPS / self._per_unit_mps
+        speed = side.window_m / self._window_s / self.per_unit_mps
+        slowest = SLOWEST_MPS / self.per_unit_mps
         should_turn = units < MOST_DEAD and side.line.speed(units) > slowest
+        must_turn = units >= MOST_DEAD and side.line.speed(units) > 2 * slowest
+        side.stood_s = side.stood_s + self._window_s if must_turn and speed < slowest else 0.0
         if speed > slowest or should_turn:  # else it stands, as it should
             side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
@@ -234,7 +249,7 @@ class SpeedLoop:
         most = MOST_BACKWARD if self._direction < 0.0 and self._is_slow else MOST_CHANGE
         steps = []
         for side, rim_mps in ((self._right, right_mps), (self._left, left_mps)):
-            wanted = side.wanted_units(rim_mps / self._per_unit_mps)
+            wanted = side.wanted_units(rim_mps / self.per_unit_mps)
             steps.append(max(-most, min(most, wanted - side.units)))
         right, left = steps
         if self._right.units + right <= 0 and self._left.units + left <= 0:
@@ -263,7 +278,8 @@ class SpeedLoop:
         return self.trip_s > SLOW_TRIP_S
 
     @property
-    def _per_unit_mps(self) -> float:
+    def per_unit_mps(self) -> float:
+        """Speed in m/s that one unit gives an ideal motor with the present battery voltage."""
         settings = self.settings
         return settings.speed_per_unit * self.volts / settings.nominal_volts
 

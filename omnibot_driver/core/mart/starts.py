@@ -6,6 +6,7 @@ This module knows the wanted motion and the start commands; it does not know whe
 Time is an argument.
 """
 
+import math
 from typing import Final
 
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
@@ -243,8 +244,10 @@ class Starts(Moves):
         if isinstance(answer.reply, Fail):
             # a restarted server has forgotten the speed of turns on the spot
             forgot = self.motion is Motion.SPIN and now - self._custom_s > JUST_SET_S
-            if answer.took_s - self.conversation.trip_s > TIMED_OUT_S and not forgot:
-                self._learn_standing()
+            if answer.took_s - self.conversation.trip_s > TIMED_OUT_S:
+                if not forgot:
+                    self._learn_standing()
+                self._doubt_the_left_wheel(answer.took_s)
             self._start_failed(answer.reply, now)
             return
         if self.motion is Motion.REFERENCE:
@@ -256,6 +259,13 @@ class Starts(Moves):
         self.odometry.started(now, sure=not answer.when.doubtful)  # else maybe it answers RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
+
+    def _doubt_the_left_wheel(self, seconds: float) -> None:
+        """Note that the left wheel, which nothing measures, may have turned for this time."""
+        units = self._spin_units if self.motion is Motion.SPIN else self.loop.units
+        most_m = units * self.loop.per_unit_mps * seconds
+        turn_rad = min(math.pi, most_m / self._settings.track_m)
+        self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
 
     def _learn_standing(self) -> None:
         """Learn that the motors need more units than those of the present motion to turn."""
@@ -270,7 +280,7 @@ class Starts(Moves):
             self.motion = Motion.UNKNOWN
             why = "another motion is in progress; look for another program that commands the robot"
         elif word is words.RM and self._is_of_another(reply, now):
-            if not reply.reason:
+            if reply.reason in ("", words.NO_START):
                 self.health.reference_failed(now)
             why = "the driver tries again"
             if self.health.reference_fails >= REFERENCE_FAILS:

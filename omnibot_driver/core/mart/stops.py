@@ -39,8 +39,14 @@ STUCK: Final = (
     "the robot is commanded to move and does not: check motors, wheels and power, and whether"
     " another program stops it"
 )
-CREEP_MPS: Final = 0.01
-"""Measured speed in m/s of a robot that certainly moves."""
+HALF_STUCK: Final = (
+    "one wheel does not turn: check its motor, wiring and power; forward motion is refused until"
+    " another command"
+)
+CREEP_MPS, CREEP_RADPS = 0.01, 0.02
+"""Measured speeds in m/s and rad/s, of which one is exceeded by a robot that certainly moves."""
+BLOCKED_S: Final = 0.6
+"""Time in s for which a wheel must stand in a drive before it is regarded as blocked."""
 SPIN_RATIO: Final = 0.35
 """Part by which the commanded turn rate must change to restart a turn on the spot.
 
@@ -151,9 +157,12 @@ class Stops(Ground, ABC):
             return f"the server does not report the encoder count{LATE}"
         if (
             odometry.wheel.told_s - self._begun_s > NO_START_S
-            and sum(map(abs, odometry.speeds.means)) < 1e-3
+            and abs(odometry.speeds.means[0]) < CREEP_MPS
+            and abs(odometry.speeds.means[1]) < CREEP_RADPS
         ):
             return STUCK
+        if self.state is State.DRIVING and self.loop.blocked_s > BLOCKED_S:
+            return HALF_STUCK
         longest_s = FROZEN_S + 2 * self.conversation.trip_s
         if self._heading_is_told and self._frozen_s > longest_s:
             if self.motion is not Motion.SPIN and abs(odometry.speeds.means[0]) < CREEP_MPS:
@@ -172,9 +181,13 @@ class Stops(Ground, ABC):
         return odometry.heading.told_s - max(odometry.heading.changed_s, self._begun_s)
 
     def _halt(self, now: float, why: str = "") -> None:
-        """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user."""
+        """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user.
+
+        The command is discarded as well, unless its direction is blocked: a block lasts until the
+        command changes.
+        """
         if why:
-            self._notice(f"{why}; robot stopped", halt=True)
+            self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
             self._custom_units = None  # a restarted server has forgotten it
         pending = self.conversation.pending
         answers = ANSWERS.get(self.motion, ())
