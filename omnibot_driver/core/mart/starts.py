@@ -287,7 +287,7 @@ class Starts(Moves):
                 self._blocked, self.health.reference_fails = Motion.REFERENCE, 0
                 why = (
                     "the motors may be stuck or without power; forward motion is refused until"
-                    " another command"
+                    " the command ends"
                 )
         elif reply.reason == words.NO_START:
             why = "no wheel has turned, so the driver tries again; check motors and power"

@@ -41,7 +41,7 @@ STUCK: Final = (
 )
 HALF_STUCK: Final = (
     "one wheel does not turn: check its motor, wiring and power; forward motion is refused until"
-    " another command"
+    " the command ends"
 )
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
 """Measured speeds in m/s and rad/s, of which one is exceeded by a robot that certainly moves."""
