@@ -69,7 +69,7 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
     bench.settle()
     longest_s = max(longest_s, bench.until_it_stands())
     bench.run(3.0)
-    lost = any(notice.startswith("lost") for notice in bench.notices)
+    lost = bench.board._pilot.lost > 0
     ended = bench.robot.stands and not (bench.server.hung or bench.server.crashed or lost)
     return Outcome(ended, longest_s, bench.server.chassis.way_m)
 

@@ -214,7 +214,7 @@ def trouble(trial: Trial) -> str:
     """Return what went wrong in the trial; empty if nothing did."""
     carrier = ran(trial)
     bench, server = carrier.bench, carrier.bench.server
-    lost = any(notice.startswith("lost") for notice in bench.notices)
+    lost = bench.board._pilot.lost > 0
     if math.isfinite(carrier.died_s):
         late_s = carrier.died_s + PROOF_S
         if any(at_s > late_s and data.split()[0] in STARTS for at_s, _, data in server.received):
