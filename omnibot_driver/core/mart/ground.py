@@ -45,6 +45,11 @@ ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Time in s, plus a number of exchange durations, without a reply that shows an absence."""
 ABSENT_BUSY_S: Final = 2.5
 """Time in s without a reply that shows an absence of a server that may be busy, as by a stop."""
+GREET_S: Final = 1.0
+"""Time in s from the start of a controlled move to the first HELLO, and between two of them.
+
+The server answers them after the move; a restarted server answers at once.
+"""
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which stops are sent while the e-stop is latched.
 
@@ -120,6 +125,7 @@ class Ground:
         self._fresh = False
         self._conflict = self._lost_told = False
         self._asked_count: tuple[int, float] | None = None
+        self._greet_s = math.inf
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
         self.heard_s = self.appeared_s = -math.inf

@@ -14,7 +14,7 @@ from omnibot_driver.core.commands.actuator import Wanted
 from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
-from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, STARTS_UP_S
+from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, GREET_S, STARTS_UP_S
 from omnibot_driver.core.mart.measuring import Measuring
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.states import (
@@ -116,7 +116,8 @@ class Pilot(Measuring):
         if self.state is State.ASKING:
             return self._ask_s if pending is None else pending.until_s
         if pending is not None:
-            return min(pending.until_s, self.jobs.wake_at, self._copy_stop_s)
+            greet_s = self._greet_s if self.state is State.MOVING else math.inf
+            return min(pending.until_s, self.jobs.wake_at, self._copy_stop_s, greet_s)
         if self.state is State.SERVING:
             return self.jobs.wake_at
         times = [max(self._polls.wake_at(self.state), now + 0.004)]
@@ -153,6 +154,9 @@ class Pilot(Measuring):
         if now >= self._copy_stop_s:
             self._copies_stopped_s = now
             return self._send((words.SL, words.SS), now)
+        if self.state is State.MOVING and now >= self._greet_s:
+            self._greet_s = now + GREET_S
+            return self._greet(now)
         if self.conversation.pending is not None:
             return NO_PACKETS
         return self._act(now) or self._poll(now)
@@ -230,11 +234,25 @@ class Pilot(Measuring):
         self.conversation.hear(reply, now)
         if self._stopping is not None and self._stopping.asks_name(now):
             self._stopped(now)  # the port is free: the move is over, its reply was lost
+        if self.state is State.MOVING and now >= self._started_s + GREET_S:
+            self._named_in_a_move(now)
         if self.state is State.ASKING:
             self._named_s = now
         if self.state is State.LOST:
             self._ask_what_moves(now)
             self._named_s = self._name_from_s
+
+    def _named_in_a_move(self, now: float) -> None:
+        """Stop any motion: a server that gives its name is not busy with a controlled move.
+
+        Its reply to the move was lost, or it was restarted while the motors turn.
+        """
+        self.appeared_s = now
+        self._moved_by = None
+        if self.motion is Motion.STRAIGHT:
+            self.odometry.finish_straight()
+        self.motion = Motion.UNKNOWN
+        self._halt(now)
 
     def _answered(self, answer: Answer, now: float) -> None:
         word, reply = answer.word, answer.reply

@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
-from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, STARTS_UP_S
+from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, GREET_S, STARTS_UP_S
 from omnibot_driver.core.mart.moves import Moves
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import (
@@ -210,6 +210,7 @@ class Starts(Moves):
         self.odometry.begin(self.motion, now)
         if start.word.kind is Kind.MOVE:
             self._moved_by = self._last_move = start
+            self._greet_s = now + GREET_S
             self.state = State.MOVING
             self.commanded = None
         elif self.motion is Motion.REFERENCE:

@@ -226,6 +226,29 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
         assert not bench.robot.stands
 
 
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize(("x_m", "y_m"), [(3.0, 0.0), (0.0, 3.0)])
+@pytest.mark.parametrize("boot_s", [0.3, 3.0])
+def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
+    boot_s: float, x_m: float, y_m: float, firmware: Firmware
+) -> None:
+    """The motors keep their last command. A move of 3 m would be awaited for a minute."""
+    bench = MartBench(firmware).ready()
+    bench.go_to(x_m, y_m, 0.0)
+    bench.run_until(lambda: not bench.robot.stands, 5.0)
+    bench.run(0.6)
+    bench.server.restart(boot_s)
+    assert not bench.robot.stands
+    bench.run(boot_s)
+    assert bench.until_it_stands() < 5.0
+    bench.run(4.0)
+    assert bench.robot.stands
+    assert not bench.server.crashed
+    assert any("knows of no motion" in notice for notice in bench.notices)
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,
