@@ -125,7 +125,7 @@ class Ground:
         self._fresh = False
         self._conflict = self._lost_told = False
         self._asked_count: tuple[int, float] | None = None
-        self._greet_s = math.inf
+        self._greet_s = self._free_s = math.inf
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
         self.heard_s = self.appeared_s = -math.inf

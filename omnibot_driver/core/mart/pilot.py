@@ -116,8 +116,10 @@ class Pilot(Measuring):
         if self.state is State.ASKING:
             return self._ask_s if pending is None else pending.until_s
         if pending is not None:
-            greet_s = self._greet_s if self.state is State.MOVING else math.inf
-            return min(pending.until_s, self.jobs.wake_at, self._copy_stop_s, greet_s)
+            times = [pending.until_s, self.jobs.wake_at, self._copy_stop_s]
+            if self.state is State.MOVING:
+                times += [self._greet_s, self._free_s]
+            return min(times)
         if self.state is State.SERVING:
             return self.jobs.wake_at
         times = [max(self._polls.wake_at(self.state), now + 0.004)]
@@ -154,6 +156,9 @@ class Pilot(Measuring):
         if now >= self._copy_stop_s:
             self._copies_stopped_s = now
             return self._send((words.SL, words.SS), now)
+        if self.state is State.MOVING and now >= self._free_s:
+            self._named_in_a_move(now)
+            return self._keep_stopping(now)
         if self.state is State.MOVING and now >= self._greet_s:
             self._greet_s = now + GREET_S
             return self._greet(now)
@@ -235,7 +240,7 @@ class Pilot(Measuring):
         if self._stopping is not None and self._stopping.asks_name(now):
             self._stopped(now)  # the port is free: the move is over, its reply was lost
         if self.state is State.MOVING and now >= self._started_s + GREET_S:
-            self._named_in_a_move(now)
+            self._free_s = min(self._free_s, now + self._delay_s)  # its reply may be on its way
         if self.state is State.ASKING:
             self._named_s = now
         if self.state is State.LOST:

@@ -210,7 +210,7 @@ class Starts(Moves):
         self.odometry.begin(self.motion, now)
         if start.word.kind is Kind.MOVE:
             self._moved_by = self._last_move = start
-            self._greet_s = now + GREET_S
+            self._greet_s, self._free_s = now + GREET_S, math.inf
             self.state = State.MOVING
             self.commanded = None
         elif self.motion is Motion.REFERENCE:

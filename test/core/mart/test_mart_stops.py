@@ -110,6 +110,32 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
     assert not bench.server.hung
 
 
+def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """HELLO is answered after the move, and its reply may overtake that of the move by 0.3 s."""
+    bench = MartBench().ready()
+    receive = bench.session.inbound.receive
+    late: list[bytes] = []
+
+    def reorder(data: bytes, now: float, channel: int) -> None:
+        moves = bench.board._pilot.state is State.MOVING
+        if moves and not late and data != b"ok BBB":
+            late.append(data)
+        else:
+            receive(data, now, channel)
+
+    monkeypatch.setattr(bench.session.inbound, "receive", reorder)
+    bench.go_to(0.5, 0.0, 0.0)
+    bench.run_until(lambda: bool(late), 20.0)
+    bench.run(0.25)
+    assert bench.board._pilot.state is State.MOVING
+    receive(late[0], bench.now, 0)
+    bench.settle()
+    assert bench.board._pilot.state is State.STILL
+    assert bench.said()[-1].startswith(b"TF")
+
+
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
