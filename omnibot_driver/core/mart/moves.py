@@ -48,6 +48,8 @@ class Moves(Asking):
         if motion is Motion.STRAIGHT:
             self.odometry.finish_straight()
         self.jobs.moved(reply, now)
+        if self._rescue:
+            self.proof.stopped(now)  # its end is the stop of the motion that nothing else stopped
         self._rest(now)
         if isinstance(reply, Fail):
             discarded = ""

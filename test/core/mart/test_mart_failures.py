@@ -241,10 +241,11 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
     assert not bench.robot.stands
     bench.run(boot_s)
     assert bench.until_it_stands() < 5.0
-    bench.run(4.0)
+    bench.run(8.0)
     assert bench.robot.stands
     assert not bench.server.crashed
     assert any("knows of no motion" in notice for notice in bench.notices)
+    assert not any("unconfirmed" in notice for notice in bench.notices)
     bench.command(0.3, 0.0, 3.0)
     assert not bench.robot.stands
 
