@@ -107,16 +107,16 @@ class RunningBoard(ABC, Generic[B]):
             remaining_s = due_s - time.monotonic()
             if remaining_s < -LONGEST_CATCH_UP_S:
                 due_s -= remaining_s
-            self._hear(max(0.0, remaining_s))
+            self._collect(max(0.0, remaining_s))
             ticks, due_s = self._due(due_s)
             if ticks > 1:  # this thread was late: what arrived meanwhile comes before these ticks
-                self._hear(0.0)
+                self._collect(0.0)
             if ticks:
                 with self._ticked:
                     self._let_pass(ticks)
                     self._ticked.notify_all()
 
-    def _hear(self, timeout_s: float) -> None:
+    def _collect(self, timeout_s: float) -> None:
         for channel, data in self._receive(timeout_s):
             with self.lock:
                 self._wired.receive(data, time.monotonic(), channel)
