@@ -32,7 +32,7 @@ class Watch:
 
     def begin(self) -> None:
         """Forget earlier timeouts, as new connections begin."""
-        self.blind = self.unposed = self._stalled = False
+        self.blind = self.unposed = self._sick = self._stalled = False
         self._begun_at = math.inf
         self._patient_until = -math.inf
 
@@ -98,12 +98,16 @@ class Watch:
 
     def _look_at_age(self, now: float, *, driving: bool) -> None:
         drive = self._ports.half("drive")
-        was_blind, was_unposed = self.blind, self.unposed
+        was_blind, was_unposed, was_sick = self.blind, self.unposed, self._sick
+        fault = self._front.trouble
+        self._sick = bool(fault)
         self.blind = not self._front.known(now)
         self.unposed = drive is None or now - drive.came_at("pose") > NO_POSE_S
         if not driving:
+            if fault and not was_sick:
+                self._told.tell(fault, now)
             return
-        if fault := self._front.trouble:
+        if fault:
             self._told.halt(f"{fault}; robot stopped", now)
         elif self.blind and not was_blind:
             self._told.halt("no angle of the front wheel for 60 ms; robot stopped", now)

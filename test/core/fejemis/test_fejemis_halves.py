@@ -236,6 +236,14 @@ def test_a_broken_angle_sensor_stops_the_robot() -> None:
         assert bench.robot.standing, fault
 
 
+def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
+    """On a busy computer the angle can be too old, and the robot stopped, before that."""
+    bench = nominal()
+    bench.robot.befall("front", "hall-broken")
+    bench.run(1.0)
+    assert sum("angle sensor" in notice for notice in bench.notices) == 1
+
+
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
     """The sensor's diagnosis reports nothing, so only the missing rotation shows the fault."""
     bench = nominal()
