@@ -21,6 +21,11 @@ from rosbags.rosbag2 import StoragePlugin
 RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
+RECOGNISED: Final = 100
+"""Packets of the standing robot, 1 s of them, from which a replay recognises both Teensys.
+
+The recording can begin after their answers to the first questions.
+"""
 
 
 def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
@@ -32,6 +37,8 @@ def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
         recorder.record(*RAW)
         odometry = probe.listen(Odometry, "odom")
         probe.wait_for_state("nominal")
+        received = recorder.messages[f"/{driver.namespace}/{RAW[0]}"]
+        probe.wait_for(lambda: len(received) > RECOGNISED)
         cmd_vel, twist = probe.publisher(Twist, "cmd_vel"), Twist()
         twist.linear.x = 0.3
         timer = probe.node.create_timer(0.1, lambda: cmd_vel.publish(twist))
