@@ -52,6 +52,7 @@ class Moves(Asking):
             self.proof.stopped(now)  # its end is the stop of the motion that nothing else stopped
         self._rest(now)
         if isinstance(reply, Fail):
+            self._moved_by = None  # it was cut short
             discarded = ""
             if self._move is not None:
                 self._move.given_up = True

@@ -108,13 +108,19 @@ class Starts(Moves):
             return NO_PACKETS
         if packets := self._prepare_spin(start, now):
             return packets
-        if self.odometry.wheel.from_s < self._harmful_s + self._delay_s:
-            return NO_PACKETS  # a late copy of a move would block the port now
-        if now < self._halted_s + self._delay_s:
-            return NO_PACKETS  # a late copy of a stop would end what begins
+        if self._copies_may_come(now):
+            return NO_PACKETS
         if start.word in NEEDS_IMU and not self.imu.fresh(now):
             return self._check(now)
         return self._begin(start, now)
+
+    def _copies_may_come(self, now: float) -> bool:
+        """Return whether a late copy of an earlier command could still harm a motion.
+
+        A copy of a move would block the port; a copy of a stop would end what begins.
+        """
+        moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
+        return moves or now < self._halted_s + self._delay_s
 
     def _next_start(self, now: float) -> Request | None:
         order = self._order(now)
@@ -209,7 +215,9 @@ class Starts(Moves):
         self.odometry.speeds.forget()
         self.odometry.begin(self.motion, now)
         if start.word.kind is Kind.MOVE:
-            self._moved_by = self._last_move = start
+            self._last_move = start
+            # a docking move ends at the dock, and a rescue turn begins with the robot in motion
+            self._moved_by = None if self.jobs.moving or self._rescue else start
             self._greet_s, self._free_s = now + GREET_S, math.inf
             self.state = State.MOVING
             self.commanded = None
@@ -314,11 +322,14 @@ class Starts(Moves):
         request = self.jobs.next(now, stands=self.proof.proved)
         if request is None:
             return NO_PACKETS
-        if request.word in NEEDS_IMU and (self.imu.dead or self.health.outlived):
-            self.jobs.cancel(self.health.refusal)
-            return NO_PACKETS
-        if request.word in NEEDS_IMU and not self.imu.fresh(now):
-            return self._check(now)
+        if request.word in NEEDS_IMU:
+            if why := self.refusal:
+                self.jobs.cancel(why)
+                return NO_PACKETS
+            if self._copies_may_come(now):
+                return NO_PACKETS
+            if not self.imu.fresh(now):
+                return self._check(now)
         self.jobs.sent(request, now)
         if request.word in STARTS:
             return self._begin(request, now)

@@ -6,10 +6,12 @@ import math
 from random import Random
 
 import pytest
+from mart_bench import MartBench
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import MartSettings
-from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, Move, Surplus, next_move
+from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, STRETCH, Move, Surplus, next_move
+from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.words import MCR, TB, TF
 
 
@@ -35,3 +37,34 @@ def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, s
         assert move.said < MOST_MOVES
         assert pose.way_to(goal).way_m < 0.1
         assert abs(math.remainder(pose.yaw_rad - goal.yaw_rad, math.tau)) < math.radians(8)
+
+
+def first_distance(bench: MartBench, x_m: float) -> int:
+    """Command a goal straight ahead or behind; return the number of inches first requested."""
+    since = len(bench.written)
+    bench.go_to(x_m, 0.0, 0.0)
+
+    def straight() -> list[bytes]:
+        return [data for data in bench.said(since) if data.startswith(b"TF")]
+
+    bench.run_until(lambda: bool(straight()), 30.0)
+    return int(straight()[0].split()[-1])
+
+
+def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> None:
+    """It was cut short, so its distance does not show how far the robot drives by an inch."""
+    bench = MartBench(front_m=0.7).ready()
+    first_distance(bench, 2.0)
+    bench.run_until(lambda: any("clearance" in notice for notice in bench.notices), 10.0)
+    bench.run(2.0)
+    here_m = bench.truth.x_m
+    assert 0.05 < here_m < 0.7
+    assert first_distance(bench, here_m - 2.0) <= round(2.0 / INCH_M / STRETCH) + 1
+
+
+def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
+    """The next goal is behind; its straight move is that of a driver that has never docked."""
+    bench = MartBench(dock_m=0.2).ready()
+    assert bench.job(Job.DOCK, "DOCK", 40).success
+    bench.run(2.0)
+    assert first_distance(bench, -1.8) <= round(2.0 / INCH_M / STRETCH) + 1
