@@ -190,7 +190,10 @@ class Conversation:
         return self.give_up(now)
 
     def hear(self, reply: Reply, now: float) -> Answer | None:
-        """Return the reply with its request, or None if the reply is late, duplicate or foreign."""
+        """Return the reply with its request, or None if the reply is late, duplicate or foreign.
+
+        The server's name is not passed here, as HELLO may be sent while a request is pending.
+        """
         pending = self.pending
         if isinstance(reply, Ok):
             self.heard(reply.form, now)
@@ -203,8 +206,7 @@ class Conversation:
             self.discarded += 1
             if isinstance(reply, Ok):
                 self.came(reply, now)
-                if reply.form is not Form.NAME:
-                    self._disturbed_s = self._doubled_s = now
+                self._disturbed_s = self._doubled_s = now
             return None
         self.pending = None
         took_s = now - pending.sent_s

@@ -148,8 +148,8 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """Repeat or end the job, as its reply did not come in time."""
-        if self.job is None:
+        """Repeat or end the job if this word was its request: the reply did not come in time."""
+        if not self._waiting or self._request is None or word is not self._request.word:
             return
         if self.job in REPEATED and self._tries < TIMES:
             self._waiting = False

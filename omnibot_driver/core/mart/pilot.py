@@ -187,6 +187,7 @@ class Pilot(Measuring):
         """Evaluate a datagram from the command port."""
         self._next_s = -math.inf
         if self.jobs.collecting:
+            self.heard_s = now
             self.jobs.piece(data, now)
             return
         for reply in self.decoder.feed(data, now):
@@ -236,7 +237,6 @@ class Pilot(Measuring):
             self.health.stranger = reply.text
             return
         self.health.stranger = ""
-        self.conversation.hear(reply, now)
         if self._stopping is not None and self._stopping.asks_name(now):
             self._stopped(now)  # the port is free: the move is over, its reply was lost
         if self.state is State.MOVING and now >= self._started_s + GREET_S:

@@ -189,6 +189,11 @@ class Stops(Ground, ABC):
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
             self._custom_units = None  # a restarted server has forgotten it
+        if self.jobs.moving:
+            self.jobs.cancel(
+                f"{why or 'the reply to the move was lost'}; the robot was stopped: see the topic"
+                " `docked`, then call again"
+            )
         pending = self.conversation.pending
         answers = ANSWERS.get(self.motion, ())
         owed = int(pending is not None and any(form in answers for form in pending.word.forms))

@@ -9,6 +9,7 @@ from mart_bench import MartBench
 
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
 
 
@@ -44,6 +45,50 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
     assert bench.robot.stands
     assert b"SL" in bench.said()
     assert bench.board._pilot.jobs.job is None
+
+
+def test_a_robot_that_must_not_move_does_not_dock() -> None:
+    """The motor board reports a trip: TF is not sent, and the answer names the trip."""
+    bench = MartBench(motor_status=4).ready()
+    done = bench.job(Job.DOCK, "DOCK", 20)
+    assert not done.success
+    assert "motor 1 trip" in done.message
+    assert not any(data.startswith(b"TF") for data in bench.said())
+
+
+def test_docking_ends_with_the_stop_of_its_move() -> None:
+    """The reply to TF is lost: the driver stops the robot, and other services are free again."""
+    bench = MartBench().ready()
+    inner = bench.robot.advance
+
+    def advance() -> list[Packet]:
+        return [packet for packet in inner() if b"ok 20" not in packet[1]]
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
+    done = bench.job(Job.DOCK, "DOCK", 20, limit_s=30.0)
+    assert not done.success
+    assert "lost" in done.message
+    assert bench.board._pilot.jobs.job is None
+    bench.run(3.0)
+    assert bench.robot.stands
+    assert bench.job(Job.BIAS).success
+
+
+def test_a_missing_reply_to_a_cancelled_job_does_not_end_the_next_one() -> None:
+    """The second download is sent and done, although the first one's reply was lost."""
+    bench = MartBench().ready()
+    bench.command(0.0, 0.5, 2.0)
+    bench.run(3.0)
+    inner = bench.robot.receive
+    bench.robot.receive = lambda data, now, channel: (  # type: ignore[method-assign]
+        None if data == b"LAST MOVE" else inner(data, now, channel)
+    )
+    bench.board.ask(Job.LAST_MOVE, "first", bench.now)
+    bench.run_until(lambda: b"LAST MOVE" in bench.said(), 5.0)
+    bench.try_command(0.0, 0.0)
+    bench.run(1.0)
+    done = bench.job(Job.LAST_TURN)
+    assert done.success, done
 
 
 def test_the_last_move_and_turn_are_downloaded_whole() -> None:
