@@ -39,7 +39,7 @@ class Asking(Stops):
         self.conversation.give_up(now)
         self.state, self.motion = State.ASKING, Motion.UNKNOWN
         self.greeted = self._conflict = False
-        self._custom_units = None
+        self._turns.forget_setting()
         self._asked_count = None
         self._name_from_s = now + 2 * self._delay_s
         self._named_s = -math.inf

@@ -18,9 +18,9 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.pilot import Pilot
+from omnibot_driver.core.mart.required_motion import SLOWEST_MPS, SLOWEST_RADPS
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import State
-from omnibot_driver.core.mart.stops import SLOWEST_MPS, SLOWEST_RADPS
 from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import NOTHING_MEASURED, Reading

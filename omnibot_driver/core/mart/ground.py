@@ -20,8 +20,10 @@ from omnibot_driver.core.mart.jobs import Jobs
 from omnibot_driver.core.mart.odometry import MartOdometry
 from omnibot_driver.core.mart.polls import Polls
 from omnibot_driver.core.mart.replies import MartDecoder
+from omnibot_driver.core.mart.required_motion import STANDING
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.speed_loop import SpeedLoop
+from omnibot_driver.core.mart.spot_turns import SpotTurns
 from omnibot_driver.core.mart.states import (
     HARMFUL_LATE,
     ROLLING,
@@ -34,7 +36,6 @@ from omnibot_driver.core.mart.words import Request, Word
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
-STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 STARTS_UP_S: Final = 1.5
 """Time in s from the first reply after an absence within which no motion is started.
 
@@ -74,6 +75,7 @@ class Ground:
         self.jobs = Jobs()
         self.proof = StopProof()
         self._surplus = Surplus()
+        self._turns = SpotTurns(settings, self.odometry, self.loop)
         self._polls = Polls()
         self.readings: list[Reading] = []
         self.lost = 0
@@ -88,6 +90,7 @@ class Ground:
     @settings.setter
     def settings(self, settings: MartSettings) -> None:
         self._settings = self.odometry.settings = self.loop.settings = settings
+        self._turns.settings = settings
         self.conversation.delay_s = settings.network_delay_s
 
     def connect(self) -> None:
@@ -96,6 +99,7 @@ class Ground:
         self.jobs.cancel("the connection was lost meanwhile; call again once it is back")
         self.jobs.logging = self.jobs.ended = False
         self.odometry.connect()
+        self._turns.connect()
         self._polls.connect()
         self.health.connect()
         self.imu.connect()
@@ -111,11 +115,6 @@ class Ground:
         self._last_move: Request | None = None
         self._started_s = self._begun_s = self._harmful_s = self._halted_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
-        self._spin_radps = self._spin_seen_radps = self._corrected_radps = 0.0
-        self._spin_units = 0
-        self._custom_units: int | None = None
-        self._custom_s = -math.inf
-        self._custom_refused = False
         self._blocked: Motion = Motion.NONE
         self._obstacle_told = False
         self._stray_s = self._swept_s = -math.inf

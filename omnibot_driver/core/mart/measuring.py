@@ -83,7 +83,7 @@ class Measuring(Starts):
                 self.odometry.rest()
             self._watch_stray(before, count, now)
         elif self.state is State.TURNING:
-            self._spin_seen_radps = rate
+            self._turns.seen_radps = rate
         else:
             self._fresh = True
             self._learn(reading, now)

@@ -13,10 +13,9 @@ from typing import Final
 from omnibot_driver.core.commands.actuator import Wanted
 from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
-from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, GREET_S, STARTS_UP_S
-from omnibot_driver.core.mart.measuring import Measuring
-from omnibot_driver.core.mart.replies import Fail, Ok, Reply
+from omnibot_driver.core.mart.hearing import Hearing
+from omnibot_driver.core.mart.required_motion import is_standstill
 from omnibot_driver.core.mart.states import (
     HALTS,
     LAST_HALTS,
@@ -24,8 +23,8 @@ from omnibot_driver.core.mart.states import (
     State,
 )
 from omnibot_driver.core.mart.stopping import REPEAT_S
-from omnibot_driver.core.mart.stops import HALF_STUCK, LOST_REPEAT_S, STUCK, stands
-from omnibot_driver.core.mart.words import Form, Kind, Word
+from omnibot_driver.core.mart.stops import HALF_STUCK, LOST_REPEAT_S, STUCK
+from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 STOPS_S: Final = 1.0
@@ -39,14 +38,9 @@ VOLTS_S: Final = 10.0
 """Longest time in s for which VOLTS waits for a network that loses nothing."""
 COPY_S: Final = 0.25
 """If ENC is unanswered for this time in s after a controlled move, a duplicate may be running."""
-BLIND_PART: Final = 0.15
-"""Largest unanswered change of motor units while the heading is unknown, as a part of the units.
-
-A larger unanswered change stops the robot.
-"""
 
 
-class Pilot(Measuring):
+class Pilot(Hearing):
     """The pilot of one server: decides which request is sent, and evaluates the replies."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
@@ -57,10 +51,10 @@ class Pilot(Measuring):
             )
         if wanted is not self._wanted:
             self._move = None
-            if self._wanted is None or wanted is None or stands(wanted):
+            if self._wanted is None or wanted is None or is_standstill(wanted):
                 self._blocked = Motion.NONE
         self._wanted = wanted
-        if stands(wanted) and wanted is not None:
+        if is_standstill(wanted) and wanted is not None:
             self.proof.stopped(now)
             self._estop_said_s = now - ESTOP_REPEAT_S
         self._next_s = -math.inf
@@ -125,7 +119,7 @@ class Pilot(Measuring):
         times = [max(self._polls.wake_at(self.state), now + 0.004)]
         if self.state is State.STILL and isinstance(self._wanted, EmergencyStop):
             times.append(max(now + 0.01, self._estop_said_s + ESTOP_REPEAT_S))
-        if self.state is State.STILL and not stands(self._wanted):
+        if self.state is State.STILL and not is_standstill(self._wanted):
             times.append(max(now + 0.01, self._again_s, self._harmful_s + self._delay_s))
         return min(times)
 
@@ -182,126 +176,6 @@ class Pilot(Measuring):
         if self.odometry.wheel.told_s >= self._rested_s:  # maybe by a late reply
             silent_s += 2 * self._delay_s
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
-
-    def hear(self, data: bytes, now: float) -> None:
-        """Evaluate a datagram from the command port."""
-        self._next_s = -math.inf
-        if self.jobs.collecting:
-            self.heard_s = now
-            self.jobs.piece(data, now)
-            return
-        for reply in self.decoder.feed(data, now):
-            self._hear(reply, now)
-
-    def _hear(self, reply: Reply, now: float) -> None:
-        self._hears(now)
-        if isinstance(reply, Ok) and reply.form is Form.NAME:
-            self._named(reply, now)
-            return
-        if self.state is State.LOST or (self._stopping is not None and self._stopping.last_port):
-            self._outlives(reply)
-        if self.state is State.LOST:
-            return
-        if self._stopping is not None:
-            late = isinstance(reply, Ok) and self._may_be_late(reply, now)
-            if isinstance(reply, Ok):
-                self.conversation.heard(reply.form, now)
-            if late or self._may_be_count(reply, now):
-                if isinstance(reply, Ok):
-                    self._stopping.doubt(reply)
-                return
-            if self._stopping.hear(reply, now):
-                self._stopped(now)
-            return
-        answer = self.conversation.hear(reply, now)
-        if answer is not None:
-            self._answered(answer, now)
-
-    def _may_be_late(self, reply: Ok, now: float) -> bool:
-        """Return whether a reply after a stop may answer an earlier request, or be a copy.
-
-        A bare ``ok`` may answer the start or the check. A number, which is also the reply to a stop
-        of a turn on the spot, may be a count that was requested before the stop.
-        """
-        late = now < self.conversation.late_until_s(reply.form)
-        if reply.form is Form.INTEGER and late:
-            self.conversation.came(reply, now)
-        return late and reply.form in (Form.NOTHING, Form.INTEGER)
-
-    def _named(self, reply: Ok, now: float) -> None:
-        if reply.text != "BBB":
-            self._once(
-                f"another server answers HELLO with '{reply.text}' instead of 'BBB'; motion is"
-                " refused; check `port`"
-            )
-            self.health.stranger = reply.text
-            return
-        self.health.stranger = ""
-        if self._stopping is not None and self._stopping.asks_name(now):
-            self._stopped(now)  # the port is free: the move is over, its reply was lost
-        if self.state is State.MOVING and now >= self._started_s + GREET_S:
-            self._free_s = min(self._free_s, now + self._delay_s)  # its reply may be on its way
-        if self.state is State.ASKING:
-            self._named_s = now
-        if self.state is State.LOST:
-            self._ask_what_moves(now)
-            self._named_s = self._name_from_s
-
-    def _named_in_a_move(self, now: float) -> None:
-        """Stop any motion: a server that gives its name is not busy with a controlled move.
-
-        Its reply to the move was lost, or it was restarted while the motors turn.
-        """
-        self.appeared_s = now
-        self._moved_by = None
-        if self.motion is Motion.STRAIGHT:
-            self.odometry.finish_straight()
-        self.motion = Motion.UNKNOWN
-        self._halt(now)
-
-    def _answered(self, answer: Answer, now: float) -> None:
-        word, reply = answer.word, answer.reply
-        if self.state is State.ASKING:
-            self._asked(answer, now)
-        elif word.kind is Kind.QUERY:
-            self._measured(answer, now)
-        elif word.kind is Kind.CHECK:
-            self._checked(answer, now)
-        elif word.kind is Kind.START:
-            self._started(answer, now)
-        elif word.kind is Kind.CHANGE:
-            if isinstance(reply, Fail):
-                self._halt(now, self._obstacle(reply, self.motion))
-            elif reply.form is Form.DECIMAL:
-                self._turned(reply.number, answer.when, now)
-        elif word.kind is Kind.MOVE:
-            self._moved(reply, now)
-        elif word is words.SSP:
-            self._custom_set(reply)
-        else:
-            self.jobs.answered(answer, now)
-            self.state = State.SERVING if self.jobs.collecting else State.STILL
-
-    def _missed(self, word: Word, now: float) -> None:
-        """React to a reply that did not come in time."""
-        if self.state is State.ASKING:
-            self._unanswered(word)
-        elif word.kind is Kind.START:
-            self._halt(now, f"the controller did not answer {word.text}")
-        elif word.kind is Kind.MOVE:
-            self._halt(now)  # its reply is lost, or it takes too long; the way is planned again
-        elif word.kind is Kind.CHECK:
-            self.state = State.STILL
-            self.imu.missed(now)
-        elif word.kind is Kind.SERVICE:
-            self.state = State.STILL
-            self.jobs.missed(word, now)
-        elif word.kind is Kind.CHANGE:
-            self.loop.missed()
-            if self.odometry.left_over_right is not None and self.loop.part > BLIND_PART:
-                self._halt(now)  # its turn would be unknown; the motion is started again
-        else:
-            self._polls.press(word)
 
     def _may_ask_volts(self, now: float) -> bool:
         """Return whether the server is certainly complete, as VOLTS crashes one that starts up.

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The start and adjustment of motions: a fresh proof of the IMU, then the start command.
+"""The start of motions: a fresh proof of the IMU, then the start command.
 
 This module knows the wanted motion and the start commands; it does not know when a motion must end.
 Time is an argument.
@@ -11,10 +11,11 @@ from typing import Final
 
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.adjusting import Adjusting
 from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, GREET_S, STARTS_UP_S
-from omnibot_driver.core.mart.moves import Moves
-from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.replies import Fail
+from omnibot_driver.core.mart.spot_turns import SLOW_UNITS
 from omnibot_driver.core.mart.states import (
     HALTS,
     HARMFUL_LATE,
@@ -24,20 +25,11 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
-from omnibot_driver.core.mart.stops import CREEP_MPS
 from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import DisplacementReading
 
-WAG_S, WAG_UNITS = 0.2, 2
-"""Time in s of constant heading after which the driver turns the robot a little; units for that.
-
-A change of the heading then shows that the IMU is alive and the robot has driven straight.
-"""
 TIMED_OUT_S: Final = 0.5
 """Shortest time in s in which the server finds that no wheel turns after a start."""
-JUST_SET_S: Final = 2.0
-"""Time in s after SSP within which the server certainly knows the speed of R and L."""
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
@@ -47,12 +39,10 @@ REFERENCE_FAILS: Final = 2
 
 A single one also comes from an intact server, after a stop that took long.
 """
-SLOW_UNITS: Final = 20
-"""Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 
 
-class Starts(Moves):
-    """The part of the pilot that starts and adjusts motions."""
+class Starts(Adjusting):
+    """The part of the pilot that starts motions."""
 
     def _act(self, now: float) -> Packets:
         if self.state is State.STILL:
@@ -60,30 +50,6 @@ class Starts(Moves):
         if self.state in (State.DRIVING, State.REVERSING) and self._fresh:
             return self._adjust(now)
         return NO_PACKETS
-
-    def _adjust(self, now: float) -> Packets:
-        """Return the command that corrects the motors' units by the measured speed, if needed."""
-        odometry = self.odometry
-        if self.state is State.DRIVING and not odometry.heading.is_known:
-            if abs(odometry.speeds.means[0]) > CREEP_MPS:
-                odometry.heading.started()
-            return NO_PACKETS
-        self._fresh = False
-        _, twist = self._wish(now)
-        change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
-        self.commanded = twist
-        if change is None and self._heading_is_told and self._frozen_s > WAG_S:
-            change = (-WAG_UNITS, WAG_UNITS)  # a living IMU shows it; the next change undoes it
-        if change is None:
-            return NO_PACKETS
-        right, left = change
-        self._require(words.RMCS if self.state is State.DRIVING else words.CS)
-        self.loop.changed(right, left, now)
-        if self.state is State.DRIVING:
-            return self._ask(words.RMCS.request(right, left), now)
-        self._predict_turn()
-        self.odometry.guess_changed(self.loop.part, self._late_s)
-        return self._ask(words.CS.request(-right, -left), now)
 
     def _act_still(self, now: float) -> Packets:
         if not self._rolled_out and not self._rescue:
@@ -106,8 +72,10 @@ class Starts(Moves):
         if why := self.refusal:
             self._notice(why, halt=True)
             return NO_PACKETS
-        if packets := self._prepare_spin(start, now):
-            return packets
+        if start.word in (words.R, words.L):
+            _, twist = self._wish(now)
+            if setting := self._turns.setting(twist.yaw_rate_radps, now, self._delay_s):
+                return self._ask(setting, now)
         if self._copies_may_come(now):
             return NO_PACKETS
         if start.word in NEEDS_IMU and not self.imu.fresh(now):
@@ -130,7 +98,7 @@ class Starts(Moves):
         if motion is Motion.NONE or motion is self._blocked:
             return None
         if motion is Motion.SPIN:
-            return self._spin_request(twist.yaw_rate_radps)
+            return self._turns.request(twist.yaw_rate_radps)
         if self.health.obstacle(motion, now):
             self._block(motion, "an obstacle is too near")
             return None
@@ -138,37 +106,6 @@ class Starts(Moves):
             units = self.loop.first_units(twist.vx_mps, twist.yaw_rate_radps)
             return words.RM.request(units)
         return words.B.request("SLOW")
-
-    def _spin_request(self, rate_radps: float) -> Request:
-        word = words.L if rate_radps > 0.0 else words.R
-        if self._spin_is_fixed:
-            return word.request("SLOW")
-        return word.request("CUSTOM")
-
-    def _prepare_spin(self, start: Request, now: float) -> Packets:
-        """Return the command that sets the speed of R and L (SSP), if that speed is not set yet.
-
-        SSP must be sent before the check of the IMU.
-        """
-        if start.word not in (words.R, words.L) or self._spin_is_fixed:
-            return NO_PACKETS
-        _, twist = self._wish(now)
-        units = self.loop.spin_units(twist.yaw_rate_radps)
-        if units == self._custom_units or now < self._custom_s + self._delay_s:
-            return NO_PACKETS  # a copy of an older speed must not come after a newer one
-        self._spin_units = units
-        self._custom_s = now
-        return self._ask(words.SSP.request(5, units), now)
-
-    def _custom_set(self, reply: Ok | Fail) -> None:
-        if isinstance(reply, Ok):
-            self._custom_units = self._spin_units
-            return
-        self._custom_refused = True
-        self._once(
-            "the server does not set the speed of turns on the spot; they have its own speed SLOW,"
-            " which is faster than most commands, as with `spin_speed`: fixed (reported once)"
-        )
 
     def _check(self, now: float) -> Packets:
         """Return the check of the IMU, once no late reply can be mistaken for the check's reply."""
@@ -208,7 +145,6 @@ class Starts(Moves):
         self.imu.used()
         _, twist = self._wish(now)
         self.commanded = twist
-        self._spin_radps = twist.yaw_rate_radps
         if start.word in HARMFUL_LATE:
             self._harmful_s = now
         self.proof.moved()
@@ -225,34 +161,15 @@ class Starts(Moves):
             self.loop.begin(int(start.data.split()[1]), False, now)
         elif self.motion is Motion.REVERSE:
             self.loop.begin(SLOW_UNITS, True, now)
-        elif self._spin_is_fixed:
-            self._spin_units = SLOW_UNITS
+        else:
+            self._turns.begin(twist.yaw_rate_radps)
         self._predict_turn()
         return self.conversation.ask(start, now, takes_s=_longest_s(start))
-
-    def _learn(self, moved: DisplacementReading, now: float) -> None:
-        """Learn from the last measurement how fast the motors turn with their units."""
-        self.loop.trip_s = self.conversation.trip_s
-        if moved.duration_s is not None:
-            blind = self.odometry.left_over_right is not None
-            self.loop.measured(moved.dx_m, moved.dyaw_rad, moved.duration_s, now, right_only=blind)
-        self._predict_turn()
-
-    def _predict_turn(self) -> None:
-        """Pass the ratio of wheel speeds to the odometry if RMRA does not report the turn."""
-        told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
-        if self.motion is Motion.REVERSE and not told:
-            self.odometry.left_over_right = self.loop.left_over_right
-            self.odometry.bend = self.loop.bend
-        elif self.motion in (Motion.SPIN, Motion.TURN):
-            self.odometry.left_over_right = -self.loop.balance
-        else:
-            self.odometry.left_over_right = None
 
     def _started(self, answer: Answer, now: float) -> None:
         if isinstance(answer.reply, Fail):
             # a restarted server has forgotten the speed of turns on the spot
-            forgot = self.motion is Motion.SPIN and now - self._custom_s > JUST_SET_S
+            forgot = self.motion is Motion.SPIN and self._turns.may_be_forgotten(now)
             if answer.took_s - self.conversation.trip_s > TIMED_OUT_S:
                 if not forgot:
                     self._learn_standing()
@@ -268,17 +185,6 @@ class Starts(Moves):
         self.odometry.started(now, sure=not answer.when.doubtful)  # else maybe it answers RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
-
-    def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Note that the left wheel, which nothing measures, may have turned for this time."""
-        units = self._spin_units if self.motion is Motion.SPIN else self.loop.units
-        most_m = units * self.loop.per_unit_mps * seconds
-        turn_rad = min(math.pi, most_m / self._settings.track_m)
-        self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
-
-    def _learn_standing(self) -> None:
-        """Learn that the motors need more units than those of the present motion to turn."""
-        self.loop.stood(self._spin_units if self.motion is Motion.SPIN else None)
 
     def _start_failed(self, reply: Fail, now: float) -> None:
         """Stop the robot after a failed start, as it may move nevertheless."""
@@ -303,7 +209,7 @@ class Starts(Moves):
         else:
             why = self._obstacle(reply, self.motion)
         if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
-            self._custom_refused = True
+            self._turns.refused()
         self._halt(now, f"{word.text} failed ({reply.reason or 'no reason given'}): {why}")
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:

@@ -10,14 +10,12 @@ import math
 from abc import ABC, abstractmethod
 from typing import Final
 
-from omnibot_driver.core.commands.actuator import Wanted
-from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Stop
+from omnibot_driver.core.commands.orders import Drive, GoTo
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
-from omnibot_driver.core.mart.ground import STANDING, Ground
-from omnibot_driver.core.mart.odometry import SLOWING_S
+from omnibot_driver.core.mart.ground import Ground
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
-from omnibot_driver.core.mart.speed_loop import turn_is_on_the_spot
+from omnibot_driver.core.mart.required_motion import STANDING, moving_order, required_motion
 from omnibot_driver.core.mart.states import (
     HALTS,
     ROLLING,
@@ -47,23 +45,7 @@ CREEP_MPS, CREEP_RADPS = 0.01, 0.02
 """Measured speeds in m/s and rad/s, of which one is exceeded by a robot that certainly moves."""
 BLOCKED_S: Final = 0.6
 """Time in s for which a wheel must stand in a drive before it is regarded as blocked."""
-SPIN_RATIO: Final = 0.35
-"""Part by which the commanded turn rate must change to restart a turn on the spot.
-
-The turn must be restarted because the server cannot change its rate.
-"""
-SPIN_OFF: Final = 0.2
-"""Relative error of the rate from which a turn on the spot is begun anew."""
-SPIN_SEEN_S, SPIN_LEARN_RAD = 1.0, 0.3
-"""Shortest turn on the spot that shows how fast the motors turn: a time in s, and an angle."""
-SPIN_RAD, SPIN_PART = 0.15, 0.4
-"""Largest difference of a turn reported by a stop from the expected turn: rad, plus a part.
-
-The expected turn comes from the encoder count and the commanded rate.
-"""
 LOST_REPEAT_S: Final = 1.0
-SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
-"""Commands below both limits, in m/s and rad/s, are regarded as a standstill."""
 NAMES: Final = {
     Motion.REFERENCE: "RM",
     Motion.REVERSE: "B",
@@ -79,24 +61,10 @@ class Stops(Ground, ABC):
     """The part of the pilot that stops motions."""
 
     def _order(self, now: float) -> Drive | GoTo | None:
-        wanted = self._wanted
-        if wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero:
-            return None
-        order = wanted.order(now)
-        return order if isinstance(order, Drive | GoTo) else None
+        return moving_order(self._wanted, now)
 
     def _wish(self, now: float) -> tuple[Motion, BodyTwist]:
-        """Return the motion that the present command requires, and its twist."""
-        order = self._order(now)
-        if not isinstance(order, Drive):
-            return Motion.NONE, STANDING
-        speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
-        if abs(speed) < SLOWEST_MPS and abs(rate) < SLOWEST_RADPS:
-            return Motion.NONE, STANDING
-        if turn_is_on_the_spot(speed, rate, self._settings.track_m):
-            return Motion.SPIN, BodyTwist(0.0, 0.0, rate)
-        motion = Motion.REFERENCE if speed > 0.0 else Motion.REVERSE
-        return motion, BodyTwist(speed, 0.0, rate)
+        return required_motion(self._order(now), self._settings.track_m)
 
     def _agrees(self, now: float) -> bool:
         """Return whether the present motion fits the present command, or job."""
@@ -106,35 +74,10 @@ class Stops(Ground, ABC):
         if motion is not self.motion:
             return False
         if motion is Motion.SPIN:
-            rate = twist.yaw_rate_radps
-            return (
-                rate * self._spin_radps > 0.0
-                and abs(rate - self._spin_radps) <= SPIN_RATIO * abs(self._spin_radps)
-                and not self._spin_is_off(rate, now)
-            ) or (self._spin_is_fixed and rate * self._spin_radps > 0.0)
+            turned_s = now - self._begun_s if self.state is State.TURNING else 0.0
+            disturbed = self.conversation.disturbed(now)
+            return self._turns.fits(twist.yaw_rate_radps, turned_s, disturbed=disturbed)
         return True
-
-    def _spin_is_off(self, rate_radps: float, now: float) -> bool:
-        """Return whether the turn on the spot is so far from its rate that it is begun anew.
-
-        Its stop tells how fast the motors turn with their units, so the next turn is right. This is
-        done once for each rate.
-        """
-        if self.state is not State.TURNING or now < self._begun_s + SPIN_SEEN_S:
-            return False
-        seen_radps = self.odometry.speeds.means[1]
-        wrong = abs(seen_radps - rate_radps) > SPIN_OFF * abs(rate_radps)
-        turned = abs(self.odometry.spun_rad) > SPIN_LEARN_RAD
-        if not (wrong and turned) or self.conversation.disturbed(now):
-            return False
-        if math.isclose(rate_radps, self._corrected_radps, rel_tol=SPIN_OFF):
-            return False
-        self._corrected_radps = rate_radps
-        return True
-
-    @property
-    def _spin_is_fixed(self) -> bool:
-        return self._custom_refused or self._settings.spin_speed == "fixed"
 
     def _why_stop(self, now: float) -> str:
         """Return why the present motion must not continue: a sentence, "wanted", or empty.
@@ -188,7 +131,7 @@ class Stops(Ground, ABC):
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
-            self._custom_units = None  # a restarted server has forgotten it
+            self._turns.forget_setting()
         if self.jobs.moving:
             self.jobs.cancel(
                 f"{why or 'the reply to the move was lost'}; the robot was stopped: see the topic"
@@ -244,7 +187,8 @@ class Stops(Ground, ABC):
         elif stopping.began is False and not self.conversation.doubles(now):
             self.odometry.wheel.refused()
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
-            self._spin_over(result.number, stopping.began_s, now)
+            uncounted_s = max(0.0, stopping.began_s - self.odometry.wheel.told_s)
+            self._turns.stopped(result.number, uncounted_s, now - self._begun_s)
         if motion is Motion.STRAIGHT:
             self.odometry.finish_straight()
         if isinstance(result, Fail):
@@ -257,38 +201,18 @@ class Stops(Ground, ABC):
             self.greeted = True
         self._rest(now)
 
-    def _may_be_count(self, reply: Reply, now: float) -> bool:
+    def _may_be_count(self, reply: Reply) -> bool:
         """Return whether a number cannot be the angle that the stop of a turn on the spot reports.
 
         The number is then a late reply to a query, such as an encoder count.
         """
         stopping = self._stopping
         assert stopping is not None
-        if stopping.motion is not Motion.SPIN or not isinstance(reply, Ok):
+        if stopping.motion is not Motion.SPIN:
             return False
-        if reply.form is not Form.INTEGER:
-            return False
-        odometry, trip_s = self.odometry, self.conversation.trip_s
-        spun_rad = odometry.spun_rad
-        unseen_s = max(0.0, stopping.began_s - max(odometry.wheel.told_s, self._started_s))
-        expected_rad = spun_rad + self._spin_radps * unseen_s
-        if abs(reply.number) <= 1 and abs(expected_rad) > SPIN_RAD:
-            return True  # MCSTAT, or a sonar
-        told_rad = math.radians(reply.number) * self._settings.heading_sign
-        most_rad = SPIN_RAD + SPIN_PART * abs(expected_rad) + abs(self._spin_radps) * 2 * trip_s
-        return abs(told_rad - expected_rad) > most_rad
-
-    def _spin_over(self, degrees: float, stopped_s: float, now: float) -> None:
-        odometry = self.odometry
-        uncounted_s = max(0.0, stopped_s - odometry.wheel.told_s) + SLOWING_S
-        rolled_rad = self._spin_seen_radps * uncounted_s
-        spun_rad = odometry.spun_rad
-        odometry.spin_told(degrees)
-        seconds = now - self._begun_s
-        if seconds > SPIN_SEEN_S and self._spin_units and abs(spun_rad) > SPIN_LEARN_RAD:
-            whole_rad = abs(spun_rad + rolled_rad)
-            steady_radps = self._spin_seen_radps * abs(math.radians(degrees)) / whole_rad
-            self.loop.spun(self._spin_units, steady_radps)
+        counted_s = max(self.odometry.wheel.told_s, self._started_s)
+        unseen_s = max(0.0, stopping.began_s - counted_s)
+        return self._turns.may_be_count(reply, unseen_s, self.conversation.trip_s)
 
     def _lose(self, now: float, why: str = "") -> None:
         """Regard the server as lost, and report that once.
@@ -365,7 +289,3 @@ class Stops(Ground, ABC):
                 f"obstacle {where} ({why}); this direction is refused until the command ends",
                 halt=False,
             )
-
-
-def stands(wanted: Wanted) -> bool:
-    return wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero

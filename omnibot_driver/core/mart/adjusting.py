@@ -1,0 +1,80 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The adjustment of the motors' units while the robot drives, and what the motors teach.
+
+This module knows the present motion and its measured speed; it does not know how a motion begins or
+ends. Time is an argument.
+"""
+
+import math
+
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.moves import Moves
+from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.mart.stops import CREEP_MPS
+from omnibot_driver.core.packets import NO_PACKETS, Packets
+from omnibot_driver.core.readings import DisplacementReading
+
+WAG_S, WAG_UNITS = 0.2, 2
+"""Time in s of constant heading after which the driver turns the robot a little; units for that.
+
+A change of the heading then shows that the IMU is alive and the robot has driven straight.
+"""
+
+
+class Adjusting(Moves):
+    """The part of the pilot that adjusts the present motion to the command."""
+
+    def _adjust(self, now: float) -> Packets:
+        """Return the command that corrects the motors' units by the measured speed, if needed."""
+        odometry = self.odometry
+        if self.state is State.DRIVING and not odometry.heading.is_known:
+            if abs(odometry.speeds.means[0]) > CREEP_MPS:
+                odometry.heading.started()
+            return NO_PACKETS
+        self._fresh = False
+        _, twist = self._wish(now)
+        change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
+        self.commanded = twist
+        if change is None and self._heading_is_told and self._frozen_s > WAG_S:
+            change = (-WAG_UNITS, WAG_UNITS)  # a living IMU shows it; the next change undoes it
+        if change is None:
+            return NO_PACKETS
+        right, left = change
+        self._require(words.RMCS if self.state is State.DRIVING else words.CS)
+        self.loop.changed(right, left, now)
+        if self.state is State.DRIVING:
+            return self._ask(words.RMCS.request(right, left), now)
+        self._predict_turn()
+        self.odometry.guess_changed(self.loop.part, self._late_s)
+        return self._ask(words.CS.request(-right, -left), now)
+
+    def _learn(self, moved: DisplacementReading, now: float) -> None:
+        """Learn from the last measurement how fast the motors turn with their units."""
+        self.loop.trip_s = self.conversation.trip_s
+        if moved.duration_s is not None:
+            blind = self.odometry.left_over_right is not None
+            self.loop.measured(moved.dx_m, moved.dyaw_rad, moved.duration_s, now, right_only=blind)
+        self._predict_turn()
+
+    def _predict_turn(self) -> None:
+        """Pass the ratio of wheel speeds to the odometry if RMRA does not report the turn."""
+        told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
+        if self.motion is Motion.REVERSE and not told:
+            self.odometry.left_over_right = self.loop.left_over_right
+            self.odometry.bend = self.loop.bend
+        elif self.motion in (Motion.SPIN, Motion.TURN):
+            self.odometry.left_over_right = -self.loop.balance
+        else:
+            self.odometry.left_over_right = None
+
+    def _doubt_the_left_wheel(self, seconds: float) -> None:
+        """Note that the left wheel, which nothing measures, may have turned for this time."""
+        units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
+        most_m = units * self.loop.per_unit_mps * seconds
+        turn_rad = min(math.pi, most_m / self._settings.track_m)
+        self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
+
+    def _learn_standing(self) -> None:
+        """Learn that the motors need more units than those of the present motion to turn."""
+        self.loop.stood(self._turns.units if self.motion is Motion.SPIN else None)

@@ -1,0 +1,150 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The reaction to each reply of the server, and to each reply that does not come in time.
+
+This module knows states and replies; it does not know which request is sent next. Time is an
+argument.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.conversation import Answer
+from omnibot_driver.core.mart.ground import GREET_S
+from omnibot_driver.core.mart.measuring import Measuring
+from omnibot_driver.core.mart.replies import Fail, Ok, Reply
+from omnibot_driver.core.mart.spot_turns import SETTING_REFUSED
+from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.mart.words import Form, Kind, Word
+
+BLIND_PART: Final = 0.15
+"""Largest unanswered change of motor units while the heading is unknown, as a part of the units.
+
+A larger unanswered change stops the robot.
+"""
+
+
+class Hearing(Measuring):
+    """The part of the pilot that hears the server."""
+
+    def hear(self, data: bytes, now: float) -> None:
+        """Evaluate a datagram from the command port."""
+        self._next_s = -math.inf
+        if self.jobs.collecting:
+            self.heard_s = now
+            self.jobs.piece(data, now)
+            return
+        for reply in self.decoder.feed(data, now):
+            self._hear(reply, now)
+
+    def _hear(self, reply: Reply, now: float) -> None:
+        self._hears(now)
+        if isinstance(reply, Ok) and reply.form is Form.NAME:
+            self._named(reply, now)
+            return
+        if self.state is State.LOST or (self._stopping is not None and self._stopping.last_port):
+            self._outlives(reply)
+        if self.state is State.LOST:
+            return
+        if self._stopping is not None:
+            late = isinstance(reply, Ok) and self._may_be_late(reply, now)
+            if isinstance(reply, Ok):
+                self.conversation.heard(reply.form, now)
+            if late or self._may_be_count(reply):
+                if isinstance(reply, Ok):
+                    self._stopping.doubt(reply)
+                return
+            if self._stopping.hear(reply, now):
+                self._stopped(now)
+            return
+        answer = self.conversation.hear(reply, now)
+        if answer is not None:
+            self._answered(answer, now)
+
+    def _may_be_late(self, reply: Ok, now: float) -> bool:
+        """Return whether a reply after a stop may answer an earlier request, or be a copy.
+
+        A bare ``ok`` may answer the start or the check. A number, which is also the reply to a stop
+        of a turn on the spot, may be a count that was requested before the stop.
+        """
+        late = now < self.conversation.late_until_s(reply.form)
+        if reply.form is Form.INTEGER and late:
+            self.conversation.came(reply, now)
+        return late and reply.form in (Form.NOTHING, Form.INTEGER)
+
+    def _named(self, reply: Ok, now: float) -> None:
+        if reply.text != "BBB":
+            self._once(
+                f"another server answers HELLO with '{reply.text}' instead of 'BBB'; motion is"
+                " refused; check `port`"
+            )
+            self.health.stranger = reply.text
+            return
+        self.health.stranger = ""
+        if self._stopping is not None and self._stopping.asks_name(now):
+            self._stopped(now)  # the port is free: the move is over, its reply was lost
+        if self.state is State.MOVING and now >= self._started_s + GREET_S:
+            self._free_s = min(self._free_s, now + self._delay_s)  # its reply may be on its way
+        if self.state is State.ASKING:
+            self._named_s = now
+        if self.state is State.LOST:
+            self._ask_what_moves(now)
+            self._named_s = self._name_from_s
+
+    def _named_in_a_move(self, now: float) -> None:
+        """Stop any motion: a server that gives its name is not busy with a controlled move.
+
+        Its reply to the move was lost, or it was restarted while the motors turn.
+        """
+        self.appeared_s = now
+        self._moved_by = None
+        if self.motion is Motion.STRAIGHT:
+            self.odometry.finish_straight()
+        self.motion = Motion.UNKNOWN
+        self._halt(now)
+
+    def _answered(self, answer: Answer, now: float) -> None:
+        word, reply = answer.word, answer.reply
+        if self.state is State.ASKING:
+            self._asked(answer, now)
+        elif word.kind is Kind.QUERY:
+            self._measured(answer, now)
+        elif word.kind is Kind.CHECK:
+            self._checked(answer, now)
+        elif word.kind is Kind.START:
+            self._started(answer, now)
+        elif word.kind is Kind.CHANGE:
+            if isinstance(reply, Fail):
+                self._halt(now, self._obstacle(reply, self.motion))
+            elif reply.form is Form.DECIMAL:
+                self._turned(reply.number, answer.when, now)
+        elif word.kind is Kind.MOVE:
+            self._moved(reply, now)
+        elif word is words.SSP:
+            if not self._turns.answered(reply):
+                self._once(SETTING_REFUSED)
+        else:
+            self.jobs.answered(answer, now)
+            self.state = State.SERVING if self.jobs.collecting else State.STILL
+
+    def _missed(self, word: Word, now: float) -> None:
+        """React to a reply that did not come in time."""
+        if self.state is State.ASKING:
+            self._unanswered(word)
+        elif word.kind is Kind.START:
+            self._halt(now, f"the controller did not answer {word.text}")
+        elif word.kind is Kind.MOVE:
+            self._halt(now)  # its reply is lost, or it takes too long; the way is planned again
+        elif word.kind is Kind.CHECK:
+            self.state = State.STILL
+            self.imu.missed(now)
+        elif word.kind is Kind.SERVICE:
+            self.state = State.STILL
+            self.jobs.missed(word, now)
+        elif word.kind is Kind.CHANGE:
+            self.loop.missed()
+            if self.odometry.left_over_right is not None and self.loop.part > BLIND_PART:
+                self._halt(now)  # its turn would be unknown; the motion is started again
+        else:
+            self._polls.press(word)

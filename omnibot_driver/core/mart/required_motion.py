@@ -1,0 +1,44 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The motion that a command requires, and its twist.
+
+This module knows commands and the track; it does not know the server. Time is an argument.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.commands.actuator import Wanted
+from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Stop
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.mart.speed_loop import turn_is_on_the_spot
+from omnibot_driver.core.mart.states import Motion
+
+STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
+SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
+"""Commands below both limits, in m/s and rad/s, are regarded as a standstill."""
+
+
+def is_standstill(wanted: Wanted) -> bool:
+    """Return whether the command requires no motion."""
+    return wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero
+
+
+def moving_order(wanted: Wanted, now: float) -> Drive | GoTo | None:
+    """Return the order of a command for this time, or None if it requires no motion."""
+    if wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero:
+        return None
+    order = wanted.order(now)
+    return order if isinstance(order, Drive | GoTo) else None
+
+
+def required_motion(order: Drive | GoTo | None, track_m: float) -> tuple[Motion, BodyTwist]:
+    """Return the motion that the order requires, and its twist; none for a goal."""
+    if not isinstance(order, Drive):
+        return Motion.NONE, STANDING
+    speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
+    if abs(speed) < SLOWEST_MPS and abs(rate) < SLOWEST_RADPS:
+        return Motion.NONE, STANDING
+    if turn_is_on_the_spot(speed, rate, track_m):
+        return Motion.SPIN, BodyTwist(0.0, 0.0, rate)
+    motion = Motion.REFERENCE if speed > 0.0 else Motion.REVERSE
+    return motion, BodyTwist(speed, 0.0, rate)

@@ -1,0 +1,162 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Turns on the spot: the setting of their speed, and what their rate and their stop teach.
+
+The server cannot change the rate of a turn, so another rate needs another turn. This module knows
+rates and motor units; it does not know when a turn begins or ends. Time is an argument.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.odometry import SLOWING_S, MartOdometry
+from omnibot_driver.core.mart.replies import Fail, Ok, Reply
+from omnibot_driver.core.mart.settings import MartSettings
+from omnibot_driver.core.mart.speed_loop import SpeedLoop
+from omnibot_driver.core.mart.words import Form, Request
+
+RATIO: Final = 0.35
+"""Part by which the commanded rate must change for a turn to be begun anew."""
+OFF: Final = 0.2
+"""Relative error of the rate from which a turn is begun anew."""
+SEEN_S, LEARN_RAD = 1.0, 0.3
+"""Shortest turn that shows how fast the motors turn: a time in s, and an angle in rad."""
+UNSURE_RAD, UNSURE_PART = 0.15, 0.4
+"""Largest difference of a turn reported by a stop from the expected turn: rad, plus a part.
+
+The expected turn comes from the encoder count and the commanded rate.
+"""
+JUST_SET_S: Final = 2.0
+"""Time in s after SSP within which the server certainly knows the speed of R and L."""
+SLOW_UNITS: Final = 20
+"""Speed of B SLOW, R SLOW and L SLOW, in motor units."""
+SETTING_REFUSED: Final = (
+    "the server does not set the speed of turns on the spot; they have its own speed SLOW,"
+    " which is faster than most commands, as with `spin_speed`: fixed (reported once)"
+)
+
+
+class SpotTurns:
+    """The turns by R and L.
+
+    ``settings`` may be replaced. ``units``: motor units of the last turn; ``seen_radps``: its
+    measured rate.
+    """
+
+    def __init__(self, settings: MartSettings, odometry: MartOdometry, loop: SpeedLoop) -> None:
+        self.settings = settings
+        self._odometry, self._loop = odometry, loop
+        self.connect()
+
+    def connect(self) -> None:
+        """Begin a new connection: nothing is known of the server's setting."""
+        self.units = 0
+        self.seen_radps = self._rate_radps = self._corrected_radps = 0.0
+        self._set_units: int | None = None
+        self._set_s = -math.inf
+        self._refused = False
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether all turns have the server's speed SLOW."""
+        return self._refused or self.settings.spin_speed == "fixed"
+
+    def request(self, rate_radps: float) -> Request:
+        """Return the command that starts a turn with this rate."""
+        word = words.L if rate_radps > 0.0 else words.R
+        return word.request("SLOW" if self.is_fixed else "CUSTOM")
+
+    def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
+        """Return the command to send before a turn with this rate (SSP), or None if none is needed.
+
+        It must be sent before the check of the IMU. ``delay_s``: longest delay of a datagram; a
+        copy of an older setting must not come after a newer one.
+        """
+        units = self._loop.spin_units(rate_radps)
+        if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
+            return None
+        self.units, self._set_s = units, now
+        return words.SSP.request(5, units)
+
+    def answered(self, reply: Ok | Fail) -> bool:
+        """Evaluate the reply to SSP; return whether the server has taken the setting."""
+        if isinstance(reply, Ok):
+            self._set_units = self.units
+        else:
+            self._refused = True
+        return not self._refused
+
+    def refused(self) -> None:
+        """Note that the server does not know turns with a speed that was set."""
+        self._refused = True
+
+    def forget_setting(self) -> None:
+        """Note that the server may have been restarted, so that it has lost the setting."""
+        self._set_units = None
+
+    def may_be_forgotten(self, now: float) -> bool:
+        """Return whether the server may have been restarted since the setting."""
+        return now - self._set_s > JUST_SET_S
+
+    def begin(self, rate_radps: float) -> None:
+        """Note that a turn with this rate begins."""
+        self._rate_radps = rate_radps
+        if self.is_fixed:
+            self.units = SLOW_UNITS
+
+    def fits(self, rate_radps: float, turned_s: float, *, disturbed: bool) -> bool:
+        """Return whether the present turn may continue under the command of this rate.
+
+        ``turned_s``: time since the turn has begun; ``disturbed``: whether measurements may be
+        missing.
+        """
+        if rate_radps * self._rate_radps <= 0.0:
+            return False
+        if self.is_fixed:
+            return True
+        near = abs(rate_radps - self._rate_radps) <= RATIO * abs(self._rate_radps)
+        return near and not self._is_off(rate_radps, turned_s, disturbed=disturbed)
+
+    def _is_off(self, rate_radps: float, turned_s: float, *, disturbed: bool) -> bool:
+        """Return whether the turn is so far from its rate that it is begun anew.
+
+        Its stop tells how fast the motors turn with their units, so the next turn is right. This is
+        done once for each rate.
+        """
+        if turned_s < SEEN_S or disturbed or abs(self._odometry.spun_rad) <= LEARN_RAD:
+            return False
+        if abs(self._odometry.speeds.means[1] - rate_radps) <= OFF * abs(rate_radps):
+            return False
+        if math.isclose(rate_radps, self._corrected_radps, rel_tol=OFF):
+            return False
+        self._corrected_radps = rate_radps
+        return True
+
+    def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
+        """Return whether a number cannot be the angle that the stop of this turn reports.
+
+        The number is then a late reply to a query, such as an encoder count. ``unseen_s``: time
+        from the last count to the stop; ``trip_s``: average duration of a query.
+        """
+        if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:
+            return False
+        expected_rad = self._odometry.spun_rad + self._rate_radps * unseen_s
+        if abs(reply.number) <= 1 and abs(expected_rad) > UNSURE_RAD:
+            return True  # MCSTAT, or a sonar
+        told_rad = math.radians(reply.number) * self.settings.heading_sign
+        most_rad = UNSURE_RAD + UNSURE_PART * abs(expected_rad) + abs(self._rate_radps) * 2 * trip_s
+        return abs(told_rad - expected_rad) > most_rad
+
+    def stopped(self, degrees: float, uncounted_s: float, turned_s: float) -> None:
+        """Evaluate the angle that the stop has reported, in degrees.
+
+        ``uncounted_s``: time from the last count to the stop; ``turned_s``: time since the turn has
+        begun.
+        """
+        odometry = self._odometry
+        spun_rad = odometry.spun_rad
+        odometry.spin_told(degrees)
+        if turned_s > SEEN_S and self.units and abs(spun_rad) > LEARN_RAD:
+            whole_rad = abs(spun_rad + self.seen_radps * (uncounted_s + SLOWING_S))
+            self._loop.spun(self.units, self.seen_radps * abs(math.radians(degrees)) / whole_rad)
