@@ -16,7 +16,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from omnibot_driver import messages
-from omnibot_driver.core.reporting.diagnosis import Diagnosis, Refusals
+from omnibot_driver.core.reporting.diagnosis import Diagnosis
+from omnibot_driver.core.reporting.figures import Refusals
 from omnibot_driver.core.reporting.status import Status
 from omnibot_driver.link import Link
 

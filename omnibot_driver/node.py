@@ -25,7 +25,7 @@ from std_msgs.msg import Bool, Float32MultiArray
 from omnibot_driver import boards, cdr, declaration, messages, parameters, selfcheck
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.reporting.diagnosis import Refusals
+from omnibot_driver.core.reporting.figures import Refusals
 from omnibot_driver.core.session import Session
 from omnibot_driver.diagnostics import Diagnostics
 from omnibot_driver.link import Link

@@ -17,8 +17,9 @@ from driver_process import Driver
 from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate.connection import connect
 from omnibot_driver.tools.calibrate.interruption import Interruption
-from omnibot_driver.tools.calibrate.robot import Robot, connect
+from omnibot_driver.tools.calibrate.robot import Robot
 
 Answer = Callable[[str], str]
 

@@ -14,7 +14,7 @@ import pytest
 
 from omnibot_driver import boards, calibration
 from omnibot_driver.boards.omnibot import PARAMETERS
-from omnibot_driver.tools.calibrate import imu, robot
+from omnibot_driver.tools.calibrate import connection, imu
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.result import Finding, Result
 
@@ -58,7 +58,7 @@ def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
         files = ["--output", str(folder / "robot.yaml"), "--plot", str(tmp_path / "imu.svg")]
         return main(["imu", *files, *words])
 
-    monkeypatch.setattr(robot, "connect", connect)
+    monkeypatch.setattr(connection, "connect", connect)
     return end
 
 

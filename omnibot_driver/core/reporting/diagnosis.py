@@ -9,11 +9,10 @@ and times; it does not know how they are obtained.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.board import RateName
-from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
+from omnibot_driver.core.reporting.figures import LinkFigures, Refusals, SessionFigures
 from omnibot_driver.core.reporting.recent import RecentFigures
 from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 
@@ -40,14 +39,6 @@ OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "Pose": ("Poses refused",),
 }
 """Figures that are left out for a board that does not send this kind of reading."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Refusals:
-    """The number of commands that were refused, and the reason for the last one."""
-
-    count: int = 0
-    last: str = ""
 
 
 class Diagnosis:

@@ -30,6 +30,14 @@ class LinkFigures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Refusals:
+    """The number of commands that were refused, and the reason for the last one."""
+
+    count: int = 0
+    last: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CommandFigures:
     """The figures of the commands.
 

@@ -56,7 +56,7 @@ def _calibrate(
     from omnibot_driver.tools.calibrate.files import draw, output_file, picture_file, save
 
     try:
-        from omnibot_driver.tools.calibrate.robot import connect
+        from omnibot_driver.tools.calibrate.connection import connect
     except ImportError as error:
         raise ToolError(f"this tool needs ROS 2 Jazzy's Python packages: {error}") from error
     run = import_module(f"omnibot_driver.tools.calibrate.{arguments.subcommand}").run

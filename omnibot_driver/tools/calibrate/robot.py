@@ -16,13 +16,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-import rclpy
 from geometry_msgs.msg import Twist, TwistStamped
-from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.context import Context
-from rclpy.exceptions import InvalidNamespaceException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float32MultiArray
 from std_srvs.srv import Trigger
 
@@ -52,30 +48,6 @@ UNRULY: Final = (
     "Stop was sent, but the robot still moves or sends no odometry; cut its power, then see"
     " docs/safety.md"
 )
-
-
-@contextmanager
-def connect(
-    namespace: str, ros_arguments: Sequence[str], interruption: Interruption
-) -> Iterator["Robot"]:
-    """Connect to the driver in this namespace. Raises ToolError if none is running there."""
-    context = Context()
-    quiet = SignalHandlerOptions.NO
-    try:
-        rclpy.init(args=list(ros_arguments), context=context, signal_handler_options=quiet)
-    except (RCLError, UnknownROSArgsError) as error:
-        raise ToolError(f"ROS does not understand its arguments: {error}") from error
-    try:
-        try:
-            node = Node("calibrate", namespace=namespace.rstrip("/"), context=context)
-        except InvalidNamespaceException as error:
-            raise ToolError(f"'{namespace}' is not a namespace: {error}") from error
-        try:
-            yield Robot(node, context, interruption)
-        finally:
-            node.destroy_node()
-    finally:
-        rclpy.shutdown(context=context)
 
 
 class Robot(Listener):

@@ -11,11 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 
 from omnibot_driver.tools.calibrate.tick_marks import Marks
+from omnibot_driver.tools.calibrate.whitening import correlation, whitener
 
 Column = NDArray[np.float64]
 
@@ -163,7 +163,7 @@ class Search:
         lags = 1
         if len(self._off) > 1:
             lags, self._good = LAGS, np.abs(every) < OUTLIER * spread
-        self._whitener = _whitener(_correlation(rows, lags), max(self._lengths))
+        self._whitener = whitener(correlation(rows, lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:
         """Return the relative residuals of these values, whitened and without outliers."""
@@ -274,38 +274,3 @@ class Search:
 
 def _cost(found: Any) -> float:
     return float(found.cost)
-
-
-def _correlation(rows: Sequence[Column], lags: int) -> Column:
-    """Return the correlation of each residual with the next ones, robust, and fading with the lag.
-
-    With one lag: -0.5 if marks are displaced, 0 if the errors of successive times are independent.
-    """
-    every = np.concatenate(rows)
-    spread = 3 * 1.4826 * float(np.median(np.abs(every)))
-    rows = [np.clip(row, -spread, spread) for row in rows]
-    lags = min(lags, min(map(len, rows)) - 1)
-    products = np.array(
-        [
-            sum(float(np.dot(row[lag:], row[: len(row) - lag])) for row in rows)
-            for lag in range(lags + 1)
-        ]
-    )
-    found = products / max(products[0], 1e-12)
-    if lags == 1:
-        found[1] = np.clip(found[1], -0.499, 0.0)
-        return np.asarray(found)
-    return np.asarray(found * (1.0 - np.arange(lags + 1) / (lags + 1)))
-
-
-def _whitener(correlation: Column, length: int) -> Column:
-    """Return the matrix that makes correlated residuals independent.
-
-    It is the inverse of the Cholesky factor. Its upper left part serves a shorter row.
-    """
-    column = np.zeros(length)
-    column[: len(correlation)] = correlation[:length]
-    matrix = toeplitz(column)
-    matrix[np.diag_indices(length)] += 1e-4
-    factor = cholesky(matrix, lower=True)
-    return np.asarray(solve_triangular(factor, np.eye(length), lower=True))

@@ -10,11 +10,12 @@ import pytest
 from omnibot_driver.core.board import BoardFigures, RateName
 from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.statistics import StreamStatistics
-from omnibot_driver.core.reporting.diagnosis import Diagnosis, Refusals
+from omnibot_driver.core.reporting.diagnosis import Diagnosis
 from omnibot_driver.core.reporting.figures import (
     CommandFigures,
     ImuFigures,
     LinkFigures,
+    Refusals,
     SessionFigures,
 )
 from omnibot_driver.core.reporting.recent import RECENT_S

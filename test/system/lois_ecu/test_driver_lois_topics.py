@@ -17,8 +17,8 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
 from std_msgs.msg import Float32MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
+from omnibot_driver.tools.calibrate.connection import connect
 from omnibot_driver.tools.calibrate.interruption import Interruption
-from omnibot_driver.tools.calibrate.robot import connect
 from omnibot_driver.tools.calibrate.tick_records import read
 from omnibot_driver.tools.needs import ToolError
 
