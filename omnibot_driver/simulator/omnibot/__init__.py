@@ -9,13 +9,8 @@ the command line.
 
 from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.common.serving import PtyBoard
-from omnibot_driver.simulator.omnibot.firmware import (
-    CHANNELS,
-    BoardMode,
-    ReceivedCommand,
-    SentFrame,
-    SimulatedBoard,
-)
+from omnibot_driver.simulator.omnibot.firmware import CHANNELS, BoardMode, SimulatedBoard
+from omnibot_driver.simulator.omnibot.logs import ReceivedCommand, SentFrame
 from omnibot_driver.simulator.omnibot.options import add_options, from_arguments
 from omnibot_driver.simulator.omnibot.receivers import ReceiverKind
 from omnibot_driver.simulator.omnibot.settings import BoardPose, BoardSettings

@@ -20,16 +20,17 @@ Assumptions where the manual says nothing, or contradicts itself:
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from enum import Enum
-from typing import Literal
 
 from omnibot_driver.simulator.common.board import Channel, Packet
 from omnibot_driver.simulator.omnibot import targets
 from omnibot_driver.simulator.omnibot.chassis import PlanarPose, Wheels
 from omnibot_driver.simulator.omnibot.imu import Mpu6050
+from omnibot_driver.simulator.omnibot.logs import CommandKind, ReceivedCommand, SentFrame
 from omnibot_driver.simulator.omnibot.motors import TICK_S, WheelController
 from omnibot_driver.simulator.omnibot.odometry import Odometry
+from omnibot_driver.simulator.omnibot.output import Output
 from omnibot_driver.simulator.omnibot.position import approach, commanded_pose
 from omnibot_driver.simulator.omnibot.receivers import CommandReceiver
 from omnibot_driver.simulator.omnibot.settings import BoardPose, BoardSettings
@@ -38,16 +39,9 @@ from omnibot_driver.simulator.omnibot.wire import (
     ControlFrame,
     ControlMode,
     StateLetter,
-    Triple,
-    delta_frame,
     imu_frame,
-    paused_text,
-    pose_frame,
 )
 from omnibot_driver.simulator.omnibot.world import Force, Held, TruePose, Twist, World
-
-TICKS_PER_POSE = 20
-TICKS_PER_TEXT = 100
 
 CHANNELS = (Channel(),)
 """One serial line."""
@@ -71,8 +65,6 @@ class BoardMode(Enum):
 
 _RUNNING = (BoardMode.NOMINAL, BoardMode.IMU_ONLY)
 
-CommandKind = Literal["velocity", "pose", "wheels", "estop", "start", "pause", "reset"]
-
 _FRAME_KINDS: dict[int, CommandKind] = {
     ControlMode.VELOCITY: "velocity",
     ControlMode.WHEELS: "wheels",
@@ -83,23 +75,6 @@ _LETTER_KINDS: dict[StateLetter, CommandKind] = {
     StateLetter.PAUSE: "pause",
     StateLetter.RESET: "reset",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class ReceivedCommand:
-    """A command that the board obeyed after ``tick`` ticks; a state letter has zeros as values."""
-
-    tick: int
-    kind: CommandKind
-    values: Triple = (0, 0, 0)
-
-
-@dataclass(frozen=True, slots=True)
-class SentFrame:
-    """A frame or text that the board sent in tick number ``tick``."""
-
-    tick: int
-    data: bytes
 
 
 class SimulatedBoard:
@@ -123,7 +98,6 @@ class SimulatedBoard:
 
     def __init__(self, settings: BoardSettings = _IDEAL) -> None:
         self.settings = settings
-        self._ticks_per_delta = round(settings.delta_period_s / TICK_S)
         self.tick = 0
         self.commands: deque[ReceivedCommand] = deque(maxlen=COMMAND_LOG)
         self.sent: deque[SentFrame] = deque(maxlen=SENT_LOG)
@@ -147,8 +121,7 @@ class SimulatedBoard:
         self._receiver = CommandReceiver(self.settings.receiver)
         self._encoders = self._world.encoders
         self._odometry = Odometry(self.settings, pose)
-        self._delta_seq = 0
-        self._pose_seq = 0
+        self._output = Output(self.settings)
         self._motors_off()
 
     @property
@@ -164,7 +137,7 @@ class SimulatedBoard:
     @property
     def odometry(self) -> BoardPose:
         """The board's own pose, in mm and mrad as in the 5 Hz frame."""
-        return BoardPose(*(1000 * value for value in self._odometry.pose))
+        return self._odometry.reported
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
         """Hold the robot by hand: tilt it by these angles (rad), turn it left at this rate (rad/s).
@@ -238,7 +211,12 @@ class SimulatedBoard:
         else:
             self._ticks_since_boot += 1
             self._control()
-        sent = self._paused_output() if self.mode is BoardMode.PAUSED else self._running_output()
+        if self.mode is BoardMode.PAUSED:
+            sent = self._output.text()
+        else:
+            sent = [imu_frame(*self._imu.read(self._world))]
+            if self.mode is BoardMode.NOMINAL:
+                sent += self._output.odometry_frames(self._ticks_since_boot, self._odometry)
         self.sent.extend(SentFrame(self.tick, data) for data in sent)
         return b"".join(sent)
 
@@ -285,8 +263,7 @@ class SimulatedBoard:
 
     def _pause(self) -> None:
         self.mode = BoardMode.PAUSED
-        self._ticks_to_text = 0
-        self._paused_count = 0
+        self._output.pause()
         self._motors_off()
 
     def _motors_off(self) -> None:
@@ -315,35 +292,3 @@ class SimulatedBoard:
                 )
             )
             self._pwm = (pwm_a, pwm_b, pwm_c)
-
-    # Output
-
-    def _paused_output(self) -> list[bytes]:
-        due = self._ticks_to_text == 0
-        self._ticks_to_text = (self._ticks_to_text or TICKS_PER_TEXT) - 1
-        if not due:
-            return []
-        count = self._paused_count
-        self._paused_count = (count + 1) % 256
-        return [paused_text(count)]
-
-    def _running_output(self) -> list[bytes]:
-        frames = [imu_frame(*self._imu.read(self._world))]
-        if self.mode is BoardMode.NOMINAL:
-            if self._ticks_since_boot % self._ticks_per_delta == 0:
-                frames.append(self._delta())
-            if self._ticks_since_boot % TICKS_PER_POSE == 0:
-                frames.append(self._absolute())
-        return frames
-
-    def _delta(self) -> bytes:
-        seq = self._delta_seq
-        self._delta_seq = (seq + 1) % 256
-        return delta_frame(self._odometry.difference(), seq)
-
-    def _absolute(self) -> bytes:
-        pose = self.odometry
-        seq = self._pose_seq
-        self._pose_seq = (seq + 1) % 256
-        order = self.settings.pose_byte_order
-        return pose_frame(pose.x_mm, pose.y_mm, pose.theta_mrad, seq, order)

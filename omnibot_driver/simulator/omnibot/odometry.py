@@ -25,6 +25,11 @@ class Odometry:
         self._settings = settings
         self._begin_difference()
 
+    @property
+    def reported(self) -> BoardPose:
+        """The board's own pose, in mm and mrad as in the 5 Hz frame."""
+        return BoardPose(*(1000 * value for value in self.pose))
+
     def integrate(self, counts: Triple) -> None:
         """Add what the encoders of wheels A, B, C counted in one control tick."""
         settings = self._settings

@@ -1,0 +1,27 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The entries of the board's logs: commands that it obeyed, and frames that it sent."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from omnibot_driver.simulator.omnibot.wire import Triple
+
+CommandKind = Literal["velocity", "pose", "wheels", "estop", "start", "pause", "reset"]
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedCommand:
+    """A command that the board obeyed after ``tick`` ticks; a state letter has zeros as values."""
+
+    tick: int
+    kind: CommandKind
+    values: Triple = (0, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class SentFrame:
+    """A frame or text that the board sent in tick number ``tick``."""
+
+    tick: int
+    data: bytes
