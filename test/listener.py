@@ -6,6 +6,8 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import pytest
+
 from omnibot_driver import boards
 from omnibot_driver.boards import omnibot
 from omnibot_driver.core.commands.limits import SpeedLimits
@@ -78,6 +80,12 @@ def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[An
         failed=listener.failed,
         **taps,
     )
+
+
+def end_patiently(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give every link more time at its end: on a busy computer the proof of rest comes later."""
+    for limit in ("STANDS_WITHIN_S", "SILENCE_S", "JOIN_TIMEOUT_S"):
+        monkeypatch.setattr(f"omnibot_driver.link.{limit}", PATIENCE_S)
 
 
 def kinds(board: SimulatedBoard) -> list[str]:
