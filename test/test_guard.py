@@ -29,6 +29,12 @@ from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import Keeper
 
 
+@pytest.fixture(autouse=True)
+def _no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy computer a guard may start, and repeat its stops, later than the driver waits."""
+    monkeypatch.setattr("omnibot_driver.keeper.SPEAKS_WITHIN_S", PATIENCE_S)
+
+
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
     """The driver has stopped the robot itself, so the guard writes nothing."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
