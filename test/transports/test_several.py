@@ -168,9 +168,10 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 
 
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
-    ends: Ends, lines: Several
+    ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The rest is written as soon as the other end's reader makes room."""
+    monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 60.0)
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     lines.write(((0, b"one"),))
