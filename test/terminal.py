@@ -18,7 +18,7 @@ def fill(descriptor: int, words: bytes = b"x") -> None:
     again. It does not report that, hence the pauses.
     """
     taken, full = 0, 0
-    while full < 5:
+    while full < 20:
         full += 1
         with contextlib.suppress(BlockingIOError):
             while True:
