@@ -23,6 +23,7 @@ from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.session import Session
 from omnibot_driver.link import Link
+from omnibot_driver.transports import Transport
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
@@ -64,12 +65,24 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
-    """The link reports that it is blocked; the e-stop is written first when there is room."""
+    """The link reports until the port is opened again that it is blocked.
+
+    The e-stop is written first when there is room.
+    """
     link, _ours = at_rest(terminal)
+    reader, may_open = link._reader, threading.Event()
+    opener = reader._open
+
+    def open_later() -> Transport:
+        assert may_open.wait(PATIENCE_S)
+        return opener()
+
+    reader._open = open_later
     assert not link.blocked
     terminal.fill()
     link.call(lambda session, now: session.estop(True, now))
     assert link.blocked
+    may_open.set()
     terminal.read_until(STOP + EMERGENCY_STOP)
     link.close("stop")
 
