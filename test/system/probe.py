@@ -18,6 +18,7 @@ from rclpy.task import Future
 from rclpy.time import Time
 from std_msgs.msg import String
 
+from omnibot_driver.node import WARN_EVERY_S
 from omnibot_driver.stall_detector import SETTLE_S
 
 
@@ -116,13 +117,16 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the probe's newest message again, when a stall is surely over."""
+        """Publish the probe's newest message again, when a stall is surely over.
+
+        By then the driver also logs another refusal, so that a second stall is noticed, too.
+        """
 
         def publish() -> None:
             with suppress(InvalidHandle):  # the test has ended or removed its publisher
                 self._publish_again()
 
-        threading.Timer(2 * SETTLE_S, publish).start()
+        threading.Timer(WARN_EVERY_S + 2 * SETTLE_S, publish).start()
 
     @contextmanager
     def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:
