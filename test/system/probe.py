@@ -180,7 +180,12 @@ class Probe:
         assert done.wait(PATIENCE_S), "no answer"
 
     def call(self, kind: type, service: str, **request: object) -> Any:
-        return self.call_async(kind, service, **request).wait()
+        """Call a service; return its answer. Call again if a stall has ended the driver's task."""
+        for _ in range(20):
+            answer = self.call_async(kind, service, **request).wait()
+            if "the driver stalled meanwhile" not in getattr(answer, "message", ""):
+                break
+        return answer
 
 
 class Answer:
