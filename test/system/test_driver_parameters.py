@@ -159,7 +159,7 @@ def test_tuning_changes_while_running_and_identity_does_not(
     twist = Twist()
     twist.linear.x = 0.3
     probe.publisher(Twist, "cmd_vel").publish(twist)
-    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), PATIENCE_S)
+    assert board.wait_for(lambda b: (30, 0, 0) in [c.values for c in b.commands], PATIENCE_S)
     text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="/dev/ttyUSB1")
     assert "read-only" in set_parameter(probe, "port", text).reason
     for value in (0.0, -1.0, float("nan"), 1e9):
@@ -177,12 +177,18 @@ def test_the_command_that_is_repeated_is_said_in_a_new_scale(
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")
+    commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = 0.3
-    probe.publisher(Twist, "cmd_vel").publish(twist)
-    assert board.wait_for(lambda b: b.commands[-1].values == (21, 0, 0), PATIENCE_S)
-    assert set_parameter(probe, "linear_scale", real(100.0)).successful
-    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), PATIENCE_S)
+    for _ in range(20):  # a stall of the computer stops the robot
+        assert set_parameter(probe, "linear_scale", real(70.0)).successful
+        commands.publish(twist)
+        if not board.wait_for(lambda b: b.commands[-1].values == (21, 0, 0), 1.0):
+            continue
+        assert set_parameter(probe, "linear_scale", real(100.0)).successful
+        if board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), 1.0):
+            return
+    raise AssertionError("the command is not repeated in the new scale")
 
 
 def test_every_parameter_is_described(
