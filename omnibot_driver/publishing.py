@@ -16,7 +16,6 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import ClockChange, JumpThreshold, TimeJump
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, String, UInt8MultiArray
@@ -30,9 +29,9 @@ from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.traits import Traits
+from omnibot_driver.qos import LATCHED
 from omnibot_driver.transforms import transform_publisher
 
-LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 RAW_DEPTH: Final = 1000
 """Queue depth of raw bytes; a recorder that is delayed for seconds still gets every byte."""
 UNHEARD: Final = ("disconnected", "connecting")

@@ -20,6 +20,7 @@ from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.traits import Traits
 from omnibot_driver.link import Link
+from omnibot_driver.qos import CALLS
 from omnibot_driver.replay import Replay
 
 
@@ -34,19 +35,17 @@ class Services:
     ) -> None:
         self._node, self._link = node, link
         self._calibration_file = calibration_file
-        node.create_service(SetBool, "~/estop", self._on_estop)
-        node.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry)
-        waiting = ReentrantCallbackGroup()
+        waiting = {"qos_profile": CALLS, "callback_group": ReentrantCallbackGroup()}
+        node.create_service(SetBool, "~/estop", self._on_estop, qos_profile=CALLS)
+        node.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry, qos_profile=CALLS)
         if Request.START in traits.requests:
-            node.create_service(Trigger, "~/start", self._on_start, callback_group=waiting)
+            node.create_service(Trigger, "~/start", self._on_start, **waiting)
         if Request.PAUSE in traits.requests:
-            node.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
+            node.create_service(SetBool, "~/pause", self._on_pause, **waiting)
         if Request.RESET in traits.requests:
-            node.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
+            node.create_service(Trigger, "~/reset", self._on_reset, **waiting)
         if traits.imu and not traits.calibrates_gyro:
-            node.create_service(
-                Trigger, "~/calibrate_gyro", self._on_calibrate_gyro, callback_group=waiting
-            )
+            node.create_service(Trigger, "~/calibrate_gyro", self._on_calibrate_gyro, **waiting)
 
     def _on_estop(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         active = bool(request.data)

@@ -24,6 +24,7 @@ from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
 from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
+from omnibot_driver.qos import CALLS
 
 LONGEST_S: Final = 120.0
 NAMES: Final = {
@@ -55,6 +56,7 @@ class Recorder:
                 f"~/record_{kind.value}",
                 partial(self._on_service, kind),
                 callback_group=waiting,
+                qos_profile=CALLS,
             )
 
     async def _on_service(

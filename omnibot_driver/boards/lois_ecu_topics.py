@@ -7,7 +7,6 @@ from typing import Any, Final, cast
 
 import rclpy
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
 from std_msgs.msg import Bool, Float32MultiArray, Header, String
 from std_srvs.srv import SetBool, Trigger
@@ -26,8 +25,8 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 from omnibot_driver.core.readings import EStopButtonReading
 from omnibot_driver.core.session import Session
+from omnibot_driver.qos import CALLS, LATCHED
 
-LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 FIX_VARIANCE_M2: Final = 0.4**2
 """Variance of a float32 longitude, in m². The GPS position is less accurate, but the board does not
 report its accuracy."""
@@ -63,8 +62,8 @@ class LoisEcuTopics:
             ),
         }
         self.publish |= Recorder(node, link, lambda: self._values).publish
-        node.create_service(SetBool, "~/led", self._on_led)
-        node.create_service(Trigger, "~/distribute_ball", self._on_ball)
+        node.create_service(SetBool, "~/led", self._on_led, qos_profile=CALLS)
+        node.create_service(Trigger, "~/distribute_ball", self._on_ball, qos_profile=CALLS)
         self._duty: Any = None
         self._terminal: Any = None
         self._make_what_the_modes_need()

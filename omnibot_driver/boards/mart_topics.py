@@ -13,7 +13,6 @@ import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import BatteryState, Range
 from std_msgs.msg import Bool, Header
@@ -31,8 +30,8 @@ from omnibot_driver.core.mart.readings import (
     SonarReading,
 )
 from omnibot_driver.core.session import Session
+from omnibot_driver.qos import CALLS, LATCHED
 
-LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 NAN: Final = float("nan")
 TIME_EVERY_S: Final = 1.0
 MINUTE_BEGINS_S: Final = 3
@@ -73,7 +72,9 @@ class MartTopics:
             ("download_last_turn", Job.LAST_TURN),
             ("download_log", Job.LOG_FILE),
         ):
-            node.create_service(Trigger, f"~/{name}", self._service(job), callback_group=group)
+            node.create_service(
+                Trigger, f"~/{name}", self._service(job), callback_group=group, qos_profile=CALLS
+            )
         if values["set_host_time"]:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(TIME_EVERY_S, self._set_time, clock=steady)

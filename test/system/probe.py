@@ -165,7 +165,9 @@ class Probe:
     def client(self, kind: type, service: str) -> Any:
         """Return the client of a service; reused, as the middleware never forgets a client."""
         if service not in self._clients:
-            self._clients[service] = self.node.create_client(kind, f"omnibot_driver/{service}")
+            self._clients[service] = self.node.create_client(
+                kind, f"omnibot_driver/{service}", qos_profile=QoSProfile(depth=1000)
+            )
             self._executor.wake()
         client = self._clients[service]
         assert client.wait_for_service(PATIENCE_S), f"no service {service}"

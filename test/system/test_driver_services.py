@@ -55,6 +55,14 @@ def drive_away(probe: Probe, board: PtyBoard) -> None:
     raise AssertionError("it does not get far")
 
 
+def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
+    """Each one is answered, in the order of the calls; the last one decides."""
+    latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
+    answers = [probe.call_async(SetBool, "estop", data=bool(n % 2)) for n in range(100)]
+    assert all(answer.wait().success for answer in answers)
+    probe.wait_for(lambda: latched and latched[-1].data)
+
+
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
     """Each is called twice; P is sent only once, and the board is in the requested mode."""
     for data, mode in [
