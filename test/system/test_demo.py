@@ -250,7 +250,7 @@ def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """The monitor shows the driver of the demo until the time is over; then the result follows."""
-    monkeypatch.setenv("DEMO_SECONDS", "6")  # the monitor may find the driver late
+    monkeypatch.setenv("DEMO_SECONDS", "20")  # the monitor may find the driver or draw late
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
         terminal.wait_for("ros2 topic hz /demo_")
         terminal.wait_for("/omnibot_driver  nominal")
