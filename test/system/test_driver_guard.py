@@ -121,6 +121,7 @@ def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
         mark, said = len(board.board.commands), len(driver.lines)
     for _ in range(20):
         commands.publish(twist(0.2))
+    driver.answers.clear()  # the probe does not publish it again
     driver.process.send_signal(signal.SIGCONT)
     stood = driver.wait_for_line("driver stalled for .* s", said)
     until_then = driver.lines[said : driver.lines.index(stood, said)]
