@@ -205,12 +205,13 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
     """The log reports the death of the first guard."""
-    driving(probe, board)
-    (first,) = driver.guards()
-    os.kill(first, signal.SIGKILL)
-    driver.wait_for_line("the guard process died.*starting another one")
-    wait_until(lambda: driver.guards() not in ([], [first]))
-    driver.end(signal.SIGKILL)
+    with probe.commanding(0.3):
+        (first,) = driver.guards()
+        os.kill(first, signal.SIGKILL)
+        driver.wait_for_line("the guard process died.*starting another one")
+        wait_until(lambda: driver.guards() not in ([], [first]))
+        assert board.wait_for(lambda b: not still(b), PATIENCE_S)
+        driver.end(signal.SIGKILL)
     assert board.wait_for(still, PATIENCE_S)
 
 
