@@ -175,9 +175,9 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     driver.wait_for_line("the line 'sense' is missing: /dev/no-such-port does not exist")
     probe_of(driver).wait_for_state("connecting")
     toy.wait_for(lambda robot: robot.heard[-2:] == 2 * [b"v 0 0"])
-    driver.process.kill()
-    driver.process.wait()
     with toy.served.lock:
+        driver.process.kill()
+        driver.process.wait()
         toy.served.board.left = toy.served.board.right = 100
         mark = len(toy.served.board.heard)
     toy.wait_for(lambda robot: robot.heard[mark:].count(b"v 0 0") >= 10)
