@@ -75,9 +75,17 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     assert board.wait_for(lambda b: newest(b).values != (0, 0, 0), PATIENCE_S)
 
 
-def test_a_zero_twist_is_the_stop_frame(probe: Probe, board: PtyBoard) -> None:
-    """A velocity frame (mode 1) with zeros is never sent."""
+def test_a_zero_twist_is_the_stop_frame(
+    board: PtyBoard, start_driver: Start, probe_of: Start
+) -> None:
+    """It ends a motion before its timeout; a velocity frame (mode 1) with zeros is never sent."""
+    probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
+    probe.wait_for_state("nominal")
     commands = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x = 0.3
+    commands.publish(twist)
+    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), PATIENCE_S)
     commands.publish(Twist())
     assert board.wait_for(lambda b: newest(b).kind == "wheels", PATIENCE_S)
     with board.lock:
