@@ -24,8 +24,10 @@ pytestmark = pytest.mark.skipif(SERVER is None, reason="fast-discovery-server is
 
 
 @contextmanager
-def program(command: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    """Run a program that ends when its input is closed; kill it if that takes longer than 1 s."""
+def program(
+    command: list[str], environment: dict[str, str], ends_within_s: float
+) -> Iterator[subprocess.Popen[str]]:
+    """Run a program and close its input in the end; kill it if it runs ``ends_within_s`` longer."""
     process = subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -41,7 +43,7 @@ def program(command: list[str], environment: dict[str, str]) -> Iterator[subproc
             assert process.stdin is not None
             process.stdin.close()
             try:
-                process.wait(1.0)
+                process.wait(ends_within_s)
             except subprocess.TimeoutExpired:
                 process.kill()
 
@@ -63,8 +65,8 @@ def test_a_super_client_finds_16_drivers_through_the_server() -> None:
     }
     fleet = str(DRIVERS), f"fleet{os.getpid()}_"
     with (
-        program([str(SERVER), "-i", "0", "-l", "127.0.0.1", "-p", port], environment),
-        program([sys.executable, str(FLEET), *fleet], environment),
+        program([str(SERVER), "-i", "0", "-l", "127.0.0.1", "-p", port], environment, 0.0),
+        program([sys.executable, str(FLEET), *fleet], environment, PATIENCE_S),
     ):
         observer = [sys.executable, str(OBSERVER), *fleet]
         as_super_client = {**environment, "ROS_SUPER_CLIENT": "TRUE"}
