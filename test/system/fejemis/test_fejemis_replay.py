@@ -55,4 +55,4 @@ def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
         listener = stack.enter_context(Probe(again.namespace))
         heard = listener.listen(Odometry, "odom")
         again.wait_for_line("the recording has ended")
-        listener.wait_for(lambda: abs(heard[-1].pose.pose.position.x - end_m) < 0.01)
+        listener.wait_for(lambda: heard and abs(heard[-1].pose.pose.position.x - end_m) < 0.01)

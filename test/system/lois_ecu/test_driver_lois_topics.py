@@ -101,7 +101,7 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
     lines = probe.listen(String, f"{NODE}/terminal")
     log = probe.listen(Log, "/rosout")
     set_parameter(probe, "terminal_mode", "gps")
-    probe.wait_for(lambda: lines and lines[-1].data.startswith("$HCHDT"))
+    probe.wait_for(lambda: any(line.data.startswith("$HCHDT") for line in lines))
     set_parameter(probe, "terminal_mode", "host")
     probe.wait_for(lambda: any("presses and releases" in line.msg for line in log))
     set_parameter(probe, "drive_mode", "duty")
