@@ -178,6 +178,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
     before = len(said)
     terminal.type("w" * 20)
     terminal.process.send_signal(signal.SIGCONT)
+    terminal.wait_for("\x1b[?1049h")  # it draws the screen again
     wait_for_ticks(board, 60)
     terminal.type("q")
     assert terminal.end() == 0
