@@ -10,7 +10,7 @@ import struct
 import subprocess
 import termios
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Self
 
 PATIENCE_S = 60.0
@@ -53,7 +53,26 @@ class PseudoTerminal:
 
     def type(self, keys: str) -> None:
         """Send keys as if they were pressed one after the other."""
-        os.write(self._far, keys.encode())
+        with self._changed:
+            os.write(self._far, keys.encode())
+
+    @contextlib.contextmanager
+    def holding(self, key: str) -> Iterator[None]:
+        """Repeat a key every 0.1 s in the context, until the terminal is closed."""
+        released = threading.Event()
+
+        def repeat() -> None:
+            with contextlib.suppress(OSError):  # the terminal is closed
+                while not released.wait(0.1):
+                    self.type(key)
+
+        keyboard = threading.Thread(target=repeat)
+        keyboard.start()
+        try:
+            yield
+        finally:
+            released.set()
+            keyboard.join()
 
     def wait_for(self, text: str) -> None:
         """Wait until the program has drawn this text, since the last text that was waited for."""
@@ -75,4 +94,6 @@ class PseudoTerminal:
                 with self._changed:
                     self._drawn += data
                     self._changed.notify_all()
-        os.close(self._far)
+        with self._changed:
+            os.close(self._far)
+            self._far = -1

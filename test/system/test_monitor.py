@@ -147,7 +147,10 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """The monitor is killed, or its window is closed, during a motion with stamped commands."""
+    """The monitor is killed, or its window is closed, while the key of a motion is held.
+
+    The commands are stamped.
+    """
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
 
@@ -158,8 +161,9 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     for end in (kill, PseudoTerminal.hang_up):
         terminal = monitor_of(driver, "--teleop")
         terminal.wait_for("0.15 m/s")
-        steer(terminal, board)
-        end(terminal)
+        with terminal.holding("w"):
+            assert board.wait_for(drives, PATIENCE_S)
+            end(terminal)
         assert board.wait_for(stands, 9.0)
 
 
