@@ -32,7 +32,8 @@ from std_msgs.msg import Bool, String
 TIMEOUT_S: Final = 0.5
 """The driver's ``cmd_vel_timeout`` in s."""
 GRACE_S: Final = 0.1
-"""Time after the timeout in which the robot must be at rest, in s of the stream."""
+REST_TICKS: Final = round(1.0 / TICK_S)
+"""Time at rest, in ticks, that shows a robot at rest for good."""
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
@@ -189,9 +190,18 @@ class Rig:
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect the motors to be off for good ``allowed_s`` (plus grace) after ``since_tick``."""
-        ticks = round((allowed_s + self._grace_s) / TICK_S)
-        self.wait_ticks(max(0, since_tick + ticks + 50 - self.line.tick))
+        """Expect the motors to be off for good ``allowed_s`` (plus grace) after ``since_tick``.
+
+        They are off for good once they have been off for ``REST_TICKS``.
+        """
+        allowed = since_tick + round(allowed_s / TICK_S)
+        latest = allowed + round(self._grace_s / TICK_S)
+
+        def is_decided(line: Any) -> bool:
+            off_from = min(max(allowed, line.driven_at), latest)
+            return bool(line.tick >= off_from + REST_TICKS)
+
+        assert self.wait_for_board(is_decided), self.driver.output
         stood_s = max(0, self.line.driven_at - since_tick) * TICK_S
         self.findings.stood_after_s.append(stood_s)
         self.findings.expect(
