@@ -86,7 +86,8 @@ class BaseSetpoint:
             self._setpoint = AT_REST
             if isinstance(before, BaseSetpoint):
                 self._setpoint = before._setpoint
-                self._reached_at = max(before._reached_at, since)
+                settled_at = max(before._reached_at, since)
+                self._reached_at = settled_at if before.settled else before._reached_at
 
     def order(self, now: float) -> Order:
         """Return the order for this time, and advance the ramp to it."""

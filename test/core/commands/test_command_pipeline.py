@@ -123,6 +123,16 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
     assert sent[-1][1] == [21, 28, 0]
 
 
+def test_a_ramp_is_as_steep_however_often_it_is_commanded() -> None:
+    """Each new command continues the step that is under way, here 100 times a second."""
+    bench = running(limits=GENTLE)
+    start = len(bench.written)
+    for _ in range(30):
+        bench.drive(0.5)
+        bench.run(0.01)
+    assert velocities(bench, start)[-1][1][0] >= 70 * 0.28
+
+
 def test_a_reversal_is_ramped_through_zero() -> None:
     """The ramp runs from forward to backward, and no step exceeds the acceleration limit."""
     bench = running(limits=GENTLE)
