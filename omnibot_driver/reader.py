@@ -55,6 +55,7 @@ class Reader:
         self.trouble = ""
         self.opened = self.received_bytes = 0
         self.overruns: int | None = None
+        self._earlier_overruns = 0
         self._count_at = -math.inf
         self._unguarded_told = False
 
@@ -94,6 +95,7 @@ class Reader:
         with self._lock:
             self._shared.port, self._shared.write_error, self._shared.keeper = port, None, keeper
             self.opened += 1
+            self._earlier_overruns += self.overruns or 0
             self.overruns, self._count_at = None, -math.inf
             self._session.opened(time.monotonic(), missing="; ".join(missing))
             if notices:
@@ -173,7 +175,7 @@ class Reader:
         self._count_at = now + COUNT_EVERY_S
         self.overruns = port.overruns
         if self.overruns:
-            self._session.overran(self.overruns)
+            self._session.overran(self._earlier_overruns + self.overruns)
 
     def _detach(self, port: Transport, *, comes_back: bool) -> None:
         """Stop the robot, then end the use of the port, whatever ended the reading."""

@@ -37,7 +37,7 @@ class Reporter:
     * ``events``: events since the last ``take``.
     * ``news_at``: time of the next ``look_for_news``, in s.
     * ``missing``: which lines are missing, as a sentence; empty if none.
-    * ``overruns``: how often the port has lost bytes since it was opened.
+    * ``overruns``: how often the ports of all connections have lost bytes.
     * ``shown``: public state and e-stop as of the last ``take``; a state that lasts only during one
       input is never shown.
     """

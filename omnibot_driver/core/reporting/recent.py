@@ -30,9 +30,9 @@ class RecentFigures:
             self._window.popleft()
 
     def grew(self, name: str, count: int, now: float) -> bool:
-        """Store the count of this name; return whether it has changed within RECENT_S."""
+        """Store the count of this name; return whether it has grown within RECENT_S."""
         before, at = self._counts.get(name, (count, -math.inf))
-        if count != before:
+        if count > before:
             at = now
         self._counts[name] = (count, at)
         return now - at < RECENT_S

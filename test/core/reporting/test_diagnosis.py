@@ -176,6 +176,16 @@ def test_what_happened_is_told_for_a_while_and_then_forgotten(
     assert not robot.troubles
 
 
+def test_a_count_that_begins_anew_has_not_grown() -> None:
+    """The port was opened again: the overruns of the last connection are no news."""
+    robot = Robot()
+    robot.connect(overruns=5)
+    robot.seconds(round(RECENT_S) + 3)
+    robot.connect(overruns=0)
+    robot.seconds(1)
+    assert not robot.troubles
+
+
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
     """Late reads lose nothing; they are named as the cause if rates are wrong."""
     robot = Robot()
