@@ -16,7 +16,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
 from nav_msgs.msg import Odometry
 from probe import Probe
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float32MultiArray
@@ -112,6 +113,26 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     driver = start_driver("/dev/null", calibration_file=path)
     driver.wait_for_line("calibration_file.*correct it, or remove it")
     assert driver.end() == 2
+
+
+def test_the_bias_is_what_was_set_last(
+    start_board: Callable[..., PtyBoard], start_driver: Callable[..., Driver], probe_of: Any
+) -> None:
+    """Standstills have refined it since; the parameter is set to the value that it shows."""
+    board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
+    probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
+    imu = probe.listen(Imu, "imu/data_raw")
+
+    def rate() -> float:
+        """Return the mean of the last 20 rates about z, as a part of the planted one."""
+        mean = sum(message.angular_velocity.z for message in imu[-20:]) / 20
+        return mean / math.radians(PLANTED_DPS[2])
+
+    probe.wait_for(lambda: len(imu) > 20 and rate() < 0.8)
+    now = {"auto_gyro_bias": False, "gyro_bias": [0.0, 0.0, 0.0]}
+    parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in now.items()]
+    probe.call(SetParameters, "set_parameters", parameters=parameters)
+    probe.wait_for(lambda: rate() > 0.95)
 
 
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:

@@ -38,9 +38,7 @@ class BiasCorrector:
         self.calibration = GyroCalibration(correction.gyro_bias, refine=correction.auto_gyro_bias)
 
     def configure(self, correction: ImuCorrection) -> None:
-        """Use new settings. Only a changed bias parameter replaces the measured bias."""
-        if correction.gyro_bias != self._correction.gyro_bias:
-            self.calibration.bias = correction.gyro_bias
+        """Use new settings, but keep the gyro's bias, which may have been measured since."""
         self.calibration.refine = correction.auto_gyro_bias
         self._correction = correction
 
