@@ -69,6 +69,8 @@ class Link:
         on_read: Callable[[Packet], None] | None = None,
         on_write: Callable[[Packet], None] | None = None,
     ) -> None:
+        self.unstopped = False
+        """Whether ``close`` could not send Stop to a robot that may be moving."""
         self._name, self._failed = port, failed
         shared = self._shared = SharedSession(session, deliver, refused, on_write)
         self._session = session
@@ -151,6 +153,7 @@ class Link:
                     self._shared.stood = told and self._session.shutdown.stands
                     self._shared.port.interrupt()
                     self._shared.port = None  # nothing may be sent after the shutdown sequence
+                self.unstopped = not told and self._session.shutdown.owed
             self._shared.closing.set()
             self._shared.changed.notify_all()
         *serving, teller = self._threads

@@ -30,6 +30,7 @@ from omnibot_driver.core.session import Session
 from omnibot_driver.diagnostics import Diagnostics
 from omnibot_driver.link import Link
 from omnibot_driver.publishing import Publishing
+from omnibot_driver.qos import DEEP
 from omnibot_driver.recording import is_recording, open_recording
 from omnibot_driver.replay import Replay
 from omnibot_driver.services import Services
@@ -127,6 +128,11 @@ class OmniBotDriver(Node):
     def close(self) -> None:
         """Stop the robot and close the port; ROS entities remain until ``destroy_node``."""
         if not self._link.close(self._values["on_exit"]):
+            if self._link.unstopped:
+                self.get_logger().warning(
+                    "the stop could not be sent, as the port is lost or accepts no data; check by"
+                    " eye that the robot has stopped"
+                )
             return
         if self._link.stands:
             self.get_logger().info("robot stopped and port closed")
@@ -157,7 +163,14 @@ class OmniBotDriver(Node):
         wheels = self._profile.kinematics(self._values)
         settings = parameters.session_settings(self._values, wheels)
         board = self._profile.settings(self._values)
-        self._link.call(lambda session, now: session.configure(settings, now, board=board))
+        bias = any(parameter.name == "gyro_bias" for parameter in changed)
+
+        def configure(session: Session, now: float) -> None:
+            session.configure(settings, now, board=board)
+            if bias:  # even if it is equal: standstills may have refined the bias since
+                session.gyro_bias = settings.imu.gyro_bias
+
+        self._link.call(configure)
 
     # From ROS to the board
 
@@ -180,7 +193,7 @@ class OmniBotDriver(Node):
         if Authority.POSE in authorities:
             obey = self._obey("cmd_pose", self._pose, may_be_old=messages.is_stamped)
             self.create_subscription(PoseStamped, "cmd_pose", obey, 1)
-        self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
+        self.create_subscription(Bool, "estop", self._on_estop_topic, DEEP)
 
     def _obey(
         self,

@@ -8,5 +8,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """A value that a later subscriber receives too."""
-CALLS: Final = QoSProfile(depth=1000)
-"""Calls of a service, none of which is lost: rclpy's own depth of 10 loses the oldest ones."""
+DEEP: Final = QoSProfile(depth=1000)
+"""Messages and calls of which none may be lost while the driver is busy.
+
+A queue of 10, as is usual, loses the older ones: a released button would wipe out its press.
+"""

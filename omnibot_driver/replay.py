@@ -79,6 +79,9 @@ class Replay:
         finally:
             self._outbox.deliver()
 
+    unstopped: Final = False
+    """A recording has no robot that may be moving."""
+
     @property
     def blocked(self) -> bool:
         """Always False, because nothing is written."""

@@ -20,7 +20,7 @@ from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.traits import Traits
 from omnibot_driver.link import Link
-from omnibot_driver.qos import CALLS
+from omnibot_driver.qos import DEEP
 from omnibot_driver.replay import Replay
 
 
@@ -35,9 +35,9 @@ class Services:
     ) -> None:
         self._node, self._link = node, link
         self._calibration_file = calibration_file
-        waiting = {"qos_profile": CALLS, "callback_group": ReentrantCallbackGroup()}
-        node.create_service(SetBool, "~/estop", self._on_estop, qos_profile=CALLS)
-        node.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry, qos_profile=CALLS)
+        waiting = {"qos_profile": DEEP, "callback_group": ReentrantCallbackGroup()}
+        node.create_service(SetBool, "~/estop", self._on_estop, qos_profile=DEEP)
+        node.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry, qos_profile=DEEP)
         if Request.START in traits.requests:
             node.create_service(Trigger, "~/start", self._on_start, **waiting)
         if Request.PAUSE in traits.requests:

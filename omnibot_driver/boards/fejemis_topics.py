@@ -31,7 +31,7 @@ from omnibot_driver.core.fejemis.board import FejemisBoard
 from omnibot_driver.core.fejemis.services import Services
 from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.core.session import Session
-from omnibot_driver.qos import CALLS
+from omnibot_driver.qos import DEEP
 
 NAN: Final = float("nan")
 WARN_EVERY_S: Final = 2.0
@@ -77,9 +77,13 @@ class FejemisTopics:
         waiting = ReentrantCallbackGroup()
         for name, job in SERVICES.items():
             node.create_service(
-                Trigger, f"~/{name}", self._service(job), callback_group=waiting, qos_profile=CALLS
+                Trigger,
+                f"~/{name}",
+                self._service(job),
+                callback_group=waiting,
+                qos_profile=DEEP,
             )
-        node.create_service(SetBool, "~/brush", self._on_brush, qos_profile=CALLS)
+        node.create_service(SetBool, "~/brush", self._on_brush, qos_profile=DEEP)
         node.create_subscription(Float32, "lift_cmd", self._on_lift, 1)
         node.create_subscription(ColorRGBA, "led_cmd", self._on_led, 1)
         node.add_post_set_parameters_callback(self._apply)

@@ -24,7 +24,7 @@ from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
 from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
-from omnibot_driver.qos import CALLS
+from omnibot_driver.qos import DEEP
 
 LONGEST_S: Final = 120.0
 NAMES: Final = {
@@ -56,7 +56,7 @@ class Recorder:
                 f"~/record_{kind.value}",
                 partial(self._on_service, kind),
                 callback_group=waiting,
-                qos_profile=CALLS,
+                qos_profile=DEEP,
             )
 
     async def _on_service(

@@ -25,7 +25,7 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 from omnibot_driver.core.readings import EStopButtonReading
 from omnibot_driver.core.session import Session
-from omnibot_driver.qos import CALLS, LATCHED
+from omnibot_driver.qos import DEEP, LATCHED
 
 FIX_VARIANCE_M2: Final = 0.4**2
 """Variance of a float32 longitude, in m². The GPS position is less accurate, but the board does not
@@ -62,8 +62,8 @@ class LoisEcuTopics:
             ),
         }
         self.publish |= Recorder(node, link, lambda: self._values).publish
-        node.create_service(SetBool, "~/led", self._on_led, qos_profile=CALLS)
-        node.create_service(Trigger, "~/distribute_ball", self._on_ball, qos_profile=CALLS)
+        node.create_service(SetBool, "~/led", self._on_led, qos_profile=DEEP)
+        node.create_service(Trigger, "~/distribute_ball", self._on_ball, qos_profile=DEEP)
         self._duty: Any = None
         self._terminal: Any = None
         self._make_what_the_modes_need()

@@ -30,7 +30,7 @@ from omnibot_driver.core.mart.readings import (
     SonarReading,
 )
 from omnibot_driver.core.session import Session
-from omnibot_driver.qos import CALLS, LATCHED
+from omnibot_driver.qos import DEEP, LATCHED
 
 NAN: Final = float("nan")
 TIME_EVERY_S: Final = 1.0
@@ -73,7 +73,7 @@ class MartTopics:
             ("download_log", Job.LOG_FILE),
         ):
             node.create_service(
-                Trigger, f"~/{name}", self._service(job), callback_group=group, qos_profile=CALLS
+                Trigger, f"~/{name}", self._service(job), callback_group=group, qos_profile=DEEP
             )
         if values["set_host_time"]:
             steady = Clock(clock_type=ClockType.STEADY_TIME)

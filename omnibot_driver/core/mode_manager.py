@@ -104,10 +104,10 @@ class ModeManager:
         self.output = NO_PACKETS
         self._begin(now)
 
-    def closed(self) -> None:
-        """Fail every request, as the port is lost."""
+    def closed(self, why: str) -> None:
+        """Fail every request for the reason ``why``, as the port is lost or closed."""
         self.phase = Phase.CLOSED
-        self._answer(False, "the port was lost meanwhile; call again once it is back")
+        self._answer(False, why)
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Begin a request; its answer appears in ``answers``. Raises RequestRefused at once.

@@ -109,6 +109,10 @@ class Session:
         """Bias that is subtracted from the gyro's readings, in rad/s."""
         return self._calibration.bias
 
+    @gyro_bias.setter
+    def gyro_bias(self, bias_radps: Vector3) -> None:
+        self._calibration.bias = bias_radps
+
     @property
     def wake_at(self) -> float:
         """Latest time for the next ``tick``, in s; infinity if nothing is due."""
@@ -153,15 +157,17 @@ class Session:
             self._commands.halt(now)
 
     def closed(self, now: float) -> None:
-        """End the connection, as the port is lost."""
+        """End the connection, as the port is lost or closed."""
         self.inbound.end(now)
-        self._mode_manager.closed()
-        for given_up in (self._calibration.give_up, self._task.give_up):
-            given_up("the port was lost meanwhile; call again once it is back")
+        self._interlocks.missing = self._reporter.missing = ""
+        why = self._interlocks.why_not_request()  # at the driver's end
+        why = why or "the port was lost meanwhile; call again once it is back"
+        for given_up in (self._mode_manager.closed, self._calibration.give_up, self._task.give_up):
+            given_up(why)
         self._commands.discard(now)
 
     def overran(self, count: int) -> None:
-        """Note how often the port has lost bytes since it was opened."""
+        """Note how often the ports of all connections have lost bytes."""
         self._reporter.overruns = count
 
     def tick(self, now: float) -> None:

@@ -39,6 +39,11 @@ class Shutdown:
         return self._policy.proof.proved
 
     @property
+    def owed(self) -> bool:
+        """Whether motion was commanded, and nothing has shown since then that the robot stands."""
+        return self._policy.proof.owed
+
+    @property
     def proof_takes_s(self) -> float:
         """Time to wait for the proof that the robot stands still, counted from Stop, in s."""
         return self._policy.proof.takes_s

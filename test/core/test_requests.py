@@ -52,6 +52,17 @@ def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
         bench.session.request(Request.PAUSE, object(), bench.now)
 
 
+def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None:
+    """The port was not lost, and there is nothing to call again."""
+    bench.speaks = False
+    bench.session.request(Request.RESET, object(), bench.now)
+    bench.session.shutdown.begin(bench.now)
+    bench.session.closed(bench.now)
+    bench.settle()
+    (done,) = [event for event in bench.events if isinstance(event, RequestDone)]
+    assert (done.success, done.message) == (False, "the driver is shutting down")
+
+
 def test_requests_without_a_port_are_refused() -> None:
     """The refusal is immediate, not after a timeout."""
     with pytest.raises(RequestRefused, match="port is not open"):

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from driver_process import PATIENCE_S, Driver
+from geometry_msgs.msg import Twist
 from probe import Probe
 from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
@@ -58,6 +59,24 @@ def test_an_unplugged_board_is_found_again(
     assert board.wait_for(lambda _: descriptors(driver) <= before, PATIENCE_S)
     assert driver.end(signal.SIGINT) == 0
     assert driver.output.count("lost") == 2
+
+
+def test_a_stop_that_cannot_be_sent_is_said_at_the_end(
+    start_driver: Start, probe_of: Start, tmp_path: Path
+) -> None:
+    """The board is unplugged while the robot drives, and the driver ends before it is back."""
+    link = tmp_path / "omnibot"
+    with PtyBoard(SimulatedBoard(), str(link)) as board:
+        driver: Driver = start_driver(str(link), cmd_vel_timeout=10.0)
+        probe: Probe = probe_of(driver)
+        probe.wait_for_state("nominal")
+        twist = Twist()
+        twist.linear.x = 0.3
+        probe.publisher(Twist, "cmd_vel").publish(twist)
+        assert board.wait_for(lambda b: b.driven, PATIENCE_S)
+    probe.wait_for_state("disconnected")
+    assert driver.end(signal.SIGINT) == 0
+    assert "the stop could not be sent" in driver.lines[-1]
 
 
 def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(

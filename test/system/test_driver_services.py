@@ -3,6 +3,7 @@
 """Each service, called by another process, with the board's bytes and modes checked."""
 
 import math
+import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -60,6 +61,20 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     answers = [probe.call_async(SetBool, "estop", data=bool(n % 2)) for n in range(100)]
     assert all(answer.wait().success for answer in answers)
+    probe.wait_for(lambda: latched and latched[-1].data)
+
+
+def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
+    probe: Probe, driver: Driver
+) -> None:
+    """The driver is stopped meanwhile; a button that is released again publishes false."""
+    latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
+    button = probe.publisher(Bool, "estop", 100)
+    driver.process.send_signal(signal.SIGSTOP)
+    button.publish(Bool(data=True))
+    for _ in range(50):
+        button.publish(Bool(data=False))
+    driver.process.send_signal(signal.SIGCONT)
     probe.wait_for(lambda: latched and latched[-1].data)
 
 

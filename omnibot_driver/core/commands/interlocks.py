@@ -82,8 +82,8 @@ class Interlocks:
     def why_not_calibrate(self) -> str:
         """Return the reason why the gyro's bias cannot be measured; empty if it can."""
         phase, mode, current = self._mode_manager.phase, self._board.mode, self._policy.current
-        if self.missing:
-            return self.missing
+        if self.leaving or self.missing:
+            return self.why_not_request()
         if phase is Phase.CLOSED:
             return "the port is not open; connect the board, then call again"
         if phase is Phase.RESETTING:
