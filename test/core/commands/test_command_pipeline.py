@@ -10,7 +10,9 @@ import pytest
 from session_bench import STOP, Bench, bare
 
 from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.orders import Drive
 from omnibot_driver.core.commands.set_point_stream import PACE_S
+from omnibot_driver.core.commands.set_points import BaseSetpoint
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
@@ -123,14 +125,21 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
     assert sent[-1][1] == [21, 28, 0]
 
 
-def test_a_ramp_is_as_steep_however_often_it_is_commanded() -> None:
-    """Each new command continues the step that is under way, here 100 times a second."""
-    bench = running(limits=GENTLE)
-    start = len(bench.written)
-    for _ in range(30):
-        bench.drive(0.5)
-        bench.run(0.01)
-    assert velocities(bench, start)[-1][1][0] >= 70 * 0.28
+@pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
+def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
+    """Each new command continues the step that is under way; an order is sent every 18 ms."""
+    motion = None
+    for now_ms in range(301):
+        now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)
+        if now_ms % every_ms == 0:
+            motion = BaseSetpoint(
+                wanted, GENTLE, lambda _order: False, before=motion, since=now - PACE_S
+            )
+        if now_ms % 18 == 0:
+            assert motion is not None
+            order = motion.order(now)
+    assert isinstance(order, Drive)
+    assert order.twist.vx_mps == pytest.approx(0.298, abs=0.001)
 
 
 def test_a_reversal_is_ramped_through_zero() -> None:
