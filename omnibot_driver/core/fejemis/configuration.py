@@ -65,7 +65,7 @@ class Configuration:
     def configure(self, written: Mapping[Written, tuple[float, ...]]) -> None:
         """Replace the settings that are written to the board."""
         if written != self.written:
-            self.written, self._new = written, False
+            self.written = written
             self._next_at, self._tries = -math.inf, 0
 
     @property

@@ -159,13 +159,15 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """The line that writes a setting may be lost, and is not repeated while the robot is driven.
 
-    So motion is refused until the board has the setting.
+    So motion is refused until the board has the setting, also if the user changes it meanwhile.
     """
-    settings = FejemisSettings(written={Written.STEERING: (0.35, 0.45)})
+    settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)
     bench.open()
     bench.hears = set()
     bench.board._upkeep.configurations["front"].told["confs"] = 0.5, 0.4
+    assert "being written" in bench.board.refusal
+    bench.board.settings = FejemisSettings(written={Written.STEERING: (0.35, 0.45)})
     assert "being written" in bench.board.refusal
     bench.hears = {DRIVE, FRONT}
     bench.run_until(lambda: not bench.board._upkeep.configurations["front"].pending)
