@@ -3,9 +3,11 @@
 """The configuration that a board stores: always read, and written where the user has set values.
 
 Written values are read back, and written again until the board reports them, for ``TRIES`` at most.
-They are also written after each restart of the board. A number is accepted only when two readings
-in a row agree, because 1 in 99 damaged answers passes its checksum, and the driver computes the
-geometry with these numbers. The module knows which line requests which numbers.
+They are written at least once to each new or restarted board and after each change by the user,
+because a small difference cannot be told from the rounding of what is read back. A number is
+accepted only when two readings in a row agree, because 1 in 99 damaged answers passes its checksum,
+and the driver computes the geometry with these numbers. The module knows which line requests which
+numbers.
 """
 
 import math
@@ -61,11 +63,13 @@ class Configuration:
         self._next_at = -math.inf
         self._tries = 0
         self._new = True
+        self._unsent = set(self.written)
 
     def configure(self, written: Mapping[Written, tuple[float, ...]]) -> None:
         """Replace the settings that are written to the board."""
         if written != self.written:
-            self.written = written
+            changed = {one for one in written if written[one] != self.written.get(one)}
+            self.written, self._unsent = written, self._unsent | changed
             self._next_at, self._tries = -math.inf, 0
 
     @property
@@ -97,6 +101,10 @@ class Configuration:
         if unwritten and not stands:
             return list(missing)
         self._tries += 1
+        for setting in self._unsent:
+            self.told.pop(_REPORT[setting], None)
+            self._once.pop(_REPORT[setting], None)
+        self._unsent.clear()
         texts = [
             text_of(setting, self.written[setting])
             for setting in unwritten
@@ -150,7 +158,8 @@ class Configuration:
         return [
             setting
             for setting in ON[self.role]
-            if setting in self.written and not self._agrees(setting, self.told)
+            if setting in self.written
+            and (setting in self._unsent or not self._agrees(setting, self.told))
         ]
 
     def _agrees(self, setting: Written, readings: Mapping[str, tuple[float, ...]]) -> bool:

@@ -123,6 +123,43 @@ def test_what_was_written_and_read_once_is_not_written_again() -> None:
     assert bench.board._upkeep.configurations["front"].told["confs"] == (0.43, 0.41)
 
 
+def test_a_small_change_by_the_user_is_written() -> None:
+    """A change within the tolerance for numbers read back is written too, once."""
+    first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
+    bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
+    bench.run(2.0)
+    mark = bench.now
+    bench.board.settings = FejemisSettings(written={Written.WHEELS: second})
+    bench.run(3.0)
+    assert bench.robot.drive.config.radii_m == (0.0772, 0.0778)
+    assert bench.lines(DRIVE, mark).count("confw 0.0772 0.0778 19 68 0.4") == 1
+    assert bench.board.figures.own["Drive conf"].startswith("0.0772 0.0778")
+
+
+def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() -> None:
+    """The board reports ``confs`` all the time, so the old values are read before the change."""
+    bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.4, 0.42)}))
+    bench.drive_on()
+    bench.board.settings = FejemisSettings(written={Written.STEERING: (0.4, 0.4205)})
+    bench.drive_on(seconds=1.0)
+    assert bench.robot.drive.config.confs_m == (0.4, 0.42)
+    bench.run(3.0)
+    assert bench.robot.drive.config.confs_m == (0.4, 0.4205)
+    assert bench.robot.front.config.confs_m == (0.4, 0.4205)
+
+
+def test_a_small_difference_is_written_after_a_start() -> None:
+    """A board that already has nearly the user's values gets them nevertheless."""
+    configuration = Configuration("front", {Written.STEERING: (0.4, 0.4205)})
+    for _ in range(2):
+        configuration.hear(parse("confs 0.4200 0.4000"))
+    assert configuration.pending
+    assert b"confs 0.4 0.4205" in configuration.due(0.0, stands=True)
+    for _ in range(2):
+        configuration.hear(parse("confs 0.4205 0.4000"))
+    assert not configuration.pending
+
+
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
     """A query that loses one or two characters does not become a command."""
     bench = nominal(Simulated(firmware=Firmware(sums=False)))
