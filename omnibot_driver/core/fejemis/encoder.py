@@ -11,12 +11,13 @@ from typing import Protocol
 
 from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.fejemis.follower import Follower
+from omnibot_driver.core.fejemis.follower import FOLLOWS_RAD, Follower
 from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, drive_line, front_line
 from omnibot_driver.core.fejemis.plain_lines import plain_drive_line, plain_front_line
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.steering import (
     ACROSS_RAD,
+    ALIGNED_RAD,
     AT_REST,
     Geometry,
     Steered,
@@ -113,7 +114,8 @@ class Encoder:
             self.held = self._turning = False
             return AT_REST
         _, steered = encoded
-        self.follower.aim(steered.angle_rad)
+        waits = steered.part == 0.0  # until the wheel is near enough for a turn on the spot
+        self.follower.aim(steered.angle_rad, ALIGNED_RAD if waits else FOLLOWS_RAD)
         self.held = not steered.whole
         self._turning = abs(steered.angle_rad) >= ACROSS_RAD and steered.part > 0.0
         return steered.twist

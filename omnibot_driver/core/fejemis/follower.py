@@ -14,6 +14,7 @@ FOLLOWS_WITHIN_S: Final = 1.0
 """Time in s within which the front wheel must get nearer to its angle; else it does not follow."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
+"""Deviation of the wheel in rad up to which it follows, if the robot is driven meanwhile."""
 MOVED_RAD: Final = math.radians(3.0)
 """Rotation in rad of a stuck wheel after which motion is allowed again."""
 AGAIN_WITHIN_S: Final = 60.0
@@ -39,15 +40,16 @@ class Follower:
     def begin(self) -> None:
         """Forget the commanded angle."""
         self._angle_rad: float | None = None
+        self._within_rad = FOLLOWS_RAD
         self._since, self._from_rad = math.inf, math.nan
 
     def start(self) -> None:
         """Forget all faults, as the user has called ~/start."""
         self.refusal, self._fault_at = "", -math.inf
 
-    def aim(self, angle_rad: float) -> None:
-        """Set the angle that the wheel must reach, in rad."""
-        self._angle_rad = angle_rad
+    def aim(self, angle_rad: float, within_rad: float = FOLLOWS_RAD) -> None:
+        """Set the angle that the wheel must reach, and how nearly, in rad."""
+        self._angle_rad, self._within_rad = angle_rad, within_rad
 
     def look(self, angle_rad: float, now: float) -> bool:
         """Take the measured angle, in rad; return whether the wheel newly fails to follow."""
@@ -56,7 +58,7 @@ class Follower:
         if self._angle_rad is None or self.refusal:
             return False
         off_rad = self._angle_rad - angle_rad
-        if abs(off_rad) <= FOLLOWS_RAD:
+        if abs(off_rad) <= self._within_rad:
             self._since, self._from_rad = now, angle_rad
             return False
         nearer_rad = math.copysign(1.0, off_rad) * (angle_rad - self._from_rad)

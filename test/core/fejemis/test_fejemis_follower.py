@@ -13,7 +13,7 @@ from omnibot_driver.core.fejemis.follower import UNTIL_IT_MOVES, UNTIL_START, Fo
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
-from omnibot_driver.simulator.fejemis import Firmware
+from omnibot_driver.simulator.fejemis import Firmware, vehicle
 
 TICK_S = 0.015
 
@@ -114,3 +114,24 @@ def test_a_clamped_reverse_is_stopped(w: float) -> None:
     bench.run(0.5)
     bench.drive_on(0.3)
     assert not bench.robot.standing
+
+
+def test_a_wheel_that_rests_short_of_across_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A turn on the spot does not begin at 82 degrees, so the robot would stand and wait."""
+    monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)
+    bench = nominal()
+    drive_whatever_is_said(bench, 0.0, 0.5, 4.0)
+    assert bench.robot.standing
+    assert any("does not go where it is commanded" in text for text in bench.notices)
+
+
+def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A wheel that leaves its angle by 8 degrees does not end a turn that has begun."""
+    bench = nominal()
+    bench.drive_on(0.0, 0.5, seconds=3.0)
+    monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)
+    bench.drive_on(0.0, 0.5, seconds=3.0)
+    assert not bench.robot.standing
+    assert bench.notices == []
