@@ -91,7 +91,10 @@ class Half:
         return bool(self.decoder.sums) and not self.decoder.doubtful
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """Return the messages in these bytes, except those with an implausible board time."""
+        """Return the messages in these bytes.
+
+        Those with an implausible board time are left out, and poses before the first heartbeat.
+        """
         return [message for message in self.decoder.feed(data, now) if self._admit(message, now)]
 
     @property
@@ -160,10 +163,14 @@ class Half:
             self._read_comment(message.text)
             self.heard_at = now
             return True
+        if isinstance(message, Heartbeat):
+            self._identify(message.identity)
+        elif isinstance(message, BoardPose) and self.heartbeat is None:
+            self.heard_at = now
+            return False  # it may have the time of another board than before
         if isinstance(message, Heartbeat | BoardPose) and not self._see(message.time_s, now):
             return False
         if isinstance(message, Heartbeat):
-            self._identify(message.identity)
             self.heartbeat = message
             self.note("hbt", now)
         self.heard_at = now
@@ -185,6 +192,7 @@ class Half:
             if identity != self.identity:
                 self._next_at = -math.inf
                 self.unknown_words.clear()
+                self.clock.begin()
             self.identity, self.role = identity, ROLES.get(identity)
         if self.heartbeat is None:
             self._next_at = -math.inf

@@ -307,6 +307,27 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
     assert not any("both ports" in text for text in bench.notices)
 
 
+@pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
+def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
+    """The boards keep running; ``ahead_s``: how far the front board's time is ahead.
+
+    If the drive board's times went on in the front board's clock, the odometry would be stamped too
+    late or too early, or the board would seem to have restarted.
+    """
+    bench = Bench()
+    bench.robot.front._clock_s += ahead_s
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(3.0)
+    bench.close()
+    bench.robot._at_port = bench.robot._at_port[::-1]
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal", 1.0)
+    bench.run(1.0)
+    assert bench.now - bench.odometry[-1].stamp_s < 0.05
+    assert not any("restarted" in text for text in bench.notices)
+
+
 def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() -> None:
     """The start message counts as a restart even before a heartbeat, as the pose begins anew."""
     bench = nominal()
