@@ -73,9 +73,10 @@ class Watch:
         half, parameter = self._ports.halves[channel], PARAMETERS[channel]
         role = half.role
         silent = now - half.heard_at > SILENT_S
-        if role is None:
+        if role is None or half.heartbeat is None:
             other = self._ports.halves[1 - channel]
-            if silent and now - self._begun_at > UNHEARD_S and other.role is not None:
+            heard = other.role is not None and other.heartbeat is not None
+            if silent and now - self._begun_at > UNHEARD_S and heard:
                 self._told.halt(
                     f"no data from the {self._ports.role(channel)} board at `{parameter}`; check"
                     " its power and cable",

@@ -170,6 +170,29 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
     assert sum(f"no data from the {half} board" in text for text in bench.notices) == 1
 
 
+@pytest.mark.parametrize("half", HALVES)
+def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
+    """The driver knows which board was at the port before, and names it, once."""
+    bench = nominal()
+    bench.close()
+    bench.speaks = {1 - HALVES[half]}
+    bench.open()
+    bench.run(5.0)
+    assert sum(f"no data from the {half} board" in text for text in bench.notices) == 1
+    assert len(bench.notices) == 1
+
+
+def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
+    """The common notice of a silent robot is enough, as the fault is more likely common to both."""
+    bench = nominal()
+    bench.close()
+    bench.speaks = set()
+    bench.open()
+    bench.run(5.0)
+    (notice,) = bench.notices
+    assert "no data from the board for" in notice
+
+
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
     """When lines begin or no longer have checksums, the robot stops once, then drives as before."""
