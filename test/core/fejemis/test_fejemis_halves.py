@@ -330,6 +330,19 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
     assert not any("both ports" in text for text in bench.notices)
 
 
+def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
+    """Another board may be at the port, or none."""
+    bench = nominal()
+    bench.run(6.0)
+    told = {"Drive ver", "Drive bat", "Drive cvdrive", "Front id"}
+    assert told <= bench.board.figures.own.keys()
+    bench.close()
+    bench.speaks = set()
+    bench.open()
+    bench.run(1.0)
+    assert not told & bench.board.figures.own.keys()
+
+
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
     """The boards keep running; ``ahead_s``: how far the front board's time is ahead.
