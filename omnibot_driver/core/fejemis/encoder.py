@@ -124,10 +124,10 @@ class Encoder:
         pair = self._pair
         geometry = pair.geometry
         speed_mps = twist.vx_mps if abs(twist.vx_mps) >= LEAST_MPS else 0.0
-        wanted = BodyTwist(speed_mps, 0.0, twist.yaw_rate_radps)
-        if wanted.vx_mps < 0.0 and not self.settings.allow_reverse:
+        if speed_mps < 0.0 and not self.settings.allow_reverse:
             pair.remark(REVERSE)
-            return pair.stop()
+            speed_mps = 0.0
+        wanted = BodyTwist(speed_mps, 0.0, twist.yaw_rate_radps)
         if outer_mps(wanted, geometry.track_m) < LEAST_MPS:
             return pair.stop()
         steered = steer(wanted, geometry, pair.front_angle_rad, turning=self._turning)

@@ -193,13 +193,16 @@ def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int
     assert not bench.robot.standing
 
 
-def test_reverse_is_off_until_it_is_allowed() -> None:
-    """Reverse needs a parameter; without it the robot stands still and one notice explains why."""
+@pytest.mark.parametrize(("v", "w"), [(-0.2, 0.0), (-0.2, 0.3), (-0.01, 0.5)])
+def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
+    """Reverse needs a parameter; without it the robot only turns, and one notice explains why."""
     bench = nominal()
-    bench.drive_on(-0.2, 0.3, 1.0)
-    assert bench.robot.standing
-    assert bench.robot.truth.x_m == 0.0
+    bench.drive_on(v, w, 3.0)
+    truth = bench.robot.truth
+    assert (truth.speed_mps, truth.yaw_rate_radps) == pytest.approx((0.0, w), abs=0.01)
+    assert math.hypot(truth.x_m, truth.y_m) < 0.006
     assert sum("allow_reverse" in text for text in bench.notices) == 1
+    assert len(bench.notices) == 1
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
