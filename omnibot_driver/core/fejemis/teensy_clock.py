@@ -10,7 +10,7 @@ the line was damaged, or the board has restarted.
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.readings import ImuReading, Reading, SampleBoundary
+from omnibot_driver.core.readings import ExtraReading, ImuReading, Reading, SampleBoundary
 from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
@@ -120,7 +120,7 @@ class StampedReadings:
 
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading; move ``stamp_s`` if it is after ``now`` or not after the last stamp."""
-        kind = type(reading)
+        kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         stamp_s = min(stamp_s, now)
         last_s = self._last.get(kind)
         if last_s is not None and stamp_s <= last_s:

@@ -39,7 +39,7 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time between two notices of a low battery, in s."""
 PERIOD_S: Final = 0.03
-"""Age in s of the last IMU sample up to which an orientation gets that sample's timestamp."""
+"""Time in s since the last IMU sample came, up to which an orientation gets its timestamp."""
 
 
 class Translation:
@@ -66,7 +66,7 @@ class Translation:
         self.odometry.begin()
         self._imu.begin()
         self._pose_s = -math.inf
-        self._imu_stamp_s = -math.inf
+        self._imu_at = self._imu_stamp_s = -math.inf
 
     def restarted(self) -> None:
         """Forget the odometry's frame and the IMU's sampling times: the drive board restarted."""
@@ -129,7 +129,7 @@ class Translation:
         if clock.known:
             sampled_s = self._imu.sampled_s(clock.board_s(now), self._pose_s)
             stamp_s = clock.host_s(sampled_s)
-        self._imu_stamp_s = min(stamp_s, now)
+        self._imu_at, self._imu_stamp_s = now, min(stamp_s, now)
         self.stamped.add(reading, stamp_s, now)
 
     def _orient(self, message: Attitude, now: float) -> None:
@@ -140,7 +140,7 @@ class Translation:
             self._imu.rates,
             self._imu.forces,
         )
-        fresh = now - self._imu_stamp_s < PERIOD_S
+        fresh = now - self._imu_at < PERIOD_S
         self.stamped.add(ExtraReading(oriented), self._imu_stamp_s if fresh else now, now)
 
     def _battery(self, message: Battery, now: float) -> None:

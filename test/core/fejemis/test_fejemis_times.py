@@ -7,12 +7,14 @@ import math
 import random
 
 import pytest
-from fejemis_bench import nominal
+from fejemis_bench import DRIVE, FRONT, nominal
 
+from omnibot_driver.core.events import Extra
 from omnibot_driver.core.fejemis.imu import ImuPairing
 from omnibot_driver.core.fejemis.messages import Acceleration, Gyro
+from omnibot_driver.core.fejemis.readings import OrientedImuReading
 from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
-from omnibot_driver.core.readings import ImuReading
+from omnibot_driver.core.readings import ExtraReading, ImuReading
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware
 
@@ -126,6 +128,45 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
     steps = [b - a for a, b in itertools.pairwise(stamps)]
     assert max(steps) < 0.0115
     assert min(steps) > 0.0085
+
+
+def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
+    """The lines of 0.3 s arrive in one read; the front board's lines arrive as usual."""
+    bench = nominal()
+    bench.run(3.0)
+    waiting = bytearray()
+
+    def wait(channel: int, data: bytes) -> bytes:
+        if channel == FRONT:
+            return data
+        waiting.extend(data)
+        return b""
+
+    bench.events.clear()
+    bench.carry = wait
+    bench.run(0.3)
+    bench.carry = lambda channel, data: bytes(waiting) + data if channel == DRIVE else data
+    bench.run_until(lambda: bool(bench.imu))
+    bench.carry = lambda _, data: data
+    bench.run(0.3)
+    samples = [estimate.stamp_s for estimate in bench.imu]
+    oriented = [
+        event.stamp_s
+        for event in bench.events
+        if isinstance(event, Extra) and isinstance(event.value, OrientedImuReading)
+    ]
+    assert len(samples) == pytest.approx(60, abs=3)
+    assert len(oriented) == pytest.approx(30, abs=2)
+    assert max(min(abs(stamp_s - one) for one in samples) for stamp_s in oriented) < 1e-3
+    assert min(b - a for a, b in itertools.pairwise(oriented)) > 0.008
+
+
+def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
+    """A battery line that arrives late does not move the stamps of later orientations."""
+    stamped = StampedReadings()
+    for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
+        stamped.add(ExtraReading(content), stamp_s, 2.0)
+    assert stamped.stamps(stamped.readings, 2.0, None) == pytest.approx([2.0, 1.0, 2.000001])
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
