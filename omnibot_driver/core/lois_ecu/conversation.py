@@ -159,6 +159,7 @@ class LoisConversation:
     def reset_odometry(self) -> None:
         """Begin the odometry frame at the robot's present pose."""
         self._translation.odometry.reset()
+        self._translation.headings.forget()
 
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is seen at rest since it was stopped; None if unknown.

@@ -154,6 +154,7 @@ class MotionFilter:
             self.shift(index, speed * (powered_s + rolled_s), abs(speed) * ROLLED_OUT_S)
             if not self.signed:
                 wheel.begin_again()
+            wheel.rolled_to_m = self.way_m(index)
             for state in (SPEED, PUSH, HELD):
                 self.filter.forget(wheel.base + state, 0.0, 0.0)
 
@@ -199,7 +200,10 @@ class MotionFilter:
             if wheel.course.next_change_s() > now:
                 continue
             before, doubted = self._way_terms(index), self._doubted(index)
+            starts = not wheel.course.target_mps
             cleared, changed = wheel.course.carry_out(now)
+            if cleared or (changed and starts):
+                wheel.rolled_to_m = self.way_m(index)
             if not (cleared or changed):
                 continue
             speed = self.speed_mps(index)

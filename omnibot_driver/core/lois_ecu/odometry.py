@@ -53,7 +53,7 @@ class LoisOdometry:
         self._begun = False
         self._may_roll_mps = [0.0, 0.0]
         """Greatest speed that each wheel may have had since the last report, in m/s."""
-        self._heard_at_s = self._lost_s = -math.inf
+        self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
         self._uncertainty = Uncertainty(OdometryNoise())
         self._source: Source = "standing"
         self.late_stddev_s = LATE_S
@@ -68,6 +68,7 @@ class LoisOdometry:
         self._settings = settings
         period_s = settings.periods_ms.get(Stream.TICKS, 0) / 1e3
         self._unheard_s = max(UNHEARD_S, UNHEARD_GROUPS * period_s)
+        other_wheels = motion.tick_m != settings.tick_m
         motion.tick_m, motion.rpm_mps = settings.tick_m, settings.rim_mps_per_rpm
         motion.track_m = settings.track_m
         tuned = not own_gains(settings)
@@ -77,7 +78,8 @@ class LoisOdometry:
         motion.turn_sign = -1.0 if settings.inverted else 1.0
         motion.yaw0_rad += yaw_rad - motion.yaw_rad
         self._board = OdometryReader(settings.track_m, settings.rim_mps_per_rpm)
-        self._comparison.begin_counts()
+        if other_wheels:
+            self._comparison.begin_counts()
         wheels = DifferentialKinematics(wheel_radius_m=1.0, track_m=settings.track_m)
         self._uncertainty.noise = OdometryNoise(
             wheel_drift=WHEEL_DRIFT, wheel_scale=0.0, wheel_slip=0.0, wheels=wheels
@@ -108,6 +110,8 @@ class LoisOdometry:
         """Begin the odometry frame at the robot's present pose."""
         for state in (X, Y, WAY, PER_WHEEL + WAY):
             self._motion.filter.forget(state, 0.0, 0.0)
+        for wheel in self._motion.wheels:
+            wheel.rolled_to_m = 0.0
         self._motion.yaw0_rad = 0.0
         self._uncertainty = Uncertainty(self._uncertainty.noise)
         self._sizes = SizeErrors()
@@ -126,7 +130,7 @@ class LoisOdometry:
         """Note that the board restarted ``age_s`` ago (None: unknown), and lost its set-point."""
         self._motion.restart(self._heard_at_s if age_s is None else now - age_s)
         self.connect()
-        self._lost_s = -math.inf
+        self._lost_s = self._advanced_s = -math.inf
         self._ticks = Ticks(0, 0, 0)
         self._comparison.begin_counts()
 
@@ -237,9 +241,9 @@ class LoisOdometry:
         self._comparison.begin_odometry()
 
     def _advance(self, now: float) -> None:
-        since_s = now - 0.5 if self._at_s == -math.inf else self._at_s
+        since_s = max(now - 0.5, self._advanced_s) if self._at_s == -math.inf else self._at_s
         self._motion.advance(since_s, now)
-        self._at_s = max(now, self._at_s)
+        self._at_s = self._advanced_s = max(now, self._at_s)
 
     # Estimates
 

@@ -51,8 +51,6 @@ class ReportedSpeed:
         self._repeats = 0
         self._jumped = False
         self.resting = RestingWheel()
-        self._changed_at_m = 0.0
-        """Distance in m of the wheel when its reported speed changed last."""
 
     def note(self, duration_s: float) -> None:
         """Note the estimated speed for a time in which none was reported."""
@@ -61,13 +59,16 @@ class ReportedSpeed:
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """Take back the distance since the reported speed last changed, when the wheel stopped."""
+        """Take back the distance since the reported speed last changed, when the wheel stopped.
+
+        A wheel that has not turned since it was commanded to start has rolled nothing since then.
+        """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
             return
         wheel.rests = True
         sign = math.copysign(1.0, wheel.course.target_mps)
-        rolled_m = motion.way_m(self._index) - self._changed_at_m
+        rolled_m = motion.way_m(self._index) - wheel.rolled_to_m
         too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
         motion.shift(self._index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
         for state in (X, Y):  # it may have had another heading then
@@ -137,7 +138,7 @@ class ReportedSpeed:
                 motion.shift(self._index, sign * tick_m, 2 * tick_m)
                 spread = 2 * motion.rpm_mps + told_mps / 2
                 motion.filter.forget(wheel.base + SPEED, sign * told_mps, spread**2)
-            self._changed_at_m = motion.way_m(self._index)
+            wheel.rolled_to_m = motion.way_m(self._index)
         elif resting.chance == 1.0 and not wheel.rests:
             self.come_to_rest()
         elif not wheel.rests and resting.chance:

@@ -75,6 +75,8 @@ class Wheel:
     def __init__(self, base: int) -> None:
         self.base = base
         self.course = WheelModel()
+        self.rolled_to_m = 0.0
+        """Distance in m up to which the wheel has certainly rolled."""
         self.begin_again()
 
     def begin_again(self) -> None:

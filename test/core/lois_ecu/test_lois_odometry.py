@@ -180,6 +180,24 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
     assert way_m == pytest.approx(20 * ours.tick_m, abs=4 * ours.tick_m)
 
 
+def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
+    """Part of the ticks of the next group are those of a way that was predicted already."""
+    ours = LoisEcuSettings()
+    ecu = LoisConversation(ours)
+    ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
+    for step in range(4):
+        ecu.receive(encode_report(Ticks(400 * step, 10 * step, 10 * step + 1)), 0.4 * step)
+        if step == 2:
+            before = ecu.predicted(0.8)
+            ecu.receive(b"", 1.0)
+            ecu.predicted(1.15)
+            ecu.settings = replace(ours, declination_rad=0.1)
+    after = ecu.predicted(1.2)
+    assert before is not None
+    assert after is not None
+    assert after.pose.x_m - before.pose.x_m == pytest.approx(10 * ours.tick_m, abs=2 * ours.tick_m)
+
+
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
     """Ticks after a silence of half a second correct a prediction that was too far ahead.
 

@@ -11,6 +11,7 @@ from lois_drives import Rig, nominal
 from omnibot_driver.core.lois_ecu import GpsDate, GpsTime, Stream, encode_report
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.messages import Heading
+from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.readings import (
     FixReading,
     HeadingReading,
@@ -79,6 +80,20 @@ def test_declination_turns_the_heading() -> None:
     ecu = LoisConversation(LoisEcuSettings(declination_rad=0.1))
     found = ecu.receive(encode_report(Heading(90)) * 3, 0.0)
     assert found[-1] == HeadingReading(pytest.approx(-0.1))
+
+
+def test_headings_are_believed_after_the_odometry_frame_has_begun_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The filter compares them with the turn in odom, of which the new frame begins at zero."""
+    yaw_rad = math.radians(-120.0)
+    monkeypatch.setattr(LoisOdometry, "yaw_rad", property(lambda _odometry: yaw_rad))
+    ecu = LoisConversation(LoisEcuSettings())
+    heading = encode_report(Heading(120))
+    assert ecu.receive(heading * 3, 0.0)
+    ecu.reset_odometry()
+    yaw_rad = 0.0
+    assert ecu.receive(heading * 10, 0.1)
 
 
 def test_false_headings_at_north_are_refused() -> None:

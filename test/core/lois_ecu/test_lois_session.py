@@ -192,3 +192,14 @@ def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
     bench.session.shutdown.begin(bench.now)
     bench.run(2.0)
     assert {data for _, data in bench.written} == {encode_command(SetDuty(0, 0))}
+
+
+@pytest.mark.parametrize("firmware", ["documented", "firmware"])
+def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
+    """The model of the motion goes on where it was when the board was reset."""
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 4.0)
+    before_m = bench.odometry[-1].pose.x_m - bench.robot.way_m
+    bench.reset()
+    bench.run(2.0)
+    assert bench.odometry[-1].pose.x_m - bench.robot.way_m == pytest.approx(before_m, abs=0.06)

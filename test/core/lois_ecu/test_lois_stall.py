@@ -4,6 +4,7 @@
 
 import math
 
+import pytest
 from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.lois_ecu import (
@@ -166,3 +167,31 @@ def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
     assert len(ways_m) > 20
     assert max(ways_m) < 0.01, "a way was taken back"
     assert cleared
+
+
+@pytest.mark.parametrize("reset", [False, True])
+def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
+    """The robot has driven 1.5 m forward; then its wheels are blocked.
+
+    ``reset``: the odometry is reset in between.
+    """
+    driver, ticks, places = LoisConversation(LoisEcuSettings()), 0, []
+    for step in range(50):
+        now, forward = 0.2 * step, step < 25
+        ticks += 4 * forward
+        speed = 20 * UNIT_MPS * forward
+        group = BoardOdometry(ticks * 0.0136, 0.0, 0.0, speed, 0.0, 0.0, appended=True)
+        lines = encode_report(Ticks(200 * step, ticks, ticks)) + encode_report(group)
+        driver.receive(lines, now)
+        driver.predicted(now + 0.05)
+        driver.receive(b"", now + 0.1)
+        if step == 29 and reset:
+            driver.reset_odometry()
+        rpm = 20 if forward else -20 * (step > 29)
+        written = driver.wheels([rpm * math.tau / 60] * 2) if rpm else encode_command(SetRpm(0, 0))
+        driver.wrote(written, now + 0.1)
+        if step > 29:
+            predicted = driver.predicted(now + 0.15)
+            assert predicted is not None
+            places.append(predicted.pose)
+    assert max(place.way_to(places[0]).way_m for place in places) < 0.15
