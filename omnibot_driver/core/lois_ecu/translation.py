@@ -40,6 +40,9 @@ RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """Fall of the counts towards zero, in ticks and in ticks per s, beyond which the board has
 restarted: wheels do not roll back that fast."""
+CONTRADICTED_S: Final = 1.0
+"""Longest time in s for which wheels may have rolled back if the clock contradicts the time since
+the last ticks. The decoder then forgets the clock's unit."""
 
 
 class Translation:
@@ -71,6 +74,7 @@ class Translation:
     def _connect(self) -> None:
         self._ticks: Ticks | None = None
         self._unit: ClockUnit | None = None
+        self._unit_known = False
         self._time, self._late_s = BoardTime(), 0.0
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
@@ -141,8 +145,12 @@ class Translation:
         ways = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
         if any(ways):
             self.ticked_at_s = now
-        self._unit = clock_unit or self._unit  # the decoder forgets the unit at a restart
+        self._unit = clock_unit or self._unit
+        contradicted = self._unit_known and clock_unit is None
+        self._unit_known = clock_unit is not None
         late = self._unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
+        if contradicted:
+            duration_s = min(duration_s, CONTRADICTED_S)
         rolled = RESTARTED_TICKS_PER_S * duration_s
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
         fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)

@@ -4,10 +4,19 @@
 
 import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu import (
+    BoardOdometry,
+    SetDuty,
+    SetRpm,
+    Ticks,
+    encode_command,
+    encode_report,
+)
+from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
@@ -70,3 +79,36 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
     odometry.heard_odometry(group, 10.2)
     (estimate,) = odometry.heard_ticks(Ticks(200, 16, 36), 10.3)
     assert math.isfinite(estimate.covariance.xx)
+
+
+@pytest.mark.parametrize("restarted", [True, False])
+def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
+    *, restarted: bool
+) -> None:
+    """500 ticks in 12 s are a speed that wheels may have, and a clock in ns wraps every 4.3 s. But
+    it contradicts the silence if the board restarted behind an adapter that kept its power."""
+    ours = LoisEcuSettings()
+    driver, now, place_m = LoisConversation(ours), 0.0, []
+
+    def hear(board_s: float, ticks: int) -> None:
+        """Process a group of a board with the manual's firmware."""
+        counts = round(board_s * 1e9) % (1 << 32)
+        driver.receive(encode_report(Ticks(counts, ticks, ticks)), now)
+        driver.receive(b"", now + 0.1)
+        if predicted := driver.predicted(now + 0.1):
+            place_m.append(predicted.pose.x_m)
+
+    driver.wrote(encode_command(SetRpm(50, 50)), -1.0)
+    for step in range(61):
+        now = 0.2 * step
+        if step == 50:
+            driver.wrote(encode_command(SetDuty(0, 0)), now)
+        hear(7.0 + now, 10 * min(step, 50))
+    driver.silence()
+    before_m = place_m[-1]
+    assert before_m > 400 * ours.tick_m
+    for step in range(10):
+        now = 24.0 + 0.2 * step
+        hear(0.2 * (step + 1) if restarted else 7.0 + now, 0)
+    assert (abs(place_m[-1] - before_m) < 0.1) is restarted
+    assert driver.translation.restarts == restarted
