@@ -6,6 +6,8 @@ Every line is sent ``ROUNDS`` times, with longer pauses between the rounds than 
 for. Two things can be confirmed: the period of the ticks, and that the board answers, because each
 round requests the date once, which is off after a boot. While either is missing, the rounds
 continue. Writing a gain resets the firmware's controller, so settings wait while the robot drives.
+The lines of other commands (``write``) do not wait, and neither a restart nor a change of settings
+removes them. But they keep their distance from the motion before them (``AFTER_MOTION_S``).
 
 A board with another terminal mode or checksum setting is silent, or seems to ignore everything.
 Then a line that restores the setting is sent both with and without a checksum, and after it the
@@ -19,6 +21,7 @@ from itertools import pairwise
 from statistics import median
 from typing import Final
 
+from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.codec import encode_command
 from omnibot_driver.core.lois_ecu.messages import (
     PERIOD_ONCE,
@@ -30,11 +33,19 @@ from omnibot_driver.core.lois_ecu.messages import (
     TerminalMode,
     WriteSetting,
 )
+from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
+AFTER_MOTION_S: Final = 0.015
+"""Shortest time in s from a motion to the line of a command that is not a setting.
+
+The board may be deaf for 13 ms at once. If that removed the end of a motion and the beginning of
+this line, their rests could be another motion. The reverse order is harmless. Less than the time
+between two set-points, so that the line is sent however often motions are sent.
+"""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
 """Times in s from a group of ticks to the next round of settings, varied because the board is deaf
 while it sends another group."""
@@ -48,12 +59,18 @@ BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 
 
 class SettingsWriter:
-    """Queue of setting commands; ``due`` returns the lines to write now."""
+    """Queue of setting commands; ``due`` returns the lines to write now.
 
-    def __init__(self, settings: LoisEcuSettings) -> None:
+    ``points``: the set-points that were sent.
+    """
+
+    def __init__(self, settings: LoisEcuSettings, points: SetPoints) -> None:
         self.settings = settings
+        self._points = points
         self._in_period = self._answered = False
         self._queue: deque[tuple[float, Command]] = deque()
+        self._others: deque[tuple[float, Command]] = deque()
+        """Commands that are not settings, with the time from which each may be sent."""
         self._rounds_left = 0
         self._round_at_s = math.inf
         self._arrivals: deque[float] = deque(maxlen=6)
@@ -69,7 +86,7 @@ class SettingsWriter:
     @property
     def done(self) -> bool:
         """Whether all queued commands have been sent, each in all of its rounds."""
-        return not self._queue and not self._rounds_left
+        return not self._queue and not self._others and not self._rounds_left
 
     @property
     def ignored(self) -> bool:
@@ -78,7 +95,24 @@ class SettingsWriter:
 
     @property
     def wake_at(self) -> float:
-        """Time of the next ``due``; infinity while nothing is left to send."""
+        """Time of the next ``due``; infinity while nothing is left to send, or all of it waits."""
+        return min(self._settings_at, self._others_at)
+
+    @property
+    def _waits(self) -> bool:
+        """Whether settings wait because the robot drives."""
+        return self._points.driving and self._rounds >= ROUNDS
+
+    @property
+    def _others_at(self) -> float:
+        if not self._others:
+            return math.inf
+        return max(self._others[0][0], self._points.moved_at_s + AFTER_MOTION_S)
+
+    @property
+    def _settings_at(self) -> float:
+        if self._waits:
+            return math.inf
         if self._queue:
             return self._queue[0][0]
         return self._round_at_s if self._rounds_left else math.inf
@@ -92,10 +126,10 @@ class SettingsWriter:
         self._in_period = self._answered = False
 
     def write(self, command: Command, now: float) -> None:
-        """Queue one more command, to be sent ``ROUNDS`` times."""
+        """Queue a command that is not a setting, to be sent ``ROUNDS`` times."""
         for count in range(ROUNDS):
-            self._queue.append((now + count * ROUND_S, command))
-        self._queue = deque(sorted(self._queue, key=lambda entry: entry[0]))
+            self._others.append((now + count * ROUND_S, command))
+        self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
 
     def ticks_came(self, now: float) -> None:
         """Note that ticks arrived, and compare their measured period with the requested one."""
@@ -114,20 +148,25 @@ class SettingsWriter:
         """Note that a GPS date arrived, which shows that the board obeys requests."""
         self._answered |= self._rounds > 0
 
-    def due(self, now: float, *, driving: bool) -> bytes:
+    def due(self, now: float) -> bytes:
         """Return the lines to write now, possibly none."""
-        if driving and self._rounds >= ROUNDS:
-            return b""
-        if self._rounds_left and not self._queue and now >= self._round_at_s:
-            self._rounds_left -= 1
-            self._rounds += 1
-            self._round_at_s = max(now, self._round_at_s) + ROUND_S
-            for index, command in enumerate(self._turned(self._rounds)):
-                self._queue.append((now + index * LINE_S, command))
-        data = b""
-        while self._queue and now >= self._queue[0][0]:
-            data += encode_command(self._queue.popleft()[1], with_sum=self.settings.with_sum)
-        return data
+        found: list[Command] = []
+        if now >= self._others_at:
+            found += _taken(self._others, now)
+        if now >= self._settings_at:
+            self._begin_round(now)
+            found += _taken(self._queue, now)
+        return outbound.lines(*found, with_sum=self.settings.with_sum)
+
+    def _begin_round(self, now: float) -> None:
+        """Queue all settings, unless those of the round before are still being sent."""
+        if self._queue or not self._rounds_left:
+            return
+        self._rounds_left -= 1
+        self._rounds += 1
+        self._round_at_s = max(now, self._round_at_s) + ROUND_S
+        for index, command in enumerate(self._turned(self._rounds)):
+            self._queue.append((now + index * LINE_S, command))
 
     def _turned(self, rounds: int) -> list[Command]:
         """Return all commands, beginning with a different command in each round.
@@ -169,3 +208,9 @@ class SettingsWriter:
         setting = Setting.LEFT_SHORT_CORRECTION
         number = self.settings.written.get(setting, BOOT_LEFT_SHORT_CORRECTION)
         return WriteSetting(setting, number)
+
+
+def _taken(queue: deque[tuple[float, Command]], now: float) -> Iterable[Command]:
+    """Remove the commands that are due from the queue, and yield them."""
+    while queue and now >= queue[0][0]:
+        yield queue.popleft()[1]

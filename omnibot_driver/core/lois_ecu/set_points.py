@@ -25,7 +25,7 @@ class SetPoints:
 
     ``saturated``: number of motions that were too fast. ``stopped_at_s``: time since which only
     zeros were sent, infinite while the robot is driven. ``stood``: the robot was seen at rest since
-    then.
+    then. ``moved_at_s``: when a motion was last sent.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -37,6 +37,7 @@ class SetPoints:
         """Begin a new connection: forget the set-points that were sent."""
         self._said: SetRpm | SetDuty | None = None
         self.stopped_at_s = math.inf
+        self.moved_at_s = -math.inf
         self.stood = False
         self._clears_left = outbound.CLEARED_TIMES
 
@@ -51,6 +52,7 @@ class SetPoints:
         for command in said:
             if _moves(command):
                 self.stopped_at_s, self.stood = math.inf, False
+                self.moved_at_s = now
                 if isinstance(command, SetDuty):
                     self._clears_left = outbound.CLEARED_TIMES
             else:

@@ -25,7 +25,7 @@ class Upkeep:
 
     def __init__(self, settings: LoisEcuSettings, points: SetPoints) -> None:
         self._points = points
-        self.writer = SettingsWriter(settings)
+        self.writer = SettingsWriter(settings, points)
         self.change = ModeChange()
         self.change.want(settings.terminal_mode)
         self.connect()
@@ -57,7 +57,7 @@ class Upkeep:
             self.writer.begin(now)
             self._recovered_at_s = now
         with_sum = self.writer.settings.with_sum
-        data = self.writer.due(now, driving=self._points.driving)
+        data = self.writer.due(now)
         data += self._change_mode(now, stands=stands)
         if (record := self.request.due(now)) is not None:
             data += outbound.lines(record, with_sum=with_sum)

@@ -11,6 +11,7 @@ from omnibot_driver.core.lois_ecu import (
     DistributeBall,
     Reset,
     SetDuty,
+    SetLed,
     SetPeriod,
     SetRpm,
     Setting,
@@ -87,6 +88,24 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
     assert heard(joined, with_sum=True, lenient=False) == [(2, 17 << 16)]
+
+
+@pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
+def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
+    with_sum: bool,
+) -> None:
+    """The driver sends the LED's line 15 ms after a motion; the reverse order needs no pause."""
+    length = 14 if with_sum else 12
+    motion = encode_command(SetRpm(16, 20), with_sum=with_sum)
+    led = encode_command(SetLed(True), with_sum=with_sum)
+
+    def joined(data: bytes) -> set[tuple[int, int]]:
+        rests = (data[:at] + data[at + length :] for at in range(1, length))
+        found = [heard(rest, with_sum=with_sum, lenient=False) for rest in rests]
+        return {line for lines in found for line in lines if line[0] in (1, 2)}
+
+    assert (2, 0x0010_0001) in joined(motion + led)
+    assert joined(led + motion) <= {(2, 0x0010_0014)}
 
 
 def test_set_points_are_found_in_what_was_written() -> None:

@@ -1,0 +1,86 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Lines to a LOIS ECU that wait or pass while the robot drives: settings, and the LED's line."""
+
+import pytest
+from lois_bench import FIRMWARE, Bench, configure
+
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.opening import SettingsWriter
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+
+def switch_led(bench: Bench, on: bool) -> None:
+    """Call ``~/led`` as the node does."""
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    board.set_led(on, bench.now)
+    bench.settle()
+
+
+def drive_and_require_sleep(bench: Bench, seconds: float) -> None:
+    """Drive on, and require at each step that the session is not due again at once."""
+    for step in range(round(seconds / 0.01)):
+        if step % 10 == 0:
+            bench.drive()
+        bench.run(0.01)
+        assert bench.session.wake_at > bench.now
+
+
+@FIRMWARE
+def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
+    """The LED's line does not wait for the end of the drive, as a gain does."""
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 1.0)
+    switch_led(bench, on=True)
+    drive_and_require_sleep(bench, 1.0)
+    assert bench.board.led
+
+
+@FIRMWARE
+def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
+    firmware: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a date the rounds of settings continue, but they wait while the robot drives."""
+    monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 1.0)
+    drive_and_require_sleep(bench, 3.0)
+
+
+@FIRMWARE
+def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> None:
+    """The board does not hear the first of the LED's lines; later ones are still sent."""
+    bench = Bench(firmware)
+    bench.hears = False
+    switch_led(bench, on=True)
+    configure(bench, LoisEcuSettings(low_pass=0.2))
+    bench.hears = True
+    bench.run(2.0)
+    assert bench.board.led
+
+
+def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
+    """If both were lost in part by one pause of 13 ms, their rests could be another motion."""
+    bench = Bench("firmware")
+    bench.drive_on(0.3, 1.0)
+    switch_led(bench, on=True)
+    moved_at, led_lines = bench.now, 0
+    for step in range(200):
+        bench.now += 0.005
+        if step % 2 == 0:
+            for channel, data in bench.robot.advance():
+                bench.session.inbound.receive(data, bench.now, channel)
+        if step % 4 == 0:
+            bench.session.command_twist(BodyTwist(0.3 + step / 2000, 0.0, 0.0), bench.now)
+        bench.session.tick(bench.now)
+        before = len(bench.written)
+        bench.settle()
+        for line in b"".join(data for _, data in bench.written[before:]).splitlines():
+            if line.startswith(b":02"):
+                moved_at = bench.now
+            if line.startswith(b":03"):
+                led_lines += 1
+                assert bench.now - moved_at > 0.0145
+    assert led_lines == 5
