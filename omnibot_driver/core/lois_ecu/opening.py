@@ -6,6 +6,10 @@ Every line is sent ``ROUNDS`` times, with longer pauses between the rounds than 
 for. Two things can be confirmed: the period of the ticks, and that the board answers, because each
 round requests the date once, which is off after a boot. While either is missing, the rounds
 continue. Writing a gain resets the firmware's controller, so settings wait while the robot drives.
+
+A request replaces the date's period on the board. So if that period is set, the requests end with
+the first answer, and the rounds after it restore the period.
+
 The lines of other commands (``write``) do not wait, and neither a restart nor a change of settings
 removes them. But they keep their distance from the motion before them (``AFTER_MOTION_S``).
 
@@ -24,6 +28,7 @@ from typing import Final
 from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.codec import encode_command
 from omnibot_driver.core.lois_ecu.messages import (
+    PERIOD_OFF,
     PERIOD_ONCE,
     Command,
     SetPeriod,
@@ -146,7 +151,10 @@ class SettingsWriter:
 
     def date_came(self) -> None:
         """Note that a GPS date arrived, which shows that the board obeys requests."""
-        self._answered |= self._rounds > 0
+        if self._rounds and not self._answered:
+            self._answered = True
+            if self._dates_come_periodically:
+                self._rounds_left = max(self._rounds_left, ROUNDS - 1)
 
     def due(self, now: float) -> bytes:
         """Return the lines to write now, possibly none."""
@@ -187,12 +195,18 @@ class SettingsWriter:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
         if self.overwritten or not settings.with_sum:
             yield self._left_short_correction()
-        yield SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)
+        if not (self._answered and self._dates_come_periodically):
+            yield SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
         for stream, period_ms in settings.periods_ms.items():
             yield SetPeriod(stream, period_ms)
         for setting, number in settings.written.items():
             yield WriteSetting(setting, number)
+
+    @property
+    def _dates_come_periodically(self) -> bool:
+        """Whether a period of the date is set, which each request of a single date replaces."""
+        return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:
         """Return the lines for a board in any mode that is silent or does not obey."""

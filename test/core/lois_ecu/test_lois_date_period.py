@@ -1,0 +1,47 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The period of the GPS date, beside the single dates that confirm the settings."""
+
+import pytest
+from lois_bench import FIRMWARE, Bench
+
+from omnibot_driver.core.lois_ecu import SetPeriod, Stream, encode_command
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+
+class DeafBench(Bench):
+    """A bench whose robot does not hear the line ``lost`` when it is sent for the nth time."""
+
+    def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
+        self.lost = encode_command(SetPeriod(Stream.GPS_DATE, period_ms))
+        self.nth, self.sent = nth, 0
+        super().__init__(firmware, LoisEcuSettings(periods_ms={Stream.GPS_DATE: period_ms}))
+        self.run(4.0)
+
+    def settle(self) -> None:
+        for channel, data in self.session.take_output(self.now):
+            for line in data.splitlines(keepends=True):
+                self.sent += line == self.lost
+                if line != self.lost or self.sent != self.nth:
+                    self.robot.receive(line, self.now, channel)
+        self.events += self.session.take_events()
+
+
+@FIRMWARE
+def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
+    """The request of a single date replaces the period, so a line with the period follows it."""
+    times = DeafBench(firmware, 500).sent
+    for nth in range(1, times + 1):
+        bench = DeafBench(firmware, 500, nth)
+        assert bench.board._timers[Stream.GPS_DATE].period_ms == 500, nth
+
+
+@FIRMWARE
+@pytest.mark.parametrize("period_ms", [200, 1000, 30000])
+def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
+    """Each line with the period restarts it, so no periodic date comes while rounds continue."""
+    bench = DeafBench(firmware, period_ms)
+    assert isinstance(bench.session.board, LoisEcuBoard)
+    assert bench.session.board._ecu.confirmed
+    assert bench.board._timers[Stream.GPS_DATE].period_ms == period_ms
