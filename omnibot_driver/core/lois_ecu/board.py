@@ -252,6 +252,8 @@ class LoisEcuBoard(Board):
 
     def reset(self) -> Packets:
         """Return Stop and a counter reset; ``due`` repeats the reset until the counters show it."""
+        if self._reset_shown:
+            self._reset_proof = None  # a new reset needs a proof of its own
         self._resets_left, self._reset_shown = RESETS, False
         return self._reset()
 

@@ -100,6 +100,18 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
     assert bench.board.wheels[0].ticks == 0
 
 
+@FIRMWARE
+def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
+    """The counters are zero since the first reset, and the second one does not arrive."""
+    bench = Bench(firmware)
+    bench.drive_on(0.2, 6.0)
+    bench.run(3.0)
+    assert bench.reset().message == "the board was reset"
+    bench.run(3.0)
+    bench.hears = False
+    assert "unconfirmed" in bench.reset().message
+
+
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
