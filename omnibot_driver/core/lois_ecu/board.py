@@ -130,7 +130,8 @@ class LoisEcuBoard(Board):
             readings += self.receive(b"", now)
         if now >= self._odometry_at and self.mode is Mode.NOMINAL:
             period_s = 1.0 / self.settings.odom_rate_hz
-            self._odometry_at = max(self._odometry_at + period_s, now)
+            next_at = self._odometry_at + period_s
+            self._odometry_at = next_at if next_at > now else now + period_s
             if (fused := self._ecu.predicted(now)) is not None:
                 readings.append(self._told(fused))
         return readings
