@@ -18,7 +18,13 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
-from omnibot_driver.core.lois_ecu.messages import EStopButton, RecordKind, SetLed, Ticks
+from omnibot_driver.core.lois_ecu.messages import (
+    EStopButton,
+    RecordKind,
+    SetLed,
+    TerminalLine,
+    Ticks,
+)
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.reset_proof import ResetProof
@@ -57,6 +63,7 @@ class LoisEcuBoard(Board):
 
     def _connect(self) -> None:
         self._odometry_at = -math.inf
+        self._sensor_speaks = False  # in a terminal mode, in place of the ticks
         self._reset_proof: ResetProof | None = None
         self._reset_seen: Ticks | None = None
         self._resets_left = 0
@@ -128,13 +135,19 @@ class LoisEcuBoard(Board):
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)
-        if now >= self._odometry_at and self.mode is Mode.NOMINAL:
+        if now >= self._odometry_due_at:
             period_s = 1.0 / self.settings.odom_rate_hz
             next_at = self._odometry_at + period_s
             self._odometry_at = next_at if next_at > now else now + period_s
             if (fused := self._ecu.predicted(now)) is not None:
                 readings.append(self._told(fused))
         return readings
+
+    @property
+    def _odometry_due_at(self) -> float:
+        """Time of the next odometry; infinity while nothing shows the motion of the wheels."""
+        silent = self._sensor_speaks or self.mode is not Mode.NOMINAL
+        return math.inf if silent else self._odometry_at
 
     def reset_odometry(self) -> None:
         """Begin the odometry frame at the robot's present pose."""
@@ -147,10 +160,12 @@ class LoisEcuBoard(Board):
                 case DisplacementReading():
                     readings.append(reading)
                 case FusedOdometry():
+                    self._sensor_speaks = False
                     self._rolled = self._rolled + self._tangent(reading)
                 case EStopButton(pressed):
                     readings.append(EStopButtonReading(pressed))
                 case _:
+                    self._sensor_speaks |= isinstance(reading, TerminalLine)
                     readings.append(ExtraReading(reading))
         return readings + self._shown_reset()
 
@@ -188,11 +203,10 @@ class LoisEcuBoard(Board):
     @property
     def wake_at(self) -> float:
         """Time of the next call of ``due`` or ``elapse``."""
-        odometry_at = self._odometry_at if self.mode is Mode.NOMINAL else math.inf
         if self._leaving:
-            return odometry_at
+            return self._odometry_due_at
         once_at = -math.inf if self._once else math.inf
-        return min(self._ecu.wake_at, odometry_at, once_at, self._reset_at_s)
+        return min(self._ecu.wake_at, self._odometry_due_at, once_at, self._reset_at_s)
 
     def leave(self) -> None:
         """Make ``due`` return nothing from now on, so that Stop is the last line."""
@@ -282,8 +296,5 @@ class LoisEcuBoard(Board):
         self._ecu.record(kind, samples)
 
     def distribute_ball(self) -> None:
-        """Send the ball command once.
-
-        A repetition would distribute another ball. The loss of the line is not noticed.
-        """
+        """Send the ball command once, as a repetition would distribute another ball."""
         self._once += packed(self._ecu.distribute_ball())

@@ -10,6 +10,7 @@ from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine, TerminalMode
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordFailed, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 
 GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
 COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
@@ -71,6 +72,27 @@ def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
     assert bench.board.terminal_mode == 0
     bench.run_until(lambda: bench.board.terminal_mode == 1)
     assert bench.board.wheels[0].controller.gains.low_pass == 1.0
+
+
+@FIRMWARE
+@pytest.mark.parametrize("settings", [GPS, COMPASS], ids=["gps", "compass"])
+def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
+    firmware: str, settings: LoisEcuSettings
+) -> None:
+    """The board reports no motion in this mode, so a pose would not be measured."""
+    bench = Bench(firmware)
+    configure(bench, settings)
+    bench.run_until(lambda: bool(told(bench, TerminalLine)))
+    bench.events.clear()
+    for _ in range(300):
+        bench.run(0.01)
+        assert bench.session.wake_at > bench.now
+    assert bench.session.state == "nominal"
+    assert not [event for event in bench.events if isinstance(event, OdometryEstimate)]
+    configure(bench, LoisEcuSettings())
+    bench.run_until(lambda: bool(told(bench, TerminalLeft)))
+    bench.run(1.0)
+    assert [event for event in bench.events if isinstance(event, OdometryEstimate)]
 
 
 @FIRMWARE
