@@ -16,10 +16,16 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Largest difference in s between the elapsed time and the deltas' count, without a restart.
+"""Largest difference in s between the elapsed time and the deltas' count, without a restart and
+without the drift of the board's clock.
 
 If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, arrival times are wrong by
 0.24 s. The limit is about twice this error.
+"""
+DRIFT: Final = 0.01
+"""Largest relative error of the board's clock, by which a long gap differs from the elapsed time.
+
+After a silence of minutes the count then says little about a restart, and the pose decides.
 """
 EARLY_S: Final = 0.2
 """Time in s by which a count from zero may exceed the time since the last delta.
@@ -92,15 +98,13 @@ class Sequence:
         lost = (count - before - 1) % WRAP
         if paused:
             return Step(0, None, restarted=count <= lost)
-        wraps = max(0, round((elapsed_s / period_s - lost - 1) / WRAP))
-        lost += wraps * WRAP
-        late_s = abs((lost + 1) * period_s - elapsed_s)
+        lost = self._unwrapped(lost + 1, elapsed_s) - 1
         from_zero = count * period_s <= elapsed_s + EARLY_S
-        if lost and late_s > LATE_S and (reconnected or from_zero):
+        if lost and not self._on_time(lost + 1, elapsed_s) and (reconnected or from_zero):
             self._pose, self._left = None, (before, before_at, count)
             return Step(0, None, restarted=True)
         latest_s = (lost + 1) * period_s - (
-            period_s / 2 if imus == self._imus_per_delta else LATE_S
+            period_s / 2 if imus == self._imus_per_delta else _late_s(elapsed_s)
         )
         ahead = lost > told and elapsed_s < latest_s
         goes_on = self._ahead is not None and 0 < (count - self._ahead) % WRAP <= per_pose
@@ -142,6 +146,20 @@ class Sequence:
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left
-            on_time = abs((count - was) % WRAP * self._period_s - (now - at)) <= LATE_S
+            on_time = self._on_time(self._unwrapped((count - was) % WRAP, now - at), now - at)
             if on_time and not 0 < (count - anew) % WRAP <= self._per_pose:
                 self._delta, self._delta_at = was, at
+
+    def _unwrapped(self, deltas: int, elapsed_s: float) -> int:
+        """Return the number of deltas with the wraps of the counter that fit the time best."""
+        wraps = max(0, round((elapsed_s / self._period_s - deltas) / WRAP))
+        return deltas + wraps * WRAP
+
+    def _on_time(self, deltas: int, elapsed_s: float) -> bool:
+        """Return whether the board can send this number of deltas in this time."""
+        return abs(deltas * self._period_s - elapsed_s) <= _late_s(elapsed_s)
+
+
+def _late_s(elapsed_s: float) -> float:
+    """Return the largest error in s of an elapsed time, compared with the board's clock."""
+    return LATE_S + DRIFT * elapsed_s

@@ -59,6 +59,39 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
     assert begun(count).delta(0, 102.0).restarted
 
 
+@pytest.mark.parametrize("imus", [0, 4])
+@pytest.mark.parametrize("drift", [-0.01, 0.01])
+@pytest.mark.parametrize("elapsed_s", [20.0, 120.0, 400.0])
+def test_a_long_gap_of_a_board_whose_clock_drifts_is_no_restart(
+    elapsed_s: float, drift: float, imus: int
+) -> None:
+    """The TTL side is unplugged, and the board's clock is 1 % slow or fast."""
+    sequence = begun(100)
+    passed = round(elapsed_s / 0.04 * (1 + drift))
+    step = sequence.delta((100 + passed) % 256, 100.0 + elapsed_s, imus=imus)
+    after = sequence.delta((101 + passed) % 256, 100.04 + elapsed_s, imus=4)
+    assert not step.restarted
+    assert not after.restarted
+    assert step.lost + after.lost == passed - 1
+
+
+def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
+    """120 s with a clock that is 1 % fast: the gap differs from the time by 1.2 s."""
+    sequence = Sequence()
+    sequence.delta(100, 0.0)
+    assert sequence.delta((100 + 3030) % 256, 120.0) == Step(3029)
+
+
+@pytest.mark.parametrize("wraps", [0, 1, 3])
+def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
+    """The false count is near zero, and the next true delta comes after a gap."""
+    sequence = begun(88)
+    passed = 1 + 256 * wraps
+    assert sequence.delta(1, 100.02 + 10.24 * wraps, imus=1).restarted
+    step = sequence.delta((88 + passed) % 256, 100.04 + 10.24 * wraps, imus=2)
+    assert step == Step(passed - 1)
+
+
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
     """Deltas that a pose includes are not counted as lost again by the next delta."""
     sequence = Sequence()
