@@ -49,7 +49,7 @@ def whole_seconds(delay_s: float) -> int:
 class Jobs:
     """The running job; ``done``: results for the caller to take.
 
-    ``powering_off``: power ends soon. ``reload``: the boards have loaded a configuration; the
+    ``powering_off``: power ends soon. ``reload``: the boards may have loaded a configuration; the
     caller must read the configuration again and reset this flag.
     """
 
@@ -171,7 +171,6 @@ class Jobs:
                 )
         elif job is Job.LOAD and isinstance(message, WheelConfiguration):
             if now - self._begun_at > SAID * AGAIN_S:
-                self.reload = True
                 self._finish(True, "the saved configuration is loaded and read again")
         elif job in OFFSETS and isinstance(message, Status) and message.keyword == OFFSETS[job][2]:
             self._offsets(job, message.numbers, now)
@@ -200,5 +199,7 @@ class Jobs:
         self._finish(False, f"{self.job.value} was not confirmed by {which}; call again")
 
     def _finish(self, success: bool, message: str) -> None:
+        if self.job is Job.LOAD and self._said:  # both boards may have obeyed, even if it failed
+            self.reload = True
         self.done.append(JobDone(self._token, success, message))
         self._clear()

@@ -207,6 +207,34 @@ def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: s
     assert "meanwhile" in done.message
 
 
+def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None:
+    """The boards may have loaded their saved values, although the job has failed."""
+    bench = nominal(settings=FejemisSettings(written={Written.FRONT_WHEEL: (2.5, 0.0)}))
+    bench.run(2.0)
+    bench.board.services.ask(Job.LOAD, None, bench.now)
+    bench.settle()
+    bench.run(0.2)
+    assert bench.robot.front.config.angle_offset_deg == 0.0
+    bench.estop(True)
+    bench.estop(False)
+    bench.run(4.0)
+    assert bench.robot.front.config.angle_offset_deg == 2.5
+
+
+def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_loading() -> None:
+    """The other board has obeyed ``eer`` as well."""
+    wheels = (0.08, 0.08, 9.7, 48.0, 0.4)
+    bench = nominal(settings=FejemisSettings(written={Written.WHEELS: wheels}))
+    bench.run(2.0)
+    bench.board.services.ask(Job.LOAD, None, bench.now)
+    bench.settle()
+    bench.run(0.2)
+    assert bench.robot.drive.config.radii_m != wheels[:2]
+    bench.robot.front.reboot()
+    bench.run(6.0)
+    assert bench.robot.drive.config.radii_m == wheels[:2]
+
+
 def test_loading_stops_the_robot_before_it_loads() -> None:
     """The stop is sent first, and the robot gets time to stop before ``eer`` is sent."""
     bench = nominal()
