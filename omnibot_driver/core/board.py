@@ -213,6 +213,13 @@ class Board(Protocol):
         These packets must work in any state of the board.
         """
 
+    def start_requested(self) -> None:
+        """Note that the user has requested a start; called before ``start``.
+
+        The driver also calls ``start`` by itself, for example after a reconnect.
+        """
+        return
+
     def start(self) -> Packets:
         """Return the packets that make the board run in any mode; they may be sent repeatedly."""
         return NO_PACKETS

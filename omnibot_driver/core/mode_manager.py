@@ -124,6 +124,7 @@ class ModeManager:
         self._deadline = now + ANSWER_WITHIN_S
         if request is Request.START:
             self._wanted = Wanted.RUNNING
+            self._board.start_requested()
             if self._board.mode.running:
                 self.phase = Phase.SETTLED
                 self._say(self._board.start(), now)

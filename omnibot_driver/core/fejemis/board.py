@@ -143,10 +143,7 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines and fail the running job, as the ports are closed.
-
-        Return the result of that job as a reading.
-        """
+        """Discard incomplete lines, and return the running job's failure: the ports are closed."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -250,6 +247,10 @@ class FejemisBoard(Board):
         """Return Stop for both boards, with lift and brush off."""
         return self.stop() + self._all_off()
 
+    def start_requested(self) -> None:
+        """Forget the faults of the front wheel, as the user has called ~/start."""
+        self._encoder.follower.start()
+
     def start(self) -> Packets:
         """Return a Stop and then ``start``; nothing during an emergency stop.
 
@@ -258,7 +259,6 @@ class FejemisBoard(Board):
         if self._obedience.estopped:
             return NO_PACKETS
         self._obedience.pause_said = False
-        self._encoder.follower.start()
         return self.stop() + self._ports.line("drive", *self._upkeep.jobs.keep_power(), b"start")
 
     def pause(self) -> Packets:

@@ -227,6 +227,9 @@ class OmniBot:
         """Return Stop; the zero bytes before it wake the board."""
         return packed(STOP)
 
+    def start_requested(self) -> None:
+        """Do nothing more: ``start`` is the same whether the user or the driver starts."""
+
     def start(self) -> Packets:
         """Return the letter S, which starts the board."""
         self._translation.apply(Happening.SENT_START)

@@ -135,3 +135,20 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
     bench.drive_on(0.0, 0.5, seconds=3.0)
     assert not bench.robot.standing
     assert bench.notices == []
+
+
+def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
+    """The driver starts the board again by itself, which is not the user's ~/start."""
+    bench = nominal()
+    bench.board._encoder.follower.refusal = UNTIL_START
+    bench.close()
+    bench.run(0.5)
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(4.0)
+    with pytest.raises(CommandRefused, match="second time within 60 s"):
+        bench.drive()
+    assert bench.ask(Request.START).success
+    bench.run(0.5)
+    bench.drive_on()
+    assert not bench.robot.standing
