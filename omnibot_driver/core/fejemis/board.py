@@ -248,8 +248,9 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
-        """Forget the faults of the front wheel, as the user has called ~/start."""
+        """Forget the faults of the front wheel, and cancel a power off, even during an e-stop."""
         self._encoder.follower.start()
+        self._upkeep.jobs.keep_power()
 
     def start(self) -> Packets:
         """Return a Stop and then ``start``; nothing during an emergency stop.
@@ -259,7 +260,7 @@ class FejemisBoard(Board):
         if self._obedience.estopped:
             return NO_PACKETS
         self._obedience.pause_said = False
-        return self.stop() + self._ports.line("drive", *self._upkeep.jobs.keep_power(), b"start")
+        return self.stop() + self._ports.line("drive", b"start")
 
     def pause(self) -> Packets:
         """Return packets that stop the motion, pause the drive board, and end brush and lift."""
@@ -273,10 +274,7 @@ class FejemisBoard(Board):
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return what the guard process sends if this one fails: Stop, and emergency stop.
-
-        Both also switch brush and lift off.
-        """
+        """Return Stop, and emergency stop, for the guard process; both end brush and lift too."""
         return self.wake(), self.emergency_stop() + self.stop()
 
     @property

@@ -57,7 +57,11 @@ class Jobs:
         self.done: list[JobDone] = []
         self.powering_off = False
         self.reload = False
+        self._stay_on(0)
         self._clear()
+
+    def _stay_on(self, times: int) -> None:
+        self._on_left, self._on_at = times, -math.inf if times else math.inf
 
     def _clear(self) -> None:
         self.job: Job | None = None
@@ -72,7 +76,7 @@ class Jobs:
     @property
     def wake_at(self) -> float:
         """Time at which ``due`` has work, in s."""
-        return min(self._next_at, self._until)
+        return min(self._next_at, self._until, self._on_at)
 
     @property
     def at_rest(self) -> str:
@@ -100,6 +104,7 @@ class Jobs:
         if job is Job.POWER_OFF:
             self._text = b"off %d" % whole_seconds(delay_s)
             self.powering_off = True
+            self._stay_on(0)
 
     def cancel(self, why: str) -> None:
         """Fail the running job for the reason ``why``."""
@@ -115,13 +120,13 @@ class Jobs:
         """Forget a requested power off, as the restarted drive board has forgotten it too."""
         self.powering_off = False
 
-    def keep_power(self) -> list[bytes]:
-        """Cancel a requested power off; return the line for it, or an empty list if not needed."""
-        lines = [b"on"] if self.powering_off else []
+    def keep_power(self) -> None:
+        """Cancel a requested power off, as the user has called ~/start."""
+        if self.powering_off:
+            self._stay_on(SAID)
         if self.job is Job.POWER_OFF:
             self.cancel("a start has cancelled it")
         self.powering_off = False
-        return lines
 
     def begin(self) -> None:
         """Fail the running job and forget a power off: the connection is new."""
@@ -130,7 +135,15 @@ class Jobs:
 
     def due(self, now: float) -> Lines:
         """Return the lines to send now, by board."""
-        if self.job is None or now < self.wake_at:
+        lines = self._of_job(now)
+        if now >= self._on_at:
+            self._on_left -= 1
+            self._on_at = now + AGAIN_S if self._on_left else math.inf
+            lines["drive"] = [b"on", *lines.get("drive", [])]
+        return lines
+
+    def _of_job(self, now: float) -> Lines:
+        if self.job is None or now < min(self._next_at, self._until):
             return {}
         if now >= self._until:
             self._give_up()

@@ -19,6 +19,7 @@ from omnibot_driver.core.fejemis.motion_lines import STOP
 from omnibot_driver.core.fejemis.polls import ASKED as POLLED
 from omnibot_driver.core.fejemis.readings import Job
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.fejemis.help_text import DRIVE_HELP, FRONT_HELP
 
 
@@ -194,8 +195,9 @@ def said_by_the_driver() -> set[str]:
         bench.run(6.0 if job is not Job.POWER_OFF else 0.5)
     bench.estop(True)
     bench.estop(False)
-    for packets in (bench.board.start(), bench.board.switch_off()):
-        bench.written += [(bench.now, channel, data) for channel, data in packets]
+    bench.session.request(Request.START, None, bench.now)
+    bench.settle()
+    bench.written += [(bench.now, channel, data) for channel, data in bench.board.switch_off()]
     said = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
     said |= {
         AngleRelay().text(math.radians(10.4), sums=True).decode(),

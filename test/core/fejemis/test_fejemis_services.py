@@ -133,8 +133,7 @@ def test_power_off_is_called_back_by_a_start() -> None:
         bench.board.services.set_brush(True, bench.now)
     with pytest.raises(CommandRefused, match="call ~/start"):
         bench.board.services.lift(3.0, bench.now)
-    for channel, data in bench.board.start():
-        bench.robot.receive(data, bench.now, channel)
+    assert bench.ask(Request.START).success
     bench.run(6.0)
     assert bench.robot.drive.powered
     assert not bench.board.refusal

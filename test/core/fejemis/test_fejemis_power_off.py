@@ -1,0 +1,79 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A power off: what cancels it, and what does not."""
+
+import pytest
+from fejemis_bench import DRIVE, FRONT, Bench, nominal
+
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.fejemis.readings import Job, JobDone
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.requests import Request
+
+
+@pytest.fixture
+def bench() -> Bench:
+    """Return a bench whose drive board will cut the power in 99 s."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
+    bench.board.services.ask(Job.POWER_OFF, None, bench.now)
+    bench.settle()
+    bench.run(2.0)
+    (done,) = bench.extras(JobDone)
+    assert done.success
+    bench.events.clear()
+    return bench
+
+
+def assert_still_refused(bench: Bench) -> None:
+    """Check that the drive board counts down, and that nothing may move."""
+    assert bench.robot.drive.off_at_s is not None
+    with pytest.raises(CommandRefused, match="call ~/start"):
+        bench.drive()
+    with pytest.raises(RequestRefused, match="call ~/start"):
+        bench.board.services.set_brush(True, bench.now)
+    with pytest.raises(CommandRefused, match="call ~/start"):
+        bench.board.services.lift(3.0, bench.now)
+
+
+def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
+    """The e-stop holds back ``start``, but not ``on``."""
+    bench.estop(True)
+    bench.session.request(Request.START, None, bench.now)
+    bench.settle()
+    bench.run(0.1)
+    assert bench.robot.drive.off_at_s is None
+
+
+def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> None:
+    """The board does not confirm ``on``, and a line may be damaged."""
+    mark = bench.now
+    bench.hears = {FRONT}
+    bench.session.request(Request.START, None, bench.now)
+    bench.settle()
+    bench.run(0.2)
+    bench.hears = {DRIVE, FRONT}
+    bench.run(3.0)
+    assert bench.lines(DRIVE, mark).count("on") == 3
+    assert bench.robot.drive.off_at_s is None
+
+
+def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
+    """The remaining repetitions of ``on`` are dropped."""
+    assert bench.ask(Request.START).success
+    bench.board.services.ask(Job.POWER_OFF, None, bench.now)
+    bench.settle()
+    bench.run(3.0)
+    assert_still_refused(bench)
+
+
+def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
+    """The driver starts the board again by itself, which is not the user's ~/start."""
+    mark = bench.now
+    bench.speaks = set()
+    bench.run(2.5)
+    bench.speaks = {DRIVE, FRONT}
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(4.0)
+    assert "start" in bench.lines(DRIVE, mark)
+    assert "on" not in bench.lines(DRIVE, mark)
+    assert_still_refused(bench)
