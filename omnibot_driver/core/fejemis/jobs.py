@@ -129,8 +129,7 @@ class Jobs:
         self.powering_off = False
 
     def begin(self) -> None:
-        """Fail the running job and forget a power off: the connection is new."""
-        self.powering_off = False
+        """Fail the running job, as the connection is new; a requested power off stays in force."""
         self.cancel("the port was lost meanwhile; call again once it is back")
 
     def due(self, now: float) -> Lines:

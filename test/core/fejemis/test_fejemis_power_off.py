@@ -77,3 +77,29 @@ def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
     assert "start" in bench.lines(DRIVE, mark)
     assert "on" not in bench.lines(DRIVE, mark)
     assert_still_refused(bench)
+
+
+def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
+    """The drive board still counts down, so nothing may move."""
+    bench.close()
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(4.0)
+    assert_still_refused(bench)
+
+
+def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
+    bench: Bench,
+) -> None:
+    """Its time shows the restart, as the clock of a board outlives the connection."""
+    bench.run(5.0)
+    bench.close()
+    bench.speaks = set()
+    bench.robot.drive.reboot()
+    bench.run(2.0)
+    bench.speaks = {DRIVE, FRONT}
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(4.0)
+    bench.drive_on()
+    assert not bench.robot.standing
