@@ -116,9 +116,13 @@ class Jobs:
         if self.at_rest:
             self.cancel(why)
 
-    def drive_restarted(self) -> None:
-        """Forget a requested power off, as the restarted drive board has forgotten it too."""
-        self.powering_off = False
+    def restarted(self, role: Role) -> None:
+        """Fail the running job; a power off fails and is forgotten only with the drive board."""
+        if role == "front" and self.job is Job.POWER_OFF:
+            return
+        self.cancel(f"the {role} board has restarted")
+        if role == "drive":
+            self.powering_off = False
 
     def keep_power(self) -> None:
         """Cancel a requested power off, as the user has called ~/start."""

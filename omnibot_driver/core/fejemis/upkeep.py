@@ -51,9 +51,7 @@ class Upkeep:
         """Configure a restarted board again, switch brush and lift off, and fail a job."""
         self._begin(role)
         self.machine.begin()
-        self.jobs.cancel(f"the {role} board has restarted")
-        if role == "drive":
-            self.jobs.drive_restarted()
+        self.jobs.restarted(role)
 
     def _begin(self, role: Role) -> None:
         self.configurations[role].begin()

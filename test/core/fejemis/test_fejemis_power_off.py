@@ -103,3 +103,17 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
     bench.run(4.0)
     bench.drive_on()
     assert not bench.robot.standing
+
+
+def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
+    """The drive board alone cuts the power, and it has not restarted."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
+    bench.board.services.ask(Job.POWER_OFF, None, bench.now)
+    bench.settle()
+    bench.run(0.1)
+    bench.robot.front.reboot()
+    bench.run(5.0)
+    assert any("front board has restarted" in text for text in bench.notices)
+    (done,) = bench.extras(JobDone)
+    assert done.success
+    assert_still_refused(bench)
