@@ -211,8 +211,10 @@ class Jobs:
     def _give_up(self) -> None:
         assert self.job is not None
         which = "both boards" if self.job in (Job.SAVE, Job.LOAD) else "the drive board"
-        self.powering_off = False
-        self._finish(False, f"{self.job.value} was not confirmed by {which}; call again")
+        then = "call again"
+        if self.job is Job.POWER_OFF:
+            then = "it may still cut the power: call ~/start to keep it on, or call again"
+        self._finish(False, f"{self.job.value} was not confirmed by {which}; {then}")
 
     def _finish(self, success: bool, message: str) -> None:
         if self.job is Job.LOAD and self._said:  # both boards may have obeyed, even if it failed

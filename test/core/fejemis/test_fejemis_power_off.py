@@ -117,3 +117,24 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
     (done,) = bench.extras(JobDone)
     assert done.success
     assert_still_refused(bench)
+
+
+def test_a_power_off_without_an_answer_may_still_come() -> None:
+    """The board may have obeyed although its heartbeats were lost; only ~/start makes it sure."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
+    bench.board.services.ask(Job.POWER_OFF, None, bench.now)
+    bench.settle()
+    bench.speaks = {FRONT}
+    bench.run(9.0)
+    (done,) = bench.extras(JobDone)
+    assert not done.success
+    assert "call ~/start" in done.message
+    bench.speaks = {DRIVE, FRONT}
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(4.0)
+    assert_still_refused(bench)
+    assert bench.ask(Request.START).success
+    bench.run(1.0)
+    assert bench.robot.drive.off_at_s is None
+    bench.drive_on()
+    assert not bench.robot.standing
