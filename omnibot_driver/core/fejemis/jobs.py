@@ -26,9 +26,11 @@ CALIBRATION_S: Final = 1.2
 """Duration of a calibration, which averages for about a second, in s."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""How many times a request is sent; a calibration is requested once."""
-UNCHANGED_S: Final = 4.0
-"""Time in s since the start of a calibration after which unchanged offsets are accepted."""
+"""How many times a request is sent, except for a calibration."""
+UNCHANGED_S: Final = 2.4
+"""Time in s after which a calibration with unchanged offsets is regarded as not received."""
+CALIBRATIONS: Final = 2
+"""How many times a calibration is requested while the offsets are unchanged."""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
@@ -67,7 +69,7 @@ class Jobs:
         self.job: Job | None = None
         self._token: object = None
         self._begun_at = self._next_at = self._until = math.inf
-        self._said = 0
+        self._said = self._calibrations = 0
         self._before: tuple[float, ...] | None = None
         self._once: tuple[float, ...] | None = None
         self._heard: set[Role] = set()
@@ -196,8 +198,8 @@ class Jobs:
         if numbers != once:
             return
         if self._before is None:
-            self._before, self._begun_at, self._said = numbers, now, 0
-            self._next_at = -math.inf
+            self._before = numbers
+            self._calibrate(now)
             return
         after_s = now - self._begun_at
         if after_s < CALIBRATION_S:
@@ -205,8 +207,18 @@ class Jobs:
         shown = ", ".join(f"{number:g}" for number in numbers[:3])
         if numbers != self._before:
             self._finish(True, f"{job.value} done; offsets {shown}")
+        elif after_s > UNCHANGED_S and self._calibrations < CALIBRATIONS:
+            self._calibrate(now)
         elif after_s > UNCHANGED_S:
-            self._finish(True, f"{job.value} done; the offsets are unchanged: {shown}")
+            self._finish(
+                False,
+                f"{job.value} failed: the offsets are unchanged: {shown}; the drive board may not"
+                " have received the command, or does not know it; call again",
+            )
+
+    def _calibrate(self, now: float) -> None:
+        self._calibrations += 1
+        self._begun_at, self._next_at, self._said = now, -math.inf, 0
 
     def _give_up(self) -> None:
         assert self.job is not None

@@ -55,6 +55,41 @@ def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
     assert jobs.done[0].success
 
 
+def lose(bench: Bench, word: bytes, times: int) -> None:
+    """Lose the first ``times`` transmissions to the boards that contain ``word``."""
+    receive, left = bench.robot.receive, [times]
+
+    def lossy(data: bytes, now: float, channel: int) -> None:
+        if word in data and left[0]:
+            left[0] -= 1
+        else:
+            receive(data, now, channel)
+
+    bench.robot.receive = lossy  # type: ignore[method-assign]
+
+
+def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
+    """The board does not confirm the command; unchanged offsets show that it may be lost."""
+    bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
+    lose(bench, b"gyroc", 1)
+    assert ask(bench, Job.CALIBRATE_GYRO).success
+    assert bench.robot.drive.config.gyro_offset_dps == pytest.approx((1.0, -2.0, 3.0), abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("job", "word"),
+    [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
+)
+def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
+    """The noise of the sensors changes the offsets, so the board has probably not measured them."""
+    bench = nominal()
+    lose(bench, word.encode(), 99)
+    done = ask(bench, job)
+    assert not done.success
+    assert "unchanged" in done.message
+    assert bench.lines(DRIVE).count(word) == 2
+
+
 def test_the_accelerometer_is_calibrated_by_the_board() -> None:
     """The robot must be on level ground, where gravity is the only acceleration."""
     bench = nominal(Simulated(accel_bias_mps2=(0.2, -0.1, 0.3)))
