@@ -13,7 +13,7 @@ from omnibot_driver.core.fejemis.jobs import POWER_ENDS
 from omnibot_driver.core.fejemis.obedience import Obedience
 from omnibot_driver.core.fejemis.odometry import PoseOdometry
 from omnibot_driver.core.fejemis.readings import Job
-from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
@@ -88,6 +88,12 @@ class Services:
         if moving and job is not Job.LOAD:
             raise RequestRefused(
                 f"{job.value} refused: the robot moves; wait until it stands still, then call again"
+            )
+        written = robot.settings.written
+        if job is Job.CALIBRATE_ACCELEROMETER and Written.ACCELEROMETER in written:
+            raise RequestRefused(
+                f"{job.value} refused: the parameter `accel_calibration` sets the offsets; remove"
+                " it, start the driver again, then call again"
             )
         moves = robot.driving or moving
         self._upkeep.jobs.ask(

@@ -189,6 +189,7 @@ def said_by_the_driver() -> set[str]:
     bench.board.services.set_brush(True, bench.now)
     bench.board.services.set_led(255, 128, 0, bench.now)
     bench.settle()
+    bench.board.settings = FejemisSettings()  # else the accelerometer must not be calibrated
     for job in Job:
         bench.board.services.ask(job, None, bench.now)
         bench.settle()

@@ -99,6 +99,17 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
     assert bench.imu[-1].specific_force == pytest.approx((0.0, 0.0, 9.80665), abs=0.1)
 
 
+def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets() -> None:
+    """The driver would write the parameter's offsets again, or report a false fault."""
+    offsets = (0.1, 0.2, 0.3, 1.0, 1.0, 1.0)
+    bench = nominal(settings=FejemisSettings(written={Written.ACCELEROMETER: offsets}))
+    bench.run(2.0)
+    with pytest.raises(RequestRefused, match="accel_calibration"):
+        bench.board.services.ask(Job.CALIBRATE_ACCELEROMETER, None, bench.now)
+    assert ask(bench, Job.CALIBRATE_GYRO).success
+    assert bench.board.advice is None
+
+
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
     """Only the loading of a configuration is accepted, because it stops the robot first."""
