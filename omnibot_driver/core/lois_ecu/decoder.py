@@ -11,7 +11,7 @@ This module does not read a clock and never raises on input. It holds less than 
 bytes between calls, and looks at each byte a bounded number of times.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.groups import Assembler, Timed
@@ -26,15 +26,16 @@ LONGEST_LINE: Final = 256
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counters of the decoder since its creation.
+    """Counters of one decoder, or of one after the other.
 
     ``lines``: valid lines; ``faults``: pieces of input that were discarded, because they were not a
-    line.
+    line; ``groups``: counters of groups of lines.
     """
 
     lines: int = 0
     faults: int = 0
     discarded_bytes: int = 0
+    groups: GroupStatistics = field(default_factory=GroupStatistics)
 
 
 class LoisDecoder:
@@ -50,15 +51,24 @@ class LoisDecoder:
         self.terminal = False
         self.times: list[float] = []
         self.statistics = DecoderStatistics()
-        self._assembler = Assembler()
         self._held = b""
         self._cut_bytes = 0
         """Number of bytes of the current line that were already discarded."""
 
     @property
+    def statistics(self) -> DecoderStatistics:
+        """Counters, which may be replaced by those of an earlier decoder before the first data."""
+        return self._statistics
+
+    @statistics.setter
+    def statistics(self, statistics: DecoderStatistics) -> None:
+        self._statistics = statistics
+        self._assembler = Assembler(statistics.groups)
+
+    @property
     def group_statistics(self) -> GroupStatistics:
         """Counters of groups of lines."""
-        return self._assembler.statistics
+        return self._statistics.groups
 
     @property
     def clock_unit(self) -> ClockUnit | None:

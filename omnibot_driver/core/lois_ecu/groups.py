@@ -61,17 +61,17 @@ class Assembler:
     """Assembler of reports from lines.
 
     Call ``add`` for each line, ``damage`` where characters were not a line, and ``rest`` while
-    nothing arrives.
+    nothing arrives. ``statistics``: the counters to increase.
     """
 
-    def __init__(self) -> None:
-        self.statistics = GroupStatistics()
+    def __init__(self, statistics: GroupStatistics) -> None:
+        self.statistics = statistics
         self._ticks_gate = TicksGate()
         self._odometry_gates: dict[bool, Gate[BoardOdometry]] = {
             False: odometry_gate(),
             True: odometry_gate(),
         }
-        self._record = RecordAssembler(self.statistics)
+        self._record = RecordAssembler(statistics)
         self._code: int | None = None
         self._payloads: list[int] = []
         self._done = False

@@ -18,7 +18,7 @@ from omnibot_driver.core.lois_ecu import (
     encode_report,
 )
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
-from omnibot_driver.core.lois_ecu.messages import Heading, SetTerminalMode
+from omnibot_driver.core.lois_ecu.messages import Heading, SetTerminalMode, Ticks
 from omnibot_driver.core.lois_ecu.readings import (
     RecordFailed,
     RecordReading,
@@ -232,3 +232,15 @@ def test_what_is_no_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> N
     ecu.receive(b"\n" + encode_report(Heading(5)), 1.0)
     assert ecu.advice is None
     assert ecu.mode is Mode.NOMINAL
+
+
+def test_the_number_of_damaged_groups_survives_a_new_connection() -> None:
+    """The faults of the diagnostics are counted over all connections."""
+    ecu = LoisConversation(LoisEcuSettings())
+    groups = [encode_report(Ticks(1000 + 200 * i, 5 + i, 7 + i)) for i in range(3)]
+    last_line_at = 3 * len(groups[0]) // 4
+    for faults in (1, 2, 3):
+        ecu.connect()
+        ecu.receive(groups[0][:last_line_at] + groups[1] + groups[2], 1.0)
+        assert ecu.figures.faults == faults
+    assert ecu.figures.discarded_bytes == 0
