@@ -158,8 +158,9 @@ class LoisConversation:
 
     def reset_odometry(self) -> None:
         """Begin the odometry frame at the robot's present pose."""
-        self._translation.odometry.reset()
-        self._translation.headings.forget()
+        odometry = self._translation.odometry
+        self._translation.headings.begin_frame(odometry.yaw_rad)
+        odometry.reset()
 
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is seen at rest since it was stopped; None if unknown.

@@ -34,6 +34,13 @@ class HeadingFilter:
         self._other: tuple[float, float] | None = None
         self._agreed = 0
 
+    def begin_frame(self, yaw_rad: float) -> None:
+        """Continue in an odometry frame that begins at this yaw of the present one."""
+        if self._last is not None:
+            self._last = self._last[0], self._last[1] - yaw_rad
+        if self._other is not None:
+            self._other = self._other[0], self._other[1] - yaw_rad
+
     def believes(self, heading_deg: float, yaw_rad: float) -> bool:
         """Return whether a heading is accepted.
 

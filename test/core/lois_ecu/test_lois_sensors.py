@@ -8,10 +8,10 @@ from datetime import date
 import pytest
 from lois_drives import Rig, nominal
 
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.lois_ecu import GpsDate, GpsTime, Stream, encode_report
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.messages import Heading
-from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.readings import (
     FixReading,
     HeadingReading,
@@ -82,20 +82,6 @@ def test_declination_turns_the_heading() -> None:
     assert found[-1] == HeadingReading(pytest.approx(-0.1))
 
 
-def test_headings_are_believed_after_the_odometry_frame_has_begun_anew(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The filter compares them with the turn in odom, of which the new frame begins at zero."""
-    yaw_rad = math.radians(-120.0)
-    monkeypatch.setattr(LoisOdometry, "yaw_rad", property(lambda _odometry: yaw_rad))
-    ecu = LoisConversation(LoisEcuSettings())
-    heading = encode_report(Heading(120))
-    assert ecu.receive(heading * 3, 0.0)
-    ecu.reset_odometry()
-    yaw_rad = 0.0
-    assert ecu.receive(heading * 10, 0.1)
-
-
 def test_false_headings_at_north_are_refused() -> None:
     """The public firmware averages headings around north wrongly: 359, 1 and 1 give 120."""
     rig = Rig(nominal("firmware"))
@@ -112,3 +98,13 @@ def test_false_headings_at_north_are_refused() -> None:
     assert len(errors) > 50
     assert max(errors) < math.radians(30)
     assert rig.driver._translation.headings.refused > 0
+
+
+def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
+    """They were compared with the yaw before the reset. So 120 degrees, which the firmware may
+    report at north, was refused for good by a robot that had turned by 120 degrees."""
+    ecu = LoisConversation(LoisEcuSettings())
+    headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)
+    assert ecu.receive(headings, 0.0)
+    ecu.reset_odometry()
+    assert ecu.receive(headings, 4.0)
