@@ -92,7 +92,7 @@ class Services:
         written = robot.settings.written
         if job is Job.CALIBRATE_ACCELEROMETER and Written.ACCELEROMETER in written:
             raise RequestRefused(
-                f"{job.value} refused: the parameter `accel_calibration` sets the offsets; remove"
+                f"{job.value} refused: the parameter accel_calibration sets the offsets; remove"
                 " it, start the driver again, then call again"
             )
         moves = robot.driving or moving

@@ -177,7 +177,7 @@ def test_what_happened_is_told_for_a_while_and_then_forgotten(
 
 
 def test_a_count_that_begins_anew_has_not_grown() -> None:
-    """The port was opened again: the overruns of the last connection are no news."""
+    """The port was opened again: the overruns of the last connection are not reported again."""
     robot = Robot()
     robot.connect(overruns=5)
     robot.seconds(round(RECENT_S) + 3)
