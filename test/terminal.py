@@ -11,14 +11,14 @@ import tty
 PATIENCE_S = 60.0
 
 
-def fill(descriptor: int, words: bytes = b"x") -> None:
-    """Write ``words`` repeatedly until the kernel accepts no more.
+def fill(descriptor: int, words: bytes = b"x", *, full_s: float = 0.2) -> None:
+    """Write ``words`` repeatedly until the kernel has accepted no more for ``full_s``.
 
     The descriptor must not block. The kernel may move data to its next buffer and then has room
     again. It does not report that, hence the pauses.
     """
     taken, full = 0, 0
-    while full < 20:
+    while full < 100 * full_s:
         full += 1
         with contextlib.suppress(BlockingIOError):
             while True:

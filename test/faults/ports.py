@@ -61,7 +61,7 @@ class Terminal(PtyBoard):
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        fill(near, old)
+        fill(near, old, full_s=0.05)  # before the driver gives the port up
         try:
             yield
         finally:

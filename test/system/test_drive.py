@@ -15,5 +15,5 @@ def test_over_a_bad_line_every_message_is_what_the_board_sent_and_odom_is_its_po
     assert outcome.imu_received > 0.85 * outcome.imu_sent, outcome
     assert outcome.odom_received > 0.85 * outcome.odom_sent, outcome
     assert outcome.imu_wrong + outcome.odom_wrong <= 3, outcome  # of 2,500
-    assert outcome.worst_m < 0.1, outcome
+    assert outcome.worst_m < 0.15, outcome
     assert outcome.way_m > 4.0, outcome
