@@ -117,7 +117,7 @@ class Ground:
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._blocked: Motion = Motion.NONE
         self._obstacle_told = False
-        self._stray_s = self._swept_s = -math.inf
+        self._stray_s = self._swept_s = self._stood_s = -math.inf
         self._negative_sweep = self._rescue = False
         self._rested_s = -math.inf
         self._counted_at_rest = 0

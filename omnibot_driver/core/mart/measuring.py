@@ -76,7 +76,11 @@ class Measuring(Starts):
         if self.state is State.STILL:
             rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
             if self._moved_by is not None and rested and self.odometry.motion is not Motion.NONE:
-                self._surplus.learn(self._moved_by, self.odometry.moved_m, self.odometry.spun_rad)
+                if self._copies_stopped_s > self._rested_s:
+                    self._discard_goal()
+                else:
+                    moved_m, spun_rad = self.odometry.moved_m, self.odometry.spun_rad
+                    self._surplus.learn(self._moved_by, moved_m, spun_rad)
                 self._moved_by = None
             if rested and self.odometry.motion is not Motion.NONE:
                 self._doubt_a_copy(now)
@@ -88,6 +92,18 @@ class Measuring(Starts):
             self._fresh = True
             self._learn(reading, now)
 
+    def _discard_goal(self) -> None:
+        """Discard the goal after a copy of its last move, as the count covers only the copy."""
+        if self._move is None or self._move.given_up:
+            return
+        self._move.given_up = True
+        self._notice(
+            "the network has copied a controlled move, and the driver has stopped the copy; the"
+            " way of the first one is not known, so the goal of cmd_pose is discarded: check the"
+            " network, then send it again",
+            halt=True,
+        )
+
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """Stop a robot whose counts change although it should be at rest.
 
@@ -97,10 +113,15 @@ class Measuring(Starts):
         rolls_s = ROLLS_AFTER_MOVE_S if self._moved_last else ROLLS_S
         if self._counted_at_rest < 2 or now - self._rested_s < rolls_s or before is None:
             return
-        if abs(count - before) <= STRAY_COUNTS or now - self._stray_s < STRAY_AGAIN_S:
+        if abs(count - before) <= STRAY_COUNTS:
+            self._stood_s = now
+            return
+        if now - self._stray_s < STRAY_AGAIN_S:
             return
         self.health.strays(now)
-        if self._negative_sweep and now - self._swept_s < 2.0:
+        # since a start that failed, or a restart of the server, the robot has not been at rest
+        unknown = self._stood_s < max(self.appeared_s, self._started_s)
+        if unknown and self._negative_sweep and now - self._swept_s < 2.0:
             self._stray_s = now
             self._rescue = True
             self._notice(

@@ -48,8 +48,7 @@ class Moves(Asking):
         if motion is Motion.STRAIGHT:
             self.odometry.finish_straight()
         self.jobs.moved(reply, now)
-        if self._rescue:
-            self.proof.stopped(now)  # its end is the stop of the motion that nothing else stopped
+        self.proof.stopped(now)
         self._rest(now)
         if isinstance(reply, Fail):
             self._moved_by = None  # it was cut short

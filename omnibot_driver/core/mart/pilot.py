@@ -74,7 +74,10 @@ class Pilot(Hearing):
         """Return whether the server is expected to be silent now, as it is busy."""
         if self._stopping is not None:
             return self.greeted and now < self._stopping.began_s + STOPS_S
-        return self.state in (State.MOVING, State.SERVING, State.CHECKING, State.STARTING)
+        if self.state is State.MOVING:
+            return True
+        answers = self.heard_s >= self.conversation.missed_s
+        return answers and self.state in (State.SERVING, State.CHECKING, State.STARTING)
 
     @property
     def ready(self) -> bool:

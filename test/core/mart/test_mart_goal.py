@@ -68,3 +68,15 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
     assert bench.job(Job.DOCK, "DOCK", 40).success
     bench.run(2.0)
     assert first_distance(bench, -1.8) <= round(2.0 / INCH_M / STRETCH) + 1
+
+
+def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_ends_the_goal() -> None:
+    """The count covers only the copy, so where the robot is now is not known."""
+    bench = MartBench().ready()
+    first_distance(bench, 2.0)
+    (move,) = [data for data in bench.said() if data.startswith(b"TF")]
+    bench.server.receive(move, 0, "driver", bench.robot.board.now_s)
+    bench.run(30.0)
+    assert any("the goal of cmd_pose is discarded" in notice for notice in bench.notices)
+    assert bench.truth.x_m < 2.4
+    assert bench.board._pilot._surplus.inches(2.0)[0] <= round(2.0 / INCH_M / STRETCH) + 1

@@ -37,6 +37,8 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
     assert bench.job(Job.DOCK, "DOCK", 20).success
     bench.run(2.0)
     assert bench.server.docked
+    assert bench.board.resting
+    assert bench.job(Job.BIAS).success
     bench = MartBench().ready()
     bench.board.ask(Job.DOCK, "token", bench.now, "DOCK", 40)
     bench.run_until(lambda: not bench.robot.stands)

@@ -280,3 +280,29 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
         assert bench.robot.stands, (wish, tenths, words)
         assert not bench.server.hung
     assert len(seen) >= 2 or wish.startswith("goal")
+
+
+def test_a_robot_that_is_pushed_under_the_estop_gets_stops_only() -> None:
+    """It was at rest, so its motors are off; somebody may be near it."""
+    bench = MartBench().ready()
+    bench.estop(True)
+    bench.run(1.0)
+    since = len(bench.written)
+    for _ in range(30):
+        bench.server.chassis.counts += 50
+        bench.run(0.1)
+    assert {data.split()[0] for data in bench.said(since)} <= {b"SRM", b"SM"}
+
+
+@pytest.mark.parametrize("motion", ["twist", "goal"])
+def test_a_network_that_is_cut_while_a_command_waits_is_reported(motion: str) -> None:
+    """The check of the IMU before the start is not answered, however often it is repeated."""
+    bench = MartBench().ready()
+    bench.robot.receive = lambda *_: None  # type: ignore[method-assign]
+    if motion == "goal":
+        bench.go_to(2.0, 0.0, 0.0)
+        bench.run(8.0)
+    else:
+        bench.command(0.3, 0.0, 8.0)
+    assert bench.session.state != "nominal"
+    assert any("no data from the board" in notice for notice in bench.notices)
