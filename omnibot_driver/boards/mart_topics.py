@@ -2,7 +2,6 @@
 
 """Topics and services that only the MART controller has. They only connect ROS to the session."""
 
-import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -21,7 +20,7 @@ from std_srvs.srv import Trigger
 from omnibot_driver import declaration, messages
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.board import MartBoard
-from omnibot_driver.core.mart.goal import INCH_M
+from omnibot_driver.core.mart.goal import docking_inches
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import (
     BatteryReading,
@@ -127,8 +126,7 @@ class MartTopics:
         async def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             arguments: tuple[object, ...] = ()
             if job is Job.DOCK:
-                inches = max(1, math.floor(self._values["dock_distance"] / INCH_M))
-                arguments = ("DOCK", inches)
+                arguments = ("DOCK", docking_inches(self._values["dock_distance"]))
             done = await self._ask(job, arguments)
             response.success, response.message = done.success, done.message
             if done.success and done.name:

@@ -26,6 +26,8 @@ To come nearer, the robot would have to turn towards the goal first.
 """
 STRETCH: Final = 1.3
 """Initial ratio of the driven to the requested length of straight moves: 15.8 in for 12 in."""
+DOCK_STRETCH: Final = 1.6
+"""Largest ratio of the driven to the requested length of docking moves: 0.73 m for 19 in."""
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Least improvement of the heading in degrees for which a turn is made."""
@@ -118,6 +120,11 @@ class Surplus:
         """Return the inches to request for a distance in m, and whether to drive at SLOW speed."""
         slow = way_m / INCH_M < SLOW_BELOW_IN
         return max(1, round(way_m / INCH_M / self._stretch[slow])), slow
+
+
+def docking_inches(longest_m: float) -> int:
+    """Return the inches to request for a docking move that drives ``longest_m`` at most."""
+    return max(1, math.floor(longest_m / INCH_M / DOCK_STRETCH))
 
 
 @dataclass(slots=True)

@@ -8,6 +8,7 @@ import pytest
 from mart_bench import MartBench
 
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.mart.goal import docking_inches
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
@@ -47,6 +48,15 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
     assert bench.robot.stands
     assert b"SL" in bench.said()
     assert bench.board._pilot.jobs.job is None
+
+
+@pytest.mark.parametrize("longest_m", [0.2, 0.5, 1.0, 3.0])
+def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
+    """The server drives further than requested, and no obstacle stops a docking move."""
+    bench = MartBench().ready()
+    bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))
+    bench.run(2.0)
+    assert 0.5 * longest_m < bench.truth.x_m <= longest_m
 
 
 def test_a_robot_that_must_not_move_does_not_dock() -> None:
