@@ -98,13 +98,16 @@ class Sequence:
         lost = (count - before - 1) % WRAP
         if paused:
             return Step(0, None, restarted=count <= lost)
-        lost = self._unwrapped(lost + 1, elapsed_s) - 1
+        wraps = max(0, round((elapsed_s / period_s - lost - 1) / WRAP))
+        lost += wraps * WRAP
+        late_s = abs((lost + 1) * period_s - elapsed_s)
+        latest_late_s = LATE_S + DRIFT * elapsed_s
         from_zero = count * period_s <= elapsed_s + EARLY_S
-        if lost and not self._on_time(lost + 1, elapsed_s) and (reconnected or from_zero):
+        if lost and late_s > latest_late_s and (reconnected or from_zero):
             self._pose, self._left = None, (before, before_at, count)
             return Step(0, None, restarted=True)
         latest_s = (lost + 1) * period_s - (
-            period_s / 2 if imus == self._imus_per_delta else _late_s(elapsed_s)
+            period_s / 2 if imus == self._imus_per_delta else latest_late_s
         )
         ahead = lost > told and elapsed_s < latest_s
         goes_on = self._ahead is not None and 0 < (count - self._ahead) % WRAP <= per_pose
@@ -146,20 +149,9 @@ class Sequence:
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left
-            on_time = self._on_time(self._unwrapped((count - was) % WRAP, now - at), now - at)
+            deltas, elapsed_s = (count - was) % WRAP, now - at
+            deltas += max(0, round((elapsed_s / self._period_s - deltas) / WRAP)) * WRAP
+            late_s = abs(deltas * self._period_s - elapsed_s)
+            on_time = late_s <= LATE_S + DRIFT * elapsed_s
             if on_time and not 0 < (count - anew) % WRAP <= self._per_pose:
                 self._delta, self._delta_at = was, at
-
-    def _unwrapped(self, deltas: int, elapsed_s: float) -> int:
-        """Return the number of deltas with the wraps of the counter that fit the time best."""
-        wraps = max(0, round((elapsed_s / self._period_s - deltas) / WRAP))
-        return deltas + wraps * WRAP
-
-    def _on_time(self, deltas: int, elapsed_s: float) -> bool:
-        """Return whether the board can send this number of deltas in this time."""
-        return abs(deltas * self._period_s - elapsed_s) <= _late_s(elapsed_s)
-
-
-def _late_s(elapsed_s: float) -> float:
-    """Return the largest error in s of an elapsed time, compared with the board's clock."""
-    return LATE_S + DRIFT * elapsed_s
