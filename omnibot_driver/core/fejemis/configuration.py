@@ -4,10 +4,9 @@
 
 Written values are read back, and written again until the board reports them, for ``TRIES`` at most.
 They are written at least once to each new or restarted board and after each change by the user,
-because what is read back may be rounded, which hides a small difference. A number is
-accepted only when two readings in a row agree, because 1 in 99 damaged answers passes its checksum,
-and the driver computes the geometry with these numbers. The module knows which line requests which
-numbers.
+because what is read back may be rounded, which hides a small difference. A number is accepted only
+when two readings in a row agree, because 1 in 99 damaged answers passes its checksum, and the
+driver computes the geometry with these numbers. The module knows which line requests which numbers.
 """
 
 import math
