@@ -21,6 +21,7 @@ from omnibot_driver import declaration, messages
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.board import MartBoard
 from omnibot_driver.core.mart.goal import docking_inches
+from omnibot_driver.core.mart.host_clock import clock_fields
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import (
     BatteryReading,
@@ -33,8 +34,6 @@ from omnibot_driver.qos import DEEP, LATCHED
 
 NAN: Final = float("nan")
 TIME_EVERY_S: Final = 1.0
-MINUTE_BEGINS_S: Final = 3
-"""Seconds at the beginning of a minute in which TIME does not set a correct clock back."""
 NO_DATA: Final = "no valid data from the controller; check its power and the network"
 ESTOP: Final = "the e-stop is latched; release it, then call again"
 NOT_AT_REST: Final = (
@@ -191,18 +190,12 @@ class MartTopics:
             self._timer.cancel()
 
     def _set_time(self) -> None:
-        """Set the controller's clock once, at a proved standstill.
-
-        The controller integrates its gyro by this clock, and sets it to the full minute. A clock
-        that was set before may not jump back after an RM, so the minute must have just begun.
-        """
-        utc = time.gmtime()
-        fields = (utc.tm_mon, utc.tm_mday, utc.tm_year, utc.tm_hour, utc.tm_min, utc.tm_sec)
+        """Set the controller's clock once, at a proved standstill."""
 
         def ask(session: Session, now: float) -> None:
             board = cast(MartBoard, session.board)
-            in_time = board.is_fresh or utc.tm_sec < MINUTE_BEGINS_S
-            if session.state == "nominal" and board.resting and in_time:
+            fields = clock_fields(time.time(), may_set_back=board.is_fresh)
+            if session.state == "nominal" and board.resting and fields:
                 try:
                     board.ask(Job.TIME, None, now, *fields)
                 except RequestRefused:

@@ -1,0 +1,26 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The numbers of the command TIME, and when they may be sent.
+
+The server sets its clock to the full minute, and integrates the heading by this clock. This module
+knows times only.
+"""
+
+import time
+from typing import Final
+
+ENDS_S: Final = range(56, 59)
+"""Seconds of a minute in which TIME with the next minute arrives before that minute."""
+
+
+def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
+    """Return month, day, year, hour, minute and second for TIME (UTC), or None if it must wait.
+
+    ``now_s``: this computer's time in s since 1970. If a correct clock may not be set back, the
+    next minute is sent shortly before it begins; the clock then is up to 4 s fast.
+    """
+    ends = time.gmtime(now_s).tm_sec in ENDS_S
+    if not (ends or may_set_back):
+        return None
+    utc = time.gmtime(now_s + 60 - ENDS_S.start if ends else now_s)
+    return utc.tm_mon, utc.tm_mday, utc.tm_year, utc.tm_hour, utc.tm_min, utc.tm_sec
