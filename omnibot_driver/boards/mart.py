@@ -55,6 +55,7 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
         track_m=wheels.track_m,
         metres_per_count=sign * values["odom_linear_scale"] * values["metres_per_count"],
         speed_per_unit=1.0 / values["linear_scale"],
+        motor_balance=values["motor_balance"],
         nominal_volts=values["nominal_voltage"],
         heading_sign=-1 if values["heading_inverted"] else 1,
         network_delay_s=values["network_delay"],

@@ -56,6 +56,17 @@ DRIVING: Final = (
         calibrated=True,
     ),
     Parameter(
+        "motor_balance",
+        1.0,
+        "",
+        "Speed of the left motor divided by that of the right one at equal units, as used before"
+        " the first drive forward; then the driver measures it, and shows it in /diagnostics.",
+        low=0.8,
+        high=1.25,
+        fixed=True,
+        calibrated=True,
+    ),
+    Parameter(
         "nominal_voltage",
         24.0,
         "V",

@@ -124,6 +124,21 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
     }
 
 
+@pytest.mark.parametrize(("shown", "found"), [("0.953", {"motor_balance": 0.953}), ("unknown", {})])
+def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
+    shown: str, found: dict[str, float]
+) -> None:
+    """Before a drive forward has shown it, the parameter keeps its value."""
+    robot = Encoder(motor_balance=1.0)
+    robot.diagnosed = {"Motor balance": shown}.__getitem__
+    console = Console(
+        yes=False,
+        read=lambda question: "y" if "Mark" in question or "room" in question else "1000",
+    )
+    parameters = scale.run(robot, console, arguments("scale")).parameters
+    assert {name: parameters[name] for name in parameters if "balance" in name} == found
+
+
 def test_a_line_that_was_misread_is_told() -> None:
     """A note says that two equal lines differ by more than the tape's uncertainty."""
     robot = TwoWheels()

@@ -7,6 +7,7 @@ ends. Time is an argument.
 """
 
 import math
+from typing import Final
 
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.moves import Moves
@@ -21,9 +22,17 @@ WAG_S, WAG_UNITS = 0.2, 2
 A change of the heading then shows that the IMU is alive and the robot has driven straight.
 """
 
+STARTED_M: Final = 0.01
+"""Distance of a wheel in m from which its motor has certainly turned it."""
+
 
 class Adjusting(Moves):
     """The part of the pilot that adjusts the present motion to the command."""
+
+    @property
+    def motor_balance(self) -> str:
+        """The measured ratio of the left to the right motor's speed, as a text."""
+        return f"{self.loop.balance:.3f}" if self.loop.balance_is_measured else "unknown"
 
     def _adjust(self, now: float) -> Packets:
         """Return the command that corrects the motors' units by the measured speed, if needed."""
@@ -76,5 +85,11 @@ class Adjusting(Moves):
         self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
 
     def _learn_standing(self) -> None:
-        """Learn that the motors need more units than those of the present motion to turn."""
-        self.loop.stood(self._turns.units if self.motion is Motion.SPIN else None)
+        """Learn that the motors need more units than those of the present motion to turn.
+
+        A robot that has moved before was blocked, which teaches nothing.
+        """
+        odometry = self.odometry
+        moved_m = abs(odometry.moved_m) + abs(odometry.spun_rad) * self._settings.track_m / 2
+        if moved_m < STARTED_M:
+            self.loop.stood(self._turns.units if self.motion is Motion.SPIN else None)

@@ -98,6 +98,7 @@ class MartBoard(Board):
                 "Late replies": str(pilot.conversation.discarded),
                 "Job": pilot.jobs.progress(pilot.now_s),
                 "Goal": pilot.goal_progress,
+                "Motor balance": pilot.motor_balance,
             },
             trouble=pilot.refusal,
         )

@@ -89,8 +89,8 @@ class Conversation:
     """The exchange of requests and replies with one server.
 
     ``delay_s``: longest time that a datagram may be on its way, in s; ``discarded``: number of late
-    replies so far; ``trip_s``: average duration of a query in s; ``missed_s``: when a reply was
-    last given up.
+    replies so far; ``trip_s``: average duration of a query in s, longer after unanswered ones;
+    ``answered_trip_s``: the same of answered queries; ``missed_s``: when a reply was last given up.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -104,7 +104,7 @@ class Conversation:
         self._owed_until_s: dict[Form, float] = {}
         self._copies_until_s: dict[Form, float] = {}
         self._answers: dict[Word, tuple[Ok | Fail, float]] = {}
-        self.trip_s = 0.0
+        self.trip_s = self.answered_trip_s = 0.0
         self._disturbed_s = self._doubled_s = self.missed_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
@@ -212,6 +212,7 @@ class Conversation:
         took_s = now - pending.sent_s
         if pending.word.kind is Kind.QUERY:
             self.trip_s += SMOOTHING * (took_s - self.trip_s)
+            self.answered_trip_s += SMOOTHING * (took_s - self.answered_trip_s)
         if pending.word in PRESSING and isinstance(reply, Ok) and took_s > SLOW_S:
             self._disturbed_s = now
         doubtful = self._owed(pending.word, now) or self._has_come(reply, now, but=pending.word)

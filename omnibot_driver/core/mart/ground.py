@@ -51,6 +51,11 @@ GREET_S: Final = 1.0
 
 The server answers them after the move; a restarted server answers at once.
 """
+GREET_CHECKED_S: Final = 0.3
+"""Time in s from a check of the IMU to the first HELLO, and between two of them.
+
+The answer shows that the check was lost, and that the server was not absent.
+"""
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which stops are sent while the e-stop is latched.
 
@@ -109,6 +114,7 @@ class Ground:
         self._stopping: Stopping | None = None
         self._move: Move | None = None
         self._start: Word | None = None
+        self._refused = False
         self._moved_last = False
         self._copies_stopped_s = -math.inf
         self._moved_by: Request | None = None
@@ -154,13 +160,19 @@ class Ground:
 
     def _hears(self, now: float) -> None:
         """Note a reply, and whether it is the first one after an absence of the server."""
-        if self.state in (State.STILL, *ROLLING):
-            most_s = ABSENT_S + ABSENT_TRIPS * self.conversation.trip_s
-        else:
+        most_s = ABSENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
+        if self.state is State.CHECKING:
+            most_s += self.imu.word.takes_s
+        elif self.state not in (State.STILL, *ROLLING):
             most_s = ABSENT_BUSY_S
         if now - self.heard_s > most_s and self.state not in (State.MOVING, State.SERVING):
-            self.appeared_s = now
+            self._appears(now)
         self.heard_s = now
+
+    def _appears(self, now: float) -> None:
+        """Note that the server may have been restarted: it then starts up, and has no log."""
+        self.appeared_s = now
+        self.jobs.logging = self.jobs.ended = False
 
     def take(self) -> list[Reading]:
         """Return the readings and the results of jobs that came since the last call."""

@@ -60,7 +60,6 @@ class Health:
 
     def __init__(self, imu: ImuProof) -> None:
         self._imu = imu
-        self.reference_fails = 0
         self.connect()
 
     def connect(self) -> None:
@@ -69,6 +68,7 @@ class Health:
         self.heading_changes = 0
         self.outlived = False
         self._defective = False
+        self.reference_fails = 0
         self._reference_failed_s = -math.inf
         self.stranger = ""
         self.status: int | None = None
@@ -155,6 +155,10 @@ class Health:
         """Note that RM was answered by a bare ``fail``."""
         self.reference_fails += 1
         self._reference_failed_s = now
+
+    def reference_answers(self) -> None:
+        """Note that RM was answered by ``ok``."""
+        self.reference_fails, self._reference_failed_s = 0, -math.inf
 
     def strays(self, now: float) -> None:
         """Note that the robot moves without a command.

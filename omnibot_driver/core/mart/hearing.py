@@ -97,10 +97,10 @@ class Hearing(Measuring):
 
         Its reply to the move was lost, or it was restarted while the motors turn.
         """
-        self.appeared_s = now
+        self._appears(now)
         self._moved_by = None
         if self.motion is Motion.STRAIGHT:
-            self.odometry.finish_straight()
+            self.odometry.doubt.end_straight()
         self.motion = Motion.UNKNOWN
         self._halt(now)
 

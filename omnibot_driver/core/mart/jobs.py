@@ -24,6 +24,11 @@ QUIET_S: Final = 1.0
 TIMES: Final = 3
 """Largest number of attempts at a job in REPEATED."""
 
+CHECK: Final = "check controller and network"
+COPY: Final = (
+    "the server has ended: copy the file from the controller, before ~/start_log deletes it"
+)
+
 
 class Job(Enum):
     """A kind of job; its value is the name used in messages."""
@@ -155,7 +160,9 @@ class Jobs:
             self._waiting = False
         else:
             self._finish(
-                False, f"the controller did not answer {word.text}; check controller and network"
+                False,
+                f"the controller did not answer {word.text}; "
+                + ("start the server again, as EXIT ends it" if self.ended else CHECK),
             )
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
@@ -197,11 +204,12 @@ class Jobs:
     def _close_file(self) -> None:
         came = sum(map(len, self._pieces))
         whole = [piece for piece in self._pieces if len(piece) == PIECE]
+        again = COPY if self.ended else "call again"
         if came < self._size:
             lost = math.ceil((self._size - came) / PIECE)
-            self._finish(False, f"{lost} pieces of {self._name} were lost; call again")
+            self._finish(False, f"{lost} pieces of {self._name} were lost; {again}")
         elif came > self._size or len(set(whole)) < len(whole):
-            self._finish(False, f"pieces of {self._name} came twice; call again")
+            self._finish(False, f"pieces of {self._name} came twice; {again}")
         else:
             content = b"".join(self._pieces)
             ended = "; the server has ended and must be started again" if self.ended else ""

@@ -118,7 +118,8 @@ class Measuring(Starts):
             return
         if now - self._stray_s < STRAY_AGAIN_S:
             return
-        self.health.strays(now)
+        if not self.conversation.doubles(now):
+            self.health.strays(now)
         # since a start that failed, or a restart of the server, the robot has not been at rest
         unknown = self._stood_s < max(self.appeared_s, self._started_s)
         if unknown and self._negative_sweep and now - self._swept_s < 2.0:

@@ -8,6 +8,7 @@ are given in nominal units: the units that an ideal motor would need for the spe
 knows neither wheels nor time.
 """
 
+import math
 from typing import Final
 
 LOWEST_SLOPE, HIGHEST_SLOPE = 0.4, 2.5
@@ -17,19 +18,26 @@ SLOPE_SD, OFFSET_SD = 0.3, 4.0
 """Initial standard deviations of the slope (around 1) and of the offset (around 0 units)."""
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 """Standard deviations of the change of slope and offset (units) between two measurements."""
+SURE: Final = 3.0
+"""Number of standard deviations by which a speed must exceed zero to be certain."""
 NOISE, NOISE_PART = 0.3, 0.02
 """Standard deviation of a measured speed: nominal units, plus a part of the commanded units."""
 
 
 class MotorLine:
-    """A Kalman filter for the line: ``slope * units + offset`` is the speed in nominal units."""
+    """A Kalman filter for the line: ``slope * units + offset`` is the speed in nominal units.
 
-    def __init__(self) -> None:
-        self.slope, self.offset = 1.0, 0.0
+    ``slope``: the slope before anything is learned.
+    """
+
+    def __init__(self, slope: float = 1.0) -> None:
+        self.slope, self.offset = slope, 0.0
+        self._learned = False
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
         """Correct the line by a measured speed; ``doubt`` multiplies its standard deviation."""
+        self._learned = True
         if self._ss < SLOPE_SD**2:
             self._ss += SLOPE_DRIFT**2
         if self._oo < OFFSET_SD**2:
@@ -47,12 +55,31 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Note that the motor does not turn with these units."""
+        """Note that the motor does not turn with these units.
+
+        The offset then is uncertain again: maybe the robot was only held.
+        """
         self._set(self.slope, min(self.offset, -self.slope * units))
+        self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
         """Change the line by these differences, by which the other motor's line has changed."""
+        self._learned = True
         self._set(self.slope + slope, self.offset + offset)
+
+    def turns(self, units: float) -> bool:
+        """Return whether the motor certainly turns with these units when it is not blocked."""
+        variance = self._ss * units * units + 2 * self._so * units + self._oo
+        noise = NOISE + NOISE_PART * units
+        return self._learned and self.speed(units) > SURE * math.hypot(math.sqrt(variance), noise)
+
+    def rescale(self, factor: float) -> None:
+        """Multiply the learned speeds by ``factor``, as nominal units are measured otherwise."""
+        if self._learned and factor != 1.0:
+            self._ss, self._so, self._oo = (
+                each * factor * factor for each in (self._ss, self._so, self._oo)
+            )
+            self._set(self.slope * factor, self.offset * factor)
 
     def _set(self, slope: float, offset: float) -> None:
         self.slope = min(HIGHEST_SLOPE, max(LOWEST_SLOPE, slope))

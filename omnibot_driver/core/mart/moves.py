@@ -46,7 +46,7 @@ class Moves(Asking):
         """Evaluate the reply that ends a controlled move."""
         motion = self.motion
         if motion is Motion.STRAIGHT:
-            self.odometry.finish_straight()
+            self.odometry.doubt.end_straight()
         self.jobs.moved(reply, now)
         self.proof.stopped(now)
         self._rest(now)

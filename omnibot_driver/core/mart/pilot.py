@@ -13,7 +13,12 @@ from typing import Final
 from omnibot_driver.core.commands.actuator import Wanted
 from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
-from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, GREET_S, STARTS_UP_S
+from omnibot_driver.core.mart.ground import (
+    ESTOP_REPEAT_S,
+    GREET_CHECKED_S,
+    GREET_S,
+    STARTS_UP_S,
+)
 from omnibot_driver.core.mart.hearing import Hearing
 from omnibot_driver.core.mart.required_motion import is_standstill
 from omnibot_driver.core.mart.states import (
@@ -36,6 +41,8 @@ It is shorter than STARTS_UP_S, so that the first motion uses the measured volta
 """
 VOLTS_S: Final = 10.0
 """Longest time in s for which VOLTS waits for a network that loses nothing."""
+GREETED: Final = {State.MOVING: GREET_S, State.CHECKING: GREET_CHECKED_S}
+"""Intervals in s at which HELLO is sent in the states in which the server may be silent."""
 COPY_S: Final = 0.25
 """If ENC is unanswered for this time in s after a controlled move, a duplicate may be running."""
 
@@ -51,7 +58,7 @@ class Pilot(Hearing):
             )
         if wanted is not self._wanted:
             self._move = None
-            if self._wanted is None or wanted is None or is_standstill(wanted):
+            if is_standstill(self._wanted) or is_standstill(wanted):
                 self._blocked = Motion.NONE
         self._wanted = wanted
         if is_standstill(wanted) and wanted is not None:
@@ -114,8 +121,10 @@ class Pilot(Hearing):
             return self._ask_s if pending is None else pending.until_s
         if pending is not None:
             times = [pending.until_s, self.jobs.wake_at, self._copy_stop_s]
+            if self.state in GREETED:
+                times.append(self._greet_s)
             if self.state is State.MOVING:
-                times += [self._greet_s, self._free_s]
+                times.append(self._free_s)
             return min(times)
         if self.state is State.SERVING:
             return self.jobs.wake_at
@@ -156,8 +165,8 @@ class Pilot(Hearing):
         if self.state is State.MOVING and now >= self._free_s:
             self._named_in_a_move(now)
             return self._keep_stopping(now)
-        if self.state is State.MOVING and now >= self._greet_s:
-            self._greet_s = now + GREET_S
+        if self.state in GREETED and now >= self._greet_s:
+            self._greet_s = now + GREETED[self.state]
             return self._greet(now)
         if self.conversation.pending is not None:
             return NO_PACKETS

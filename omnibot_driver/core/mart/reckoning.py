@@ -14,9 +14,9 @@ from omnibot_driver.core.geometry.se2 import Pose, roll
 from omnibot_driver.core.mart.doubt import CLOCK_S, SPREAD, Doubt
 from omnibot_driver.core.mart.mean_speeds import LEAST_S, MeanSpeeds
 from omnibot_driver.core.mart.moment import Moment
+from omnibot_driver.core.mart.motors import UNEQUAL
 from omnibot_driver.core.mart.relative_heading import RelativeHeading
 from omnibot_driver.core.mart.settings import MartSettings
-from omnibot_driver.core.mart.speed_loop import UNEQUAL
 from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
@@ -81,6 +81,7 @@ class Reckoning:
         """Begin a new odometry frame at the present pose."""
         self.pose = Pose()
         self.doubt.reset()
+        self._begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)
 
     def connect(self) -> None:
         """Begin a new connection: the server may have continued or restarted during the silence."""
@@ -130,6 +131,9 @@ class Reckoning:
         self.doubt.end()
         way_m, turn_rad = self.maybe
         self.doubt.add(way_m**2, turn_rad**2)
+        if self._begins_in_move:  # which part of the move came before is not known
+            self.doubt.add(self.moved_m**2, self.spun_rad**2)
+            self._begins_in_move = False
         self.motion = Motion.NONE
         self.wheel.rest()
         self.slowing_since_s = None
@@ -259,10 +263,6 @@ class Reckoning:
             told_rad = None
         self.doubt.end_turn(self.spun_rad, told_rad)
         self.told_rad = None
-
-    def finish_straight(self) -> None:
-        """End a straight controlled move: add the error with which the server holds the heading."""
-        self.doubt.end_straight()
 
     def _move(self, way_m: float, turn_rad: float, seconds: float, wheel_m: float) -> None:
         tangent = Pose(way_m, 0.0, turn_rad)

@@ -5,12 +5,12 @@
 This module knows commands and the track; it does not know the server. Time is an argument.
 """
 
+import math
 from typing import Final
 
 from omnibot_driver.core.commands.actuator import Wanted
 from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Stop
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.mart.speed_loop import turn_is_on_the_spot
 from omnibot_driver.core.mart.states import Motion
 
 STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
@@ -38,7 +38,12 @@ def required_motion(order: Drive | GoTo | None, track_m: float) -> tuple[Motion,
     speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
     if abs(speed) < SLOWEST_MPS and abs(rate) < SLOWEST_RADPS:
         return Motion.NONE, STANDING
-    if turn_is_on_the_spot(speed, rate, track_m):
+    if _is_on_the_spot(speed, rate, track_m):
         return Motion.SPIN, BodyTwist(0.0, 0.0, rate)
     motion = Motion.REFERENCE if speed > 0.0 else Motion.REVERSE
     return motion, BodyTwist(speed, 0.0, rate)
+
+
+def _is_on_the_spot(speed_mps: float, rate_radps: float, track_m: float) -> bool:
+    """Return whether a turn on the spot is nearer to the motion than a turn about one wheel."""
+    return abs(speed_mps) < 0.5 * abs(rate_radps) * track_m / 2 or math.isclose(speed_mps, 0.0)

@@ -14,13 +14,15 @@ class MartSettings:
     forward counts down; ``speed_per_unit``: speed of a wheel in m/s for one unit of RM at
     ``nominal_volts``; ``heading_sign``: 1 where a positive relative angle is to the left, else -1;
     ``network_delay_s``: longest time that a datagram may be on its way, in s; ``spin_speed``:
-    whether R and L turn at the commanded speed (set by SSP) or at the server's own SLOW speed.
+    whether R and L turn at the commanded speed (set by SSP) or at the server's own SLOW speed;
+    ``motor_balance``: speed of the left motor divided by that of the right one, at equal units.
     """
 
     wheel_radius_m: float = 0.0625
     track_m: float = 0.40
     metres_per_count: float = 0.0004
     speed_per_unit: float = 0.0085
+    motor_balance: float = 1.0
     nominal_volts: float = 24.0
     heading_sign: int = 1
     network_delay_s: float = 0.3

@@ -9,13 +9,13 @@ turn rate error. This module knows units, m/s and rad; it knows no commands. Tim
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.mart.motor_line import MOST_DEAD, MotorLine
+from omnibot_driver.core.mart.motors import MOST_UNITS, UNEQUAL, Motors
 from omnibot_driver.core.mart.settings import MartSettings
 
-MOST_UNITS: Final = 127
 MOST_CHANGE: Final = 15
 """Largest change in units by one command, as a duplicated command acts twice."""
 MOST_BACKWARD: Final = 5
@@ -36,38 +36,30 @@ SLOWEST_START_MPS: Final = 0.03
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the units of a start grow after a start that moved nothing."""
-SLOWEST_TURN_RADPS: Final = 0.05
-"""Slowest turn on the spot from which anything is learned, in rad/s."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
 """Time in s after a change of the turn rate for which the heading error is not summed."""
 NEW_RADPS: Final = 0.03
-UNEQUAL: Final = 0.04
-"""Standard deviation of the ratio of the two motors' speeds at equal units."""
-MOST_UNEQUAL: Final = 2 * UNEQUAL
-"""Largest relative difference of the two motors' gains that is used for predictions."""
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Variances per squared change of units: if it may arrive twice, and if it is not answered.
 
 A change may come twice where an exchange takes longer than SLOW_TRIP_S (s). The variances are
 larger than is probable, as a wrong guess stays for the complete motion.
 """
-BALANCE_UNITS: Final = 20
-"""Fewest units at which the motors are compared; with less, a line's error has too much effect."""
 
 
 @dataclass(slots=True)
 class _Side:
     """One motor.
 
-    ``units``: commanded units; ``line``: the learned speed for each number of units;
+    ``line``: the learned speed for each number of units; ``units``: commanded units;
     ``window_units_s``, ``window_m``: units and distance summed over the present window;
     ``stood_s``: time for which the wheel has stood although it must turn.
     """
 
+    line: MotorLine
     units: int = 0
     stood_s: float = 0.0
-    line: MotorLine = field(default_factory=MotorLine)
     window_units_s: float = 0.0
     window_m: float = 0.0
 
@@ -76,20 +68,20 @@ class _Side:
         return round(min(MOST_UNITS, max(0.0, self.line.units(speed)))) if speed > 0.0 else 0
 
 
-class SpeedLoop:
+class SpeedLoop(Motors):
     """The controller of both motors' speeds in one motion.
 
-    ``settings`` may be replaced; ``volts``: battery voltage as last reported; ``trip_s``: duration
-    of an exchange, by which the times of measurements are uncertain; ``part``: sum of the last
-    changes of both sides, each without sign and as a part of that side's units.
+    ``trip_s``: duration of an exchange, by which the times of measurements are uncertain; ``part``:
+    sum of the last changes of both sides, each without sign and as a part of that side's units;
+    ``balance_is_measured``: whether both wheels have been measured in a drive.
     """
 
     def __init__(self, settings: MartSettings) -> None:
-        self.settings = settings
-        self.volts = settings.nominal_volts
+        super().__init__(settings)
         self.trip_s = 0.0
-        self._right, self._left = _Side(), _Side()
+        self._right, self._left = _Side(self._right_line), _Side(self._left_line)
         self._least_units = LEAST_UNITS
+        self.balance_is_measured = False
         self.begin(0, False, 0.0)
 
     def begin(self, units: int, reverse: bool, now: float) -> None:
@@ -113,30 +105,21 @@ class SpeedLoop:
         units = min(60, self._right.wanted_units(slower_mps / self.per_unit_mps))
         return max(self._least_units, units)
 
-    def spin_units(self, rate_radps: float) -> int:
-        """Return the motor units for a turn on the spot at this rate."""
-        speed = abs(rate_radps) * self.settings.track_m / 2 / self.per_unit_mps
-        units = (self._right.line.units(speed) + self._left.line.units(speed)) / 2
-        return max(2, min(MOST_UNITS, round(units)))
-
-    def spun(self, units: int, rate_radps: float) -> None:
-        """Learn from a turn on the spot with these units and this mean rate."""
-        if abs(rate_radps) > SLOWEST_TURN_RADPS:
-            speed = abs(rate_radps) * self.settings.track_m / 2 / self.per_unit_mps
-            lines = self._right.line, self._left.line
-            error = speed - sum(line.speed(units) for line in lines) / 2
-            for line in lines:
-                line.learn(units, line.speed(units) + error)
+    def started(self) -> None:
+        """Note that the motors have turned after a start; later starts may need fewer units."""
+        self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
         """Learn that no motor turns with the present units, or with ``units`` on both sides.
 
-        More units than MOST_DEAD turn each motor that is not blocked, so they teach nothing.
+        More units than MOST_DEAD turn each motor that is not blocked, so they teach nothing. Nor do
+        units with which the motor has turned before; but to start, it may need more.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
             if 0 < each < MOST_DEAD:
-                side.line.stood(each)
+                if units is not None or not side.line.turns(each):
+                    side.line.stood(each)
                 self._least_units = max(self._least_units, min(round(MOST_DEAD), MORE_TIMES * each))
 
     @property
@@ -153,7 +136,7 @@ class SpeedLoop:
     def left_over_right(self) -> float:
         """Ratio of left to right wheel speed, by the units and the learned lines.
 
-        It differs from the ratio of two equal motors by MOST_UNEQUAL at most.
+        It differs from that of two motors with this ``motor_balance`` by MOST_UNEQUAL at most.
         """
         right, left = self._right, self._left
         if not right.units:
@@ -162,31 +145,14 @@ class SpeedLoop:
         return equal * self.balance
 
     @property
+    def balance(self) -> float:
+        """Ratio of the left to the right motor's speed at equal units of the present motion."""
+        return self._balance(self.units)
+
+    @property
     def bend(self) -> float:
         """Relative standard deviation of ``left_over_right``."""
         return math.sqrt(UNEQUAL**2 + self._unsure)
-
-    @property
-    def balance(self) -> float:
-        """Ratio of the left to the right motor's speed at equal units, limited to 1 ± MOST_UNEQUAL.
-
-        A change of units that was lost or duplicated while learning falsifies the lines.
-        """
-        units = max(self._right.units, self._left.units, BALANCE_UNITS)
-        ratio = self._left.line.speed(units) / max(1.0, self._right.line.speed(units))
-        return min(1.0 + MOST_UNEQUAL, max(1.0 - MOST_UNEQUAL, ratio))
-
-    def _mean_speed(self, units: float) -> float:
-        """Return the mean speed of both motors at these units, in nominal units; not negative."""
-        return max(0.0, (self._right.line.speed(units) + self._left.line.speed(units)) / 2)
-
-    def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
-        """Return the speeds of the right and left wheel, in m/s.
-
-        Neither is negative: in a tight turn the inner wheel stands still.
-        """
-        half = rate_radps * self.settings.track_m / 2
-        return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
 
     def measured(
         self,
@@ -223,6 +189,7 @@ class SpeedLoop:
                 )
             else:
                 self._learn(self._left)
+                self.balance_is_measured = True
             self._clear(now)
 
     def _learn(self, side: _Side) -> None:
@@ -277,20 +244,9 @@ class SpeedLoop:
         """Whether the network is so slow that a change may come twice."""
         return self.trip_s > SLOW_TRIP_S
 
-    @property
-    def per_unit_mps(self) -> float:
-        """Speed in m/s that one unit gives an ideal motor with the present battery voltage."""
-        settings = self.settings
-        return settings.speed_per_unit * self.volts / settings.nominal_volts
-
     def _clear(self, from_s: float) -> None:
         """Begin a new window at this time."""
         self._window_from_s = from_s
         self._window_s = 0.0
         for side in (self._right, self._left):
             side.window_units_s = side.window_m = 0.0
-
-
-def turn_is_on_the_spot(speed_mps: float, rate_radps: float, track_m: float) -> bool:
-    """Return whether a turn on the spot is nearer to the motion than a turn about one wheel."""
-    return abs(speed_mps) < 0.5 * abs(rate_radps) * track_m / 2 or math.isclose(speed_mps, 0.0)

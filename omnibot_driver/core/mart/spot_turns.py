@@ -18,10 +18,22 @@ from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
 """Part by which the commanded rate must change for a turn to be begun anew."""
-OFF: Final = 0.2
-"""Relative error of the rate from which a turn is begun anew."""
-SEEN_S, LEARN_RAD = 1.0, 0.3
-"""Shortest turn that shows how fast the motors turn: a time in s, and an angle in rad."""
+OFF, OFF_UNITS = 0.05, 0.6
+"""Error of the rate from which a turn is begun anew: as a part of the rate, and in motor units.
+
+Units are whole, so a smaller error cannot be corrected. The second correction of a rate needs twice
+the error, as each one costs a pause.
+"""
+SAME, CORRECTIONS = 0.2, 2
+"""Relative difference up to which two rates count as the same, and how often each is corrected."""
+STEADY: Final = 0.03
+"""Relative change of the commanded rate from which it is regarded as a new one."""
+SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.3
+"""Shortest turn that shows how fast the motors turn: a time in s, and angles in rad.
+
+The time is added to the averaging time of speeds. From TOLD_RAD on, the angle that the server
+reports in whole degrees is more precise than the wheel.
+"""
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest difference of a turn reported by a stop from the expected turn: rad, plus a part.
 
@@ -53,6 +65,8 @@ class SpotTurns:
         """Begin a new connection: nothing is known of the server's setting."""
         self.units = 0
         self.seen_radps = self._rate_radps = self._corrected_radps = 0.0
+        self._corrections = 0
+        self._wanted_radps, self._wanted_s = 0.0, -math.inf
         self._set_units: int | None = None
         self._set_s = -math.inf
         self._refused = False
@@ -101,37 +115,54 @@ class SpotTurns:
 
     def begin(self, rate_radps: float) -> None:
         """Note that a turn with this rate begins."""
-        self._rate_radps = rate_radps
+        self._rate_radps = self._wanted_radps = rate_radps
+        self._wanted_s = -math.inf
         if self.is_fixed:
             self.units = SLOW_UNITS
 
-    def fits(self, rate_radps: float, turned_s: float, *, disturbed: bool) -> bool:
+    def fits(self, rate_radps: float, now: float, *, turned_s: float, disturbed: bool) -> bool:
         """Return whether the present turn may continue under the command of this rate.
 
         ``turned_s``: time since the turn has begun; ``disturbed``: whether measurements may be
         missing.
         """
+        if abs(rate_radps - self._wanted_radps) > STEADY * abs(rate_radps):
+            self._wanted_radps, self._wanted_s = rate_radps, now
         if rate_radps * self._rate_radps <= 0.0:
             return False
         if self.is_fixed:
             return True
         near = abs(rate_radps - self._rate_radps) <= RATIO * abs(self._rate_radps)
-        return near and not self._is_off(rate_radps, turned_s, disturbed=disturbed)
+        steady_s = min(turned_s, now - self._wanted_s)
+        return near and not self._is_off(rate_radps, steady_s, disturbed=disturbed)
 
-    def _is_off(self, rate_radps: float, turned_s: float, *, disturbed: bool) -> bool:
+    def _is_off(self, rate_radps: float, steady_s: float, *, disturbed: bool) -> bool:
         """Return whether the turn is so far from its rate that it is begun anew.
 
-        Its stop tells how fast the motors turn with their units, so the next turn is right. This is
-        done once for each rate.
+        Its stop tells how fast the motors turn with their units, so the next turn is better. This
+        is not done while the commanded rate changes.
         """
-        if turned_s < SEEN_S or disturbed or abs(self._odometry.spun_rad) <= LEARN_RAD:
+        if disturbed or not self._is_seen(steady_s, rate_radps):
             return False
-        if abs(self._odometry.speeds.means[1] - rate_radps) <= OFF * abs(rate_radps):
+        if not math.isclose(rate_radps, self._corrected_radps, rel_tol=SAME):
+            self._corrected_radps, self._corrections = rate_radps, 0
+        error_radps = self._odometry.speeds.means[1] - rate_radps
+        times = 1 + self._corrections
+        off = abs(error_radps) > times * OFF * abs(rate_radps)
+        off = off and self._loop.units_of_spin(error_radps) > times * OFF_UNITS
+        if not off or self._corrections >= CORRECTIONS:
             return False
-        if math.isclose(rate_radps, self._corrected_radps, rel_tol=OFF):
-            return False
-        self._corrected_radps = rate_radps
+        self._corrections += 1
         return True
+
+    def _is_seen(self, seconds: float, rate_radps: float) -> bool:
+        """Return whether a turn shows how fast the motors turn.
+
+        ``seconds``: its duration; ``rate_radps``: its commanded rate, of which it may fall short.
+        """
+        least_s = SPINS_UP_S + self._odometry.speeds.window_s
+        turned_rad = max(abs(self._odometry.spun_rad), abs(rate_radps) * seconds / 2)
+        return seconds >= least_s and turned_rad > SEEN_RAD
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number cannot be the angle that the stop of this turn reports.
@@ -157,6 +188,10 @@ class SpotTurns:
         odometry = self._odometry
         spun_rad = odometry.spun_rad
         odometry.spin_told(degrees)
-        if turned_s > SEEN_S and self.units and abs(spun_rad) > LEARN_RAD:
-            whole_rad = abs(spun_rad + self.seen_radps * (uncounted_s + SLOWING_S))
-            self._loop.spun(self.units, self.seen_radps * abs(math.radians(degrees)) / whole_rad)
+        if not (self.units and self._is_seen(turned_s, self._rate_radps)):
+            return
+        rate_radps = self.seen_radps
+        if abs(spun_rad) > TOLD_RAD:
+            whole_rad = abs(spun_rad + rate_radps * (uncounted_s + SLOWING_S))
+            rate_radps *= abs(math.radians(degrees)) / whole_rad
+        self._loop.spun(self.units, rate_radps)

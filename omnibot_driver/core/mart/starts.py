@@ -12,8 +12,13 @@ from typing import Final
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.adjusting import Adjusting
-from omnibot_driver.core.mart.conversation import Answer
-from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, GREET_S, STARTS_UP_S
+from omnibot_driver.core.mart.conversation import SLOW_S, Answer
+from omnibot_driver.core.mart.ground import (
+    ESTOP_REPEAT_S,
+    GREET_CHECKED_S,
+    GREET_S,
+    STARTS_UP_S,
+)
 from omnibot_driver.core.mart.replies import Fail
 from omnibot_driver.core.mart.spot_turns import SLOW_UNITS
 from omnibot_driver.core.mart.states import (
@@ -52,6 +57,8 @@ class Starts(Adjusting):
         return NO_PACKETS
 
     def _act_still(self, now: float) -> Packets:
+        if setting := self._spin_setting(now):
+            return self._ask(setting, now)
         if not self._rolled_out and not self._rescue:
             return NO_PACKETS  # the roll-out is counted before the count begins anew
         if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
@@ -72,15 +79,18 @@ class Starts(Adjusting):
         if why := self.refusal:
             self._notice(why, halt=True)
             return NO_PACKETS
-        if start.word in (words.R, words.L):
-            _, twist = self._wish(now)
-            if setting := self._turns.setting(twist.yaw_rate_radps, now, self._delay_s):
-                return self._ask(setting, now)
         if self._copies_may_come(now):
             return NO_PACKETS
         if start.word in NEEDS_IMU and not self.imu.fresh(now):
             return self._check(now)
         return self._begin(start, now)
+
+    def _spin_setting(self, now: float) -> Request | None:
+        """Return the setting of the speed for the next turn on the spot, if it must be sent."""
+        motion, twist = self._wish(now)
+        if motion is not Motion.SPIN or self.refusal or now < self.appeared_s + STARTS_UP_S:
+            return None
+        return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _copies_may_come(self, now: float) -> bool:
         """Return whether a late copy of an earlier command could still harm a motion.
@@ -113,7 +123,7 @@ class Starts(Adjusting):
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
             return NO_PACKETS
         self._require(word)
-        self.state = State.CHECKING
+        self.state, self._greet_s = State.CHECKING, now + GREET_CHECKED_S
         if word is words.CHECK:
             self.odometry.wheel.may_begin_anew = True
         return self._ask(self.imu.request, now)
@@ -140,7 +150,7 @@ class Starts(Adjusting):
         self._require(start.word)
         self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
-        self._start = start.word
+        self._start, self._refused = start.word, False
         self._started_s = now
         self.imu.used()
         _, twist = self._wish(now)
@@ -174,10 +184,14 @@ class Starts(Adjusting):
                 if not forgot:
                     self._learn_standing()
                 self._doubt_the_left_wheel(answer.took_s)
-            self._start_failed(answer.reply, now)
+            network = self.conversation
+            quiet = not (answer.when.doubtful or network.disturbed(now))
+            arrived = quiet and network.trip_s < SLOW_S
+            self._start_failed(answer.reply, now, arrived=arrived)
             return
         if self.motion is Motion.REFERENCE:
-            self.health.reference_fails = 0
+            self.loop.started()
+            self.health.reference_answers()
             self._obstacle_told = False
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
@@ -186,10 +200,14 @@ class Starts(Adjusting):
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 
-    def _start_failed(self, reply: Fail, now: float) -> None:
-        """Stop the robot after a failed start, as it may move nevertheless."""
+    def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
+        """Stop the robot after a failed start, as it may move nevertheless.
+
+        ``arrived``: whether the reply is certainly that to this start, and no copy of it is likely.
+        """
         word = self._start
         assert word is not None
+        self._refused = True
         self._again_s = now + AGAIN_S
         if reply.reason == words.CONFLICT:
             self.motion = Motion.UNKNOWN
@@ -197,6 +215,8 @@ class Starts(Adjusting):
         elif word is words.RM and self._is_of_another(reply, now):
             if reply.reason in ("", words.NO_START):
                 self.health.reference_failed(now)
+            if not reply.reason and self.health.reference_fails == 1:
+                self._again_s = now  # after a stop that took long, an intact server fails once
             why = "the driver tries again"
             if self.health.reference_fails >= REFERENCE_FAILS:
                 self._blocked, self.health.reference_fails = Motion.REFERENCE, 0
@@ -210,7 +230,8 @@ class Starts(Adjusting):
             why = self._obstacle(reply, self.motion)
         if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
             self._turns.refused()
-        self._halt(now, f"{word.text} failed ({reply.reason or 'no reason given'}): {why}")
+        failed = f"{word.text} failed ({reply.reason or 'no reason given'})"
+        self._halt(now, f"{failed}: {why}", arrived=arrived)
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure text of RM may not be about this RM.

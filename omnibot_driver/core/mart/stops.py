@@ -76,7 +76,9 @@ class Stops(Ground, ABC):
         if motion is Motion.SPIN:
             turned_s = now - self._begun_s if self.state is State.TURNING else 0.0
             disturbed = self.conversation.disturbed(now)
-            return self._turns.fits(twist.yaw_rate_radps, turned_s, disturbed=disturbed)
+            return self._turns.fits(
+                twist.yaw_rate_radps, now, turned_s=turned_s, disturbed=disturbed
+            )
         return True
 
     def _why_stop(self, now: float) -> str:
@@ -123,11 +125,12 @@ class Stops(Ground, ABC):
         odometry = self.odometry
         return odometry.heading.told_s - max(odometry.heading.changed_s, self._begun_s)
 
-    def _halt(self, now: float, why: str = "") -> None:
+    def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user.
 
         The command is discarded as well, unless its direction is blocked: a block lasts until the
-        command changes.
+        command changes. ``arrived``: whether the start has certainly arrived, so that a stop cannot
+        overtake it.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
@@ -147,7 +150,7 @@ class Stops(Ground, ABC):
             self.motion,
             now,
             delay_s=self._delay_s,
-            started_s=self._started_s,
+            started_s=-math.inf if arrived else self._started_s,
             owed=owed,
             move=move,
         )
@@ -190,11 +193,11 @@ class Stops(Ground, ABC):
             uncounted_s = max(0.0, stopping.began_s - self.odometry.wheel.told_s)
             self._turns.stopped(result.number, uncounted_s, now - self._begun_s)
         if motion is Motion.STRAIGHT:
-            self.odometry.finish_straight()
+            self.odometry.doubt.end_straight()
         if isinstance(result, Fail):
             self._failed(motion, result, now)
-        elif result is None and motion is not Motion.UNKNOWN and now >= self._again_s:
-            self.appeared_s = now  # it knows of no motion: maybe it was started again meanwhile
+        elif result is None and motion is not Motion.UNKNOWN and not self._refused:
+            self._appears(now)  # it knows of no motion: maybe it was started again meanwhile
         if motion is Motion.UNKNOWN:
             self._negative_sweep = result is None
             self._swept_s = now
@@ -272,7 +275,9 @@ class Stops(Ground, ABC):
 
     def _failed(self, motion: Motion, reply: Fail, now: float) -> None:
         """Report the failure with which the server has ended a motion."""
-        if reply.reason in words.OBSTACLES:
+        if motion is Motion.STRAIGHT and reply.reason in words.OBSTACLES:
+            self._notice(f"an obstacle has ended the move ({reply.reason})", halt=False)
+        elif reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
         elif reply.reason == words.IMU_LOST:
             self.imu.lost()

@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.node import Node
@@ -56,6 +57,22 @@ class Listener(Client):
                 f"{self.driver} sends no {first} (state: {state}): see what it logs, and"
                 " docs/troubleshooting.md"
             )
+
+    def diagnosed(self, key: str) -> str:
+        """Return the value of ``key`` in the driver's next diagnostics, or an empty text."""
+        values: dict[str, str] = {}
+
+        def hear(message: DiagnosticArray) -> None:
+            for status in message.status:
+                if status.hardware_id == self.parameters["port"]:
+                    values.update((each.key, each.value) for each in status.values)
+
+        subscription = self._node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
+        try:
+            self._wait(lambda: key in values, FOUND_WITHIN_S)
+        finally:
+            self._node.destroy_subscription(subscription)
+        return values.get(key, "")
 
     def _on_imu(self, message: Imu) -> None:
         self._heard_s[IMU] = time.monotonic()

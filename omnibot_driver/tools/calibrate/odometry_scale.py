@@ -35,6 +35,8 @@ COUNT, UNITS = "metres_per_count", "linear_scale"
 
 A longer distance per count makes the same speed fewer units of the motors.
 """
+BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
+"""The parameter that the driver measures in these drives, its name in /diagnostics, its error."""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where"
     " the robot's centre is and where the front points; after it, enter how far it has driven, or"
@@ -85,7 +87,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         lambda drive: _drive(robot, console, drive, arguments),
         lambda drive, path: _measure(console, drive, path, arguments),
     )
-    return result(ratios, robot.parameters)
+    shown = robot.diagnosed(BALANCE_SHOWN) if BALANCE in robot.parameters else ""
+    return result(ratios, robot.parameters, balance=_number(shown))
 
 
 def plan(side_m: float, turns: int) -> list[Drive]:
@@ -124,8 +127,20 @@ def _measure(console: Console, drive: Drive, path: Column, arguments: argparse.N
     return Ratio(drive, first.way_to(last).way_m, come_mm / 1000.0, arguments.tape / 1000.0)
 
 
-def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
-    """Return the findings of these drives, to show and write; ``now``: the driver's parameters."""
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def result(
+    ratios: Sequence[Ratio], now: Mapping[str, Any], *, balance: float | None = None
+) -> Result:
+    """Return the findings of these drives, to show and write.
+
+    ``now``: the driver's parameters; ``balance``: motor balance that the driver has measured.
+    """
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))
     for name, turns in names:
@@ -138,6 +153,8 @@ def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
         if name == COUNT:
             before = now[UNITS]
             found[UNITS] = before / mean, before * sigma / mean**2, "unit/(m/s)"
+        if name == COUNT and balance is not None:
+            found[BALANCE] = balance, BALANCE_SIGMA, ""
         for each, (value, value_sigma, of) in found.items():
             parameters[each] = value
             findings.append(

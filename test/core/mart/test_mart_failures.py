@@ -65,6 +65,50 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
     assert not bench.robot.stands
 
 
+def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
+    None
+):
+    """The stop before the second RM is short, as the reply shows that the first RM has arrived."""
+    bench = MartBench("source").ready()
+    bench.command(0.3, 0.0, 3.0)
+    bench.command(0.0, 0.0, 1.0)
+    bench.server.motions[Kind.REFERENCE].samples = 58
+    bench.command(0.3, 0.0, 2.0)
+    assert any("RM failed" in notice for notice in bench.notices)
+    from_m = bench.server.chassis.x_m
+    bench.command(0.3, 0.0, 2.0)
+    assert bench.server.chassis.x_m - from_m == pytest.approx(0.6, rel=0.05)
+
+
+def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
+    """The robot is pushed within three seconds of the RM that failed, after one that did not."""
+    bench = MartBench("source").ready()
+    bench.server.motions[Kind.REFERENCE].samples = 58
+    bench.command(0.3, 0.0, 1.4)
+    assert not bench.robot.stands
+    bench.command(0.0, 0.0, 1.0)
+    bench.server.receive(b"RM 30", 0, None, bench.robot.board.now_s)
+    bench.run(3.0)
+    assert any("moves without a command" in notice for notice in bench.notices)
+    assert bench.board.refusal == ""
+
+
+def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None:
+    """The next start gets more units, but the drive is soon as fast as commanded."""
+    bench = MartBench("source").ready()
+    bench.command(0.06, 0.0, 3.0)
+    bench.server.chassis.change(stuck="both")
+    bench.command(0.06, 0.0, 3.0)
+    assert any("does not" in notice for notice in bench.notices)
+    bench.server.chassis.change(stuck="")
+    bench.command(0.0, 0.0, 1.0)
+    bench.command(0.06, 0.0, 1.0)
+    assert not bench.robot.stands
+    for _ in range(20):
+        bench.command(0.06, 0.0, 0.1)
+        assert bench.robot.board.facts["speed_mps"] == pytest.approx(0.06, abs=0.015)
+
+
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
     """The server gives the reason of the last B; the front sonar does not see an obstacle."""
     bench = MartBench("source").ready()
@@ -224,6 +268,20 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
         assert bench.session.state == "nominal"
         bench.command(*(wanted if any(wanted) else (0.3, 0.0)), 3.0)
         assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.02, 0.05, 0.1])
+def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_soon(
+    after_s: float,
+) -> None:
+    """The check is not answered. The absence shows that the server was restarted."""
+    bench = MartBench().ready()
+    bench.run_until(lambda: bench.try_command(0.0, 0.5) or b"RST IMU" in bench.said()[-1:], 2.0)
+    bench.run(after_s)
+    bench.server.restart(1.0)
+    bench.command(0.0, 0.5, 6.0)
+    assert not bench.server.crashed
+    assert not bench.robot.stands
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)

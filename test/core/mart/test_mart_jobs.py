@@ -2,13 +2,17 @@
 
 """Requests to the controller besides motion: gyro bias, dock, log, files, clock."""
 
+import calendar
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from mart_bench import MartBench
 
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.goal import docking_inches
+from omnibot_driver.core.mart.host_clock import clock_fields
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
@@ -163,6 +167,17 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
     assert bench.session.state == "connecting"
 
 
+def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
+    """EXIT would end the server without an answer, as its log was not started again."""
+    bench = MartBench("source").ready()
+    assert bench.job(Job.LOG).success
+    bench.server.restart(1.0)
+    bench.run(3.0)
+    assert bench.session.state == "nominal"
+    with pytest.raises(RequestRefused, match="start_log"):
+        bench.board.ask(Job.LOG_FILE, "token", bench.now)
+
+
 def test_the_clock_is_set_while_the_robot_stands() -> None:
     """TIME gets six numbers, in UTC; it is not sent while the robot is driven."""
     bench = MartBench().ready()
@@ -173,6 +188,22 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
     bench.board.ask(Job.TIME, "token", bench.now, 1, 1, 2027, 0, 0, 0)
     bench.command(0.3, 0.0, 1.0)
     assert b"TIME 1 1 2027 0 0 0" not in bench.said()
+
+
+@given(st.floats(0.0, 4e9))
+def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
+    """The server ignores the seconds. The datagram may take 1 s to it."""
+    fields = clock_fields(now_s, may_set_back=False)
+    assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))
+    if fields is not None:
+        month, day, year, hour, minute, _second = fields
+        set_s = calendar.timegm((year, month, day, hour, minute, 0))
+        assert now_s + 1.0 < set_s < now_s + 4.1
+
+
+def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
+    """Month, day, year, hour, minute, second, in UTC."""
+    assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:

@@ -271,6 +271,21 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
     assert loop.left_over_right == pytest.approx(1.0 + 0.08)
 
 
+def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
+    """The count at the end of the move covers the part before the reset, too."""
+    bench = MartBench("source").ready()
+    bench.go_to(1.0, 0.0, 0.0)
+    bench.run_until(lambda: bench.truth.x_m > 0.5, 10.0)
+    from_m = bench.truth.x_m
+    bench.session.reset_odometry(bench.now)
+    bench.until_it_stands()
+    bench.run(2.0)
+    told = bench.odometry[-1]
+    error_m = told.pose.x_m - (bench.truth.x_m - from_m)
+    assert error_m > 0.4
+    assert error_m**2 < 4 * told.covariance.xx
+
+
 def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
     """Before the first measured speed, the covariance includes the speed the robot may have."""
     odometry = MartOdometry(MartSettings())

@@ -141,7 +141,7 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 ) -> None:
     """The server answers a stop of a turn with an angle, and the late count looks like one."""
     bench = MartBench().ready()
-    bench.command(0.0, 0.5, 1.5)
+    bench.command(0.0, 0.5, 3.0)
     lost: list[bytes] = []
     receive = bench.robot.receive
 

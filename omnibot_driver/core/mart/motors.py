@@ -1,0 +1,100 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is known of the two motors: the speed of each for its command units.
+
+Each motor has a line (``MotorLine``) in nominal units, which are the units that an ideal motor
+would need. This module knows units, m/s and rad/s; it does not know what is commanded.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.mart.motor_line import MotorLine
+from omnibot_driver.core.mart.settings import MartSettings
+
+MOST_UNITS: Final = 127
+SLOWEST_TURN_RADPS: Final = 0.01
+"""Slowest turn on the spot from which anything is learned, in rad/s."""
+UNEQUAL: Final = 0.04
+"""Standard deviation of the ratio of the two motors' speeds at equal units."""
+MOST_UNEQUAL: Final = 2 * UNEQUAL
+"""Largest relative difference of the two motors' gains that is used for predictions."""
+BALANCE_UNITS: Final = 20
+"""Fewest units at which the motors are compared; with less, a line's error has too much effect."""
+
+
+class Motors:
+    """The right and the left motor.
+
+    ``volts``: battery voltage as last reported.
+    """
+
+    def __init__(self, settings: MartSettings) -> None:
+        self._settings = settings
+        self.volts = settings.nominal_volts
+        self._right_line, self._left_line = MotorLine(), MotorLine(settings.motor_balance)
+
+    @property
+    def settings(self) -> MartSettings:
+        """The sizes and scales of the robot; may be replaced."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: MartSettings) -> None:
+        factor = _nominal_units_per_count(settings) / _nominal_units_per_count(self._settings)
+        self._settings = settings
+        for line in (self._right_line, self._left_line):
+            line.rescale(factor)
+
+    @property
+    def per_unit_mps(self) -> float:
+        """Speed in m/s that one unit gives an ideal motor with the present battery voltage."""
+        settings = self.settings
+        return settings.speed_per_unit * self.volts / settings.nominal_volts
+
+    def spin_units(self, rate_radps: float) -> int:
+        """Return the motor units for a turn on the spot at this rate."""
+        speed = abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
+        units = (self._right_line.units(speed) + self._left_line.units(speed)) / 2
+        return max(2, min(MOST_UNITS, round(units)))
+
+    def units_of_spin(self, rate_radps: float) -> float:
+        """Return by how many motor units two turns on the spot differ whose rates differ so."""
+        speed = abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
+        return 2 * speed / (self._right_line.slope + self._left_line.slope)
+
+    def spun(self, units: int, rate_radps: float) -> None:
+        """Learn from a turn on the spot with these units and this mean rate."""
+        if abs(rate_radps) > SLOWEST_TURN_RADPS:
+            speed = abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
+            lines = self._right_line, self._left_line
+            error = speed - sum(line.speed(units) for line in lines) / 2
+            for line in lines:
+                line.learn(units, line.speed(units) + error)
+
+    def _balance(self, units: float) -> float:
+        """Return the ratio of the left to the right motor's speed at these units on both sides.
+
+        A change of units that was lost or duplicated while learning falsifies the lines, so the
+        ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
+        """
+        usual = self._settings.motor_balance
+        units = max(units, BALANCE_UNITS)
+        ratio = self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
+        return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
+
+    def _mean_speed(self, units: float) -> float:
+        """Return the mean speed of both motors at these units, in nominal units; not negative."""
+        return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
+
+    def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
+        """Return the speeds of the right and left wheel, in m/s.
+
+        Neither is negative: in a tight turn the inner wheel stands still.
+        """
+        half = rate_radps * self._settings.track_m / 2
+        return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
+
+
+def _nominal_units_per_count(settings: MartSettings) -> float:
+    """Return the speed of one count per second, in nominal units at 1 V."""
+    return abs(settings.metres_per_count) * settings.nominal_volts / settings.speed_per_unit
