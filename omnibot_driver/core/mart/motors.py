@@ -6,6 +6,7 @@ Each motor has a line (``MotorLine``) in nominal units, which are the units that
 would need. This module knows units, m/s and rad/s; it does not know what is commanded.
 """
 
+import copy
 from typing import Final
 
 from omnibot_driver.core.mart.motor_line import MotorLine
@@ -42,7 +43,7 @@ class Motors:
     def settings(self, settings: MartSettings) -> None:
         factor = _nominal_units_per_count(settings) / _nominal_units_per_count(self._settings)
         self._settings = settings
-        for line in (self._right_line, self._left_line):
+        for line in self._lines:
             line.rescale(factor)
 
     @property
@@ -53,23 +54,26 @@ class Motors:
 
     def spin_units(self, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at this rate."""
-        speed = abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
-        units = (self._right_line.units(speed) + self._left_line.units(speed)) / 2
-        return max(2, min(MOST_UNITS, round(units)))
+        return _units(self._lines, self._spin_speed(rate_radps))
 
-    def units_of_spin(self, rate_radps: float) -> float:
-        """Return by how many motor units two turns on the spot differ whose rates differ so."""
-        speed = abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
-        return 2 * speed / (self._right_line.slope + self._left_line.slope)
+    def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
+        """Return the units for a turn at ``rate_radps`` if ``units`` turn with ``seen_radps``."""
+        lines = copy.copy(self._right_line), copy.copy(self._left_line)
+        _learn_spin(lines, units, self._spin_speed(seen_radps))
+        return _units(lines, self._spin_speed(rate_radps))
 
     def spun(self, units: int, rate_radps: float) -> None:
         """Learn from a turn on the spot with these units and this mean rate."""
         if abs(rate_radps) > SLOWEST_TURN_RADPS:
-            speed = abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
-            lines = self._right_line, self._left_line
-            error = speed - sum(line.speed(units) for line in lines) / 2
-            for line in lines:
-                line.learn(units, line.speed(units) + error)
+            _learn_spin(self._lines, units, self._spin_speed(rate_radps))
+
+    @property
+    def _lines(self) -> tuple[MotorLine, MotorLine]:
+        return self._right_line, self._left_line
+
+    def _spin_speed(self, rate_radps: float) -> float:
+        """Return the speed of both wheels in a turn on the spot, in nominal units."""
+        return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
         """Return the ratio of the left to the right motor's speed at these units on both sides.
@@ -93,6 +97,16 @@ class Motors:
         """
         half = rate_radps * self._settings.track_m / 2
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
+
+
+def _units(lines: tuple[MotorLine, MotorLine], speed: float) -> int:
+    return max(2, min(MOST_UNITS, round(sum(line.units(speed) for line in lines) / 2)))
+
+
+def _learn_spin(lines: tuple[MotorLine, MotorLine], units: int, speed: float) -> None:
+    error = speed - sum(line.speed(units) for line in lines) / 2
+    for line in lines:
+        line.learn(units, line.speed(units) + error)
 
 
 def _nominal_units_per_count(settings: MartSettings) -> float:

@@ -18,17 +18,16 @@ from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
 """Part by which the commanded rate must change for a turn to be begun anew."""
-OFF, OFF_UNITS = 0.05, 0.6
-"""Error of the rate from which a turn is begun anew: as a part of the rate, and in motor units.
+OFF: Final = 0.05
+"""Relative error of the rate from which a turn is begun anew, with other units.
 
-Units are whole, so a smaller error cannot be corrected. The second correction of a rate needs twice
-the error, as each one costs a pause.
+The second correction of a rate needs twice the error, as each one costs a pause.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Relative difference up to which two rates count as the same, and how often each is corrected."""
 STEADY: Final = 0.03
 """Relative change of the commanded rate from which it is regarded as a new one."""
-SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.3
+SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Shortest turn that shows how fast the motors turn: a time in s, and angles in rad.
 
 The time is added to the averaging time of speeds. From TOLD_RAD on, the angle that the server
@@ -146,11 +145,11 @@ class SpotTurns:
             return False
         if not math.isclose(rate_radps, self._corrected_radps, rel_tol=SAME):
             self._corrected_radps, self._corrections = rate_radps, 0
-        error_radps = self._odometry.speeds.means[1] - rate_radps
-        times = 1 + self._corrections
-        off = abs(error_radps) > times * OFF * abs(rate_radps)
-        off = off and self._loop.units_of_spin(error_radps) > times * OFF_UNITS
-        if not off or self._corrections >= CORRECTIONS:
+        seen_radps = self._odometry.speeds.means[1]
+        most_radps = (1 + self._corrections) * OFF * abs(rate_radps)
+        if abs(seen_radps - rate_radps) <= most_radps or self._corrections >= CORRECTIONS:
+            return False
+        if self._loop.corrected_spin_units(self.units, seen_radps, rate_radps) == self.units:
             return False
         self._corrections += 1
         return True
