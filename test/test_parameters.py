@@ -70,7 +70,7 @@ EVERY_ROW = [
 ]
 DIMENSIONLESS = {
     "gear", "ir_calibration", "left_feed_forward", "left_kp", "left_long_correction",
-    "left_short_correction", "low_pass", "right_feed_forward", "right_kp",
+    "left_short_correction", "low_pass", "motor_balance", "right_feed_forward", "right_kp",
     "right_long_correction", "right_short_correction", "steering_gains",
 }  # fmt: skip
 """Real numbers that have no unit, or whose items have different ones."""

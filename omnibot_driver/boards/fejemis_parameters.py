@@ -129,7 +129,8 @@ DRIVING: Final = (
         10.0,
         "s",
         "Time from ~/power_off until the board cuts the power, also that of this computer if"
-        " the board supplies it.",
+        " the board supplies it. It is sent in whole seconds; a value in which a lost digit could"
+        " make another one is raised, such as 120 s to 131 s. The answer has the time in use.",
         low=1.0,
         high=3600.0,
     ),

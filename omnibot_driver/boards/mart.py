@@ -32,6 +32,9 @@ PARAMETERS: Final = table(
         "twist_angular_stddev",
     ),
     changed={
+        "command_rate": {
+            "description": "Not used by this board: a motion needs no repetition of its command."
+        },
         "port": {
             "default": "udp://192.168.1.50:5000",
             "description": "Address of the controller, udp://host:port; its stop port is one"

@@ -79,7 +79,7 @@ DRIVING: Final = (
         "heading_inverted",
         False,
         "",
-        "Whether the controller's relative angle is positive to the right.",
+        "Whether the controller's relative angle increases when the robot turns right.",
         fixed=True,
         calibrated=True,
     ),
@@ -162,7 +162,7 @@ SENSORS: Final = (
     ),
     Parameter(
         "record_directory",
-        ".",
+        "~/.ros/mart_records",
         "",
         "Where downloads are written.",
         fixed=True,

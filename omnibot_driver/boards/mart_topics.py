@@ -18,10 +18,10 @@ from std_msgs.msg import Bool, Header
 from std_srvs.srv import Trigger
 
 from omnibot_driver import declaration, messages
+from omnibot_driver.boards.mart_clock import clock_fields
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.board import MartBoard
 from omnibot_driver.core.mart.goal import docking_inches
-from omnibot_driver.core.mart.host_clock import clock_fields
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import (
     BatteryReading,

@@ -107,6 +107,7 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
                 true_pose=Pose(truth["x_m"], truth["y_m"], truth["yaw_rad"]),
                 points=robot.points,
                 real=capability.real,
+                page=capability.page,
             )
         )
 

@@ -21,7 +21,7 @@ class Capability:
     ``title`` is its name in "A simulated ... drives". ``imu``: whether it has ``imu/data_raw``.
     ``sideways``: whether it can move along y as well. ``ports``: for each address that the
     simulator prints, the driver's parameter for it; empty where another address implies it.
-    ``real``: arguments that a driver needs for the real robot.
+    ``real``: arguments that a driver needs for the real robot; ``page``: the board's document.
     """
 
     title: str
@@ -29,6 +29,7 @@ class Capability:
     sideways: bool
     ports: tuple[str, ...]
     real: str
+    page: str
 
 
 def of(name: str) -> Capability:
@@ -50,6 +51,7 @@ def of(name: str) -> Capability:
         sideways=sideways,
         ports=ports,
         real=port_arguments(name, {port: str(values[port]) for port in ports if port}),
+        page=f"docs/boards/{name}.md",
     )
 
 

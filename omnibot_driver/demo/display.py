@@ -19,7 +19,7 @@ HEADING: Final = """\
 state        imu odom lap   x m   y m yaw° x m/s y m/s rad/s x m/s y m/s rad/s"""
 
 CLOSING: Final = """
-With the real robot: wheels off the ground first (docs/commissioning.md), then
+With the real robot: wheels off the ground first ({page}), then
   ros2 run omnibot_driver driver --ros-args """
 
 
@@ -79,7 +79,8 @@ Where ROS 2 Jazzy is installed, watch and intervene from another terminal:
 class Drive:
     """The results of a drive: what was driven and received, the pose by odometry, and the true one.
 
-    ``imu_hz`` is None without an IMU. ``real``: the driver's arguments for the real robot.
+    ``imu_hz`` is None without an IMU. ``real``: the driver's arguments for the real robot;
+    ``page``: the document of its board.
     """
 
     seconds: float
@@ -91,6 +92,7 @@ class Drive:
     true_pose: Pose
     points: Iterable[tuple[float, float]]
     real: str
+    page: str
 
 
 def report(drive: Drive) -> None:
@@ -113,4 +115,4 @@ def report(drive: Drive) -> None:
     if sys.stdout.isatty():
         rows = zip_longest(draw_path(drive.points, 24, 12).rows, ["", "", "", *text], fillvalue="")
         text = ["", *(f"{drawn:28}{line}".rstrip() for drawn, line in rows)]
-    print(*text, CLOSING + drive.real, sep="\n")
+    print(*text, CLOSING.format(page=drive.page) + drive.real, sep="\n")

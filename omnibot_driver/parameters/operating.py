@@ -56,7 +56,7 @@ LINE: Final = (
         0.5,
         "s",
         "Time until the driver opens a lost port again. It grows by half with each failure, up to"
-        " 2 s.",
+        " 2 s, if it is shorter.",
         low=0.05,
         high=60.0,
     ),

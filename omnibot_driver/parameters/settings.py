@@ -55,8 +55,8 @@ def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSe
         motion=MotionLimits(
             fastest_mps=values["fastest_linear_speed"],
             fastest_radps=values["fastest_angular_speed"],
-            fastest_mps2=values["fastest_linear_acceleration"],
-            fastest_radps2=values["fastest_angular_acceleration"],
+            fastest_mps2=values.get("fastest_linear_acceleration", math.inf),
+            fastest_radps2=values.get("fastest_angular_acceleration", math.inf),
             force_step_mps2=values.get("largest_force_step", math.inf),
             full_scale_mps2=values.get("accel_range", math.inf) * STANDARD_GRAVITY,
         ),

@@ -38,6 +38,10 @@ def _takes_twists(traits: Traits) -> bool:
     return Authority.BASE in traits.authorities
 
 
+def _checks_accelerations(traits: Traits) -> bool:
+    return bool(traits.imu) or not traits.own_odometry
+
+
 NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "baudrate": lambda traits: traits.baudrate,
     "auto_start": lambda traits: Request.START in traits.requests,
@@ -47,6 +51,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "max_linear_acceleration": _takes_twists,
     "max_angular_acceleration": _takes_twists,
     "max_wheel_speed": lambda traits: Authority.WHEELS in traits.authorities,
+    "fastest_linear_acceleration": _checks_accelerations,
+    "fastest_angular_acceleration": _checks_accelerations,
     "imu_frame": _has_imu,
     "gyro_bias": _has_imu,
     "accel_bias": _has_imu,

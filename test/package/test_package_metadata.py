@@ -54,6 +54,7 @@ PURE_MODULES = {
     "bisect",
     "cmath",
     "collections",
+    "copy",
     "dataclasses",
     "enum",
     "functools",

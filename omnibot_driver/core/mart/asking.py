@@ -75,7 +75,7 @@ class Asking(Stops):
         elif abs(count - before[0]) > STRAY_COUNTS:
             self._sweep(now)
         else:
-            self._lose(now, "the stop port has ended a motion, and the server does not know it")
+            self._lose(now, "the robot is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
         """Stop any motion with SRM and SM, which cannot hang the server now."""

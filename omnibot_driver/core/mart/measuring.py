@@ -99,8 +99,8 @@ class Measuring(Starts):
         self._move.given_up = True
         self._notice(
             "the network has copied a controlled move, and the driver has stopped the copy; the"
-            " way of the first one is not known, so the goal of cmd_pose is discarded: check the"
-            " network, then send it again",
+            " driven distance is unknown, so the goal of cmd_pose is discarded: check the network,"
+            " then send the goal again",
             halt=True,
         )
 

@@ -18,10 +18,11 @@ from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
 """Part by which the commanded rate must change for a turn to be begun anew."""
-OFF: Final = 0.05
-"""Relative error of the rate from which a turn is begun anew, with other units.
+OFF, OFF_AGAIN = 0.05, 0.12
+"""Relative errors of the rate from which a turn is begun anew, with other units.
 
-The second correction of a rate needs twice the error, as each one costs a pause.
+The first holds until a turn has taught how fast the motors turn; later a correction would often
+cost more than the error.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Relative difference up to which two rates count as the same, and how often each is corrected."""
@@ -64,7 +65,7 @@ class SpotTurns:
         """Begin a new connection: nothing is known of the server's setting."""
         self.units = 0
         self.seen_radps = self._rate_radps = self._corrected_radps = 0.0
-        self._corrections = 0
+        self._corrections, self._has_learned = 0, False
         self._wanted_radps, self._wanted_s = 0.0, -math.inf
         self._set_units: int | None = None
         self._set_s = -math.inf
@@ -146,7 +147,7 @@ class SpotTurns:
         if not math.isclose(rate_radps, self._corrected_radps, rel_tol=SAME):
             self._corrected_radps, self._corrections = rate_radps, 0
         seen_radps = self._odometry.speeds.means[1]
-        most_radps = (1 + self._corrections) * OFF * abs(rate_radps)
+        most_radps = (OFF_AGAIN if self._has_learned else OFF) * abs(rate_radps)
         if abs(seen_radps - rate_radps) <= most_radps or self._corrections >= CORRECTIONS:
             return False
         if self._loop.corrected_spin_units(self.units, seen_radps, rate_radps) == self.units:
@@ -194,3 +195,4 @@ class SpotTurns:
             whole_rad = abs(spun_rad + rate_radps * (uncounted_s + SLOWING_S))
             rate_radps *= abs(math.radians(degrees)) / whole_rad
         self._loop.spun(self.units, rate_radps)
+        self._has_learned = True

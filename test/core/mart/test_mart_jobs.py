@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mart_bench import MartBench
 
+from omnibot_driver.boards.mart_clock import clock_fields
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.goal import docking_inches
-from omnibot_driver.core.mart.host_clock import clock_fields
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
