@@ -8,6 +8,10 @@ it. It is returned with its last line already if no line repeats the one before 
 received twice) and its values can follow those of the last group. Otherwise it waits for the next
 line, or for ``QUIET_S`` without one.
 
+Silence completes a group that has a valid length. It does not end an unfinished group, because a
+reader may be late for the rest. But a rest that comes almost a period later may be the rest of the
+next group: then all lines between them were lost. So that group is discarded.
+
 0x12 is two kinds of group, distinguished by their length: ticks of 3 lines, and in the public
 firmware 6 lines of odometry right behind them. A count of -1 looks like a marker; there the length
 decides too. Records are assembled in ``record_lines``. Works on lines and arrival times.
@@ -42,8 +46,12 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group has ended: its lines follow each other within 1.2 ms, and a
-reader passes them on within this time."""
+"""Silence in s after which a group of a valid length has ended: its lines follow each other within
+1.2 ms, and a reader usually passes them on within this time."""
+LATE_S: Final = 0.15
+LATE_PART: Final = 0.75
+"""Longest pause within a group, in s and as part of the time between its marker and the marker of
+the group before."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
@@ -75,6 +83,9 @@ class Assembler:
         self._code: int | None = None
         self._payloads: list[int] = []
         self._done = False
+        self._begun_at: dict[int, float] = {}
+        self._late_s: dict[int, float] = {}
+        """By code: when the last group began, and the longest pause in s within a group."""
         self._astray = False
         self._after_ticks = False
         self._appends = True
@@ -88,8 +99,11 @@ class Assembler:
 
     @property
     def resolves_at(self) -> float:
-        """Time at which a held group is returned if nothing follows it; infinity without one."""
-        return self._at + QUIET_S if self._code is not None and not self._done else math.inf
+        """Time at which a held group is returned if nothing follows it.
+
+        Infinity without a group, and while the group may be unfinished.
+        """
+        return self._at + QUIET_S if self._may_be_complete() else math.inf
 
     @property
     def in_record(self) -> bool:
@@ -111,11 +125,11 @@ class Assembler:
         code, payload = line.command, line.payload
         if code in _LENGTHS:
             self._record.cut_off()
-            found: list[Timed] = []
+            late = now - self._at > self._late_s.get(code, LATE_S)
+            found: list[Timed] = self._end(now) if late else []
             if payload == MARKER and not self._may_be_minus_one(code):
                 found += self._end(now)
-                self._code, self._payloads, self._done, self._astray = code, [], False, False
-                self._at = now
+                self._begin(code, now)
                 return found
             return found + self._value(code, payload, now)
         found = self._end(now)
@@ -136,7 +150,7 @@ class Assembler:
         self._record.damage()
 
     def rest(self, now: float) -> list[Timed]:
-        """Return the held group if nothing has followed it for ``QUIET_S``."""
+        """Return the held group if it has a valid length and nothing follows it for ``QUIET_S``."""
         return self._end(now) if now >= self.resolves_at else []
 
     def finish(self, now: float) -> list[Timed]:
@@ -147,9 +161,25 @@ class Assembler:
 
     # Groups
 
+    def _begin(self, code: int, now: float) -> None:
+        """Begin a group, and learn from the time since the one before how late its rest may be."""
+        since_s = now - self._begun_at.get(code, -math.inf)
+        if since_s > QUIET_S and not self._after_ticks:  # not read together, nor sent together
+            self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))
+        self._begun_at[code] = self._at = now
+        self._code, self._payloads, self._done, self._astray = code, [], False, False
+
     def _may_be_minus_one(self, code: int) -> bool:
         """Return whether this marker may be a count of -1; if not, the group gets too long."""
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
+
+    def _may_be_complete(self) -> bool:
+        """Return whether a held group has a valid length, and nothing shows that it is longer."""
+        if self._code is None or self._done:
+            return False
+        if len(self._payloads) not in _LENGTHS[Code(self._code)]:
+            return False
+        return not (self._after_ticks and self._appends and len(self._payloads) == 3)
 
     def _value(self, code: int, payload: int, now: float) -> list[Timed]:
         if code != self._code:
@@ -164,10 +194,9 @@ class Assembler:
             return []
         if len(self._payloads) < _LONGEST:
             self._payloads.append(payload)
-        if len(self._payloads) not in _LENGTHS[Code(code)]:
+        if not self._may_be_complete():
             return []
-        repeated = any(map(eq, self._payloads, self._payloads[1:])) or MARKER in self._payloads
-        if repeated or (self._after_ticks and self._appends and len(self._payloads) == 3):
+        if any(map(eq, self._payloads, self._payloads[1:])) or MARKER in self._payloads:
             return []
         group = _group(code, self._payloads)
         if group is None or not in_range(group) or not self._goes_on(group, now):

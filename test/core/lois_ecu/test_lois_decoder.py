@@ -75,6 +75,7 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     assert decoder.feed(encode_report(Ticks(600, 4, 3)), 0.0) == []
     assert decoder.feed(b"", 0.04) == []
     assert decoder.feed(b"", 0.06) == [Ticks(600, 4, 3)]
+    assert decoder.feed(encode_report(Heading(2)), 0.07) == [Heading(2)]
     assert decoder.feed(alike, 0.4) == []
     assert decoder.resolves_at == pytest.approx(0.45)
     assert decoder.feed(encode_report(Heading(3)), 0.41) == [Ticks(1000, 5, 5), Heading(3)]
