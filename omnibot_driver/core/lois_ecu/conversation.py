@@ -120,6 +120,8 @@ class LoisConversation:
             )
             self._points.clear_again()
         found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
+        if self._translation.needs_date:
+            self._upkeep.writer.ask_date(now)
         if self._translation.restarts != restarts:
             self._upkeep.writer.begin(now)
         if self._upkeep.change.left:

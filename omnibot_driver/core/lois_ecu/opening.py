@@ -7,6 +7,9 @@ for. Two things can be confirmed: the period of the ticks, and that the board an
 round requests the date once, which is off after a boot. While either is missing, the rounds
 continue. Writing a gain resets the firmware's controller, so settings wait while the robot drives.
 
+After that, the date is requested while it is unknown although the GPS works (``ask_date``): the GPS
+had none before, or midnight has passed.
+
 A request replaces the date's period on the board. So if that period is set, the requests end with
 the first answer, and the rounds after it restore the period.
 
@@ -52,10 +55,12 @@ this line, their rests could be another motion. The reverse order is harmless. L
 between two set-points, so that the line is sent however often motions are sent.
 """
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group of ticks to the next round of settings, varied because the board is deaf
-while it sends another group."""
+"""Times in s from a group to the next round of settings or request of the date, varied because the
+board is deaf while it sends another group."""
 CONFIRMED_WITHIN: Final = 0.35
 """Part by which the ticks' period may differ from the requested one."""
+DATE_AGAIN_S: Final = 3.0
+"""Shortest time in s between two requests of a date that is unknown."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s before a recovery; the board boots for two seconds."""
@@ -78,6 +83,7 @@ class SettingsWriter:
         """Commands that are not settings, with the time from which each may be sent."""
         self._rounds_left = 0
         self._round_at_s = math.inf
+        self._date_asked_at_s, self._dates_asked = -math.inf, 0
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
         self.overwritten = False
@@ -133,8 +139,20 @@ class SettingsWriter:
     def write(self, command: Command, now: float) -> None:
         """Queue a command that is not a setting, to be sent ``ROUNDS`` times."""
         for count in range(ROUNDS):
-            self._others.append((now + count * ROUND_S, command))
+            self._queue_other(now + count * ROUND_S, command)
+
+    def _queue_other(self, at_s: float, command: Command) -> None:
+        self._others.append((at_s, command))
         self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
+
+    def ask_date(self, now: float) -> None:
+        """Request the date, unless it comes by itself or was requested a short time ago."""
+        if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
+            return
+        self._date_asked_at_s = now
+        at_s = now + AWAY_S[self._dates_asked % len(AWAY_S)]
+        self._dates_asked += 1
+        self._queue_other(at_s, SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
 
     def ticks_came(self, now: float) -> None:
         """Note that ticks arrived, and compare their measured period with the requested one."""

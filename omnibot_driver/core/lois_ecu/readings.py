@@ -14,7 +14,10 @@ from omnibot_driver.core.readings import DisplacementReading
 
 @dataclass(frozen=True, slots=True)
 class FixReading:
-    """GPS position in degrees, north and east positive. ``valid``: it is not 0/0."""
+    """GPS position in degrees, north and east positive.
+
+    ``valid``: it is not 0/0, and the GPS has a date.
+    """
 
     latitude_deg: float
     longitude_deg: float

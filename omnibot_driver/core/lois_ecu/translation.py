@@ -78,7 +78,10 @@ class Translation:
         self._time, self._late_s = BoardTime(), 0.0
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
+        self._dated = False
+        """Whether the GPS has a date; it still has one when midnight makes ``_date`` unknown."""
         self._clock = (0, 0, 0)
+        self._gps_works = False
 
     def connect(self) -> None:
         """Begin a new connection."""
@@ -94,6 +97,7 @@ class Translation:
         now: float,
     ) -> list[LoisReading]:
         """Return the readings of the reports, in order; ``times``: when each report arrived."""
+        self._gps_works = False
         found: list[LoisReading] = []
         for at, report in zip(times, reports, strict=True):
             found += self._readings(report, clock_unit, at)
@@ -116,15 +120,19 @@ class Translation:
                 odometry.heard_odometry(report, now, late_s)
             case GpsPosition(latitude, longitude):
                 self._time.sent(POSITION_LINES)
-                return [FixReading(latitude, longitude, bool(latitude or longitude))]
+                located = bool(latitude or longitude)
+                self._gps_works |= located
+                return [FixReading(latitude, longitude, located and self._dated)]
             case GpsDate():
                 self._date = report if report.month and report.day else None
+                self._dated = self._date is not None
             case GpsTime():
                 self._time.sent(1)
                 clock = (report.hours, report.minutes, report.seconds)
                 if clock < self._clock:
                     self._date = None  # after midnight the date is another one
                 self._clock = clock
+                self._gps_works |= any(clock)
                 return [TimeReading(self._utc_s(report))]
             case Heading(heading_deg):
                 self._time.sent(1)
@@ -162,6 +170,11 @@ class Translation:
             self.headings.forget()
             return [DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)]
         return []
+
+    @property
+    def needs_date(self) -> bool:
+        """Whether the last reports contain a position or a time, and its date is unknown."""
+        return self._gps_works and self._date is None
 
     @property
     def ticks(self) -> Ticks | None:

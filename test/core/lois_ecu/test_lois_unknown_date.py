@@ -1,0 +1,142 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A position without a date is not a fix, and an unknown date is requested."""
+
+from dataclasses import replace
+from functools import partial
+
+import pytest
+from lois_drives import Rig
+
+from omnibot_driver.core.lois_ecu import SetPeriod, Stream, encode_command
+from omnibot_driver.core.lois_ecu.messages import PERIOD_ONCE
+from omnibot_driver.core.lois_ecu.readings import FixReading, TimeReading
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.simulator.lois_ecu import DOCUMENTED, FIRMWARE, LoisSettings, Quirks
+from omnibot_driver.simulator.lois_ecu.sensors import Fix
+
+DAY_S = 86400
+UTC_S = 20 * 365 * DAY_S
+REQUEST = encode_command(SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
+MOTION = (b":01", b":02")
+WORKS = pytest.mark.parametrize(
+    "quirks",
+    [DOCUMENTED, replace(FIRMWARE, gps_is_ignored=False)],
+    ids=["documented", "firmware with a GPS"],
+)
+
+
+class GpsRig(Rig):
+    """A robot with a GPS that has no date until ``dated`` is set; ``sent``: lines and their times.
+
+    ``requests``: the times of the requests of a date.
+    """
+
+    def __init__(self, quirks: Quirks, *, utc_s: int = UTC_S, dated: bool = False) -> None:
+        self.sent: list[tuple[float, bytes]] = []
+        self.dated = dated
+        super().__init__(LoisSettings(quirks=quirks, running=True, utc_s=utc_s), LoisEcuSettings())
+        self.board._sayings.fix = partial(self._fix, self.board._sayings.fix)  # type: ignore[method-assign]
+
+    def _fix(self, true: "partial[Fix]", now_s: float) -> Fix:
+        fix = true(now_s)
+        return fix if self.dated else replace(fix, date=(0, 0, 0))
+
+    def say(self, data: bytes) -> None:
+        self.sent += [(self.now, line) for line in data.splitlines(keepends=True)]
+        super().say(data)
+
+    @property
+    def requests(self) -> list[float]:
+        return [at for at, line in self.sent if line == REQUEST]
+
+    def fixes(self) -> list[bool]:
+        """Return whether each position since the last call is a fix."""
+        found = [reading.valid for reading in self.readings if isinstance(reading, FixReading)]
+        self.readings.clear()
+        return found
+
+
+@WORKS
+def test_a_position_without_a_date_is_no_fix(quirks: Quirks) -> None:
+    """The GPS reports a position, and zeros as its date. Then it reports a date, too."""
+    rig = GpsRig(quirks)
+    rig.run(8.0)
+    assert len(fixes := rig.fixes()) >= 5
+    assert not any(fixes)
+    rig.dated = True
+    rig.run(8.0)
+    rig.fixes()
+    rig.run(5.0)
+    assert len(fixes := rig.fixes()) >= 3
+    assert all(fixes)
+
+
+@WORKS
+def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Quirks) -> None:
+    """A zero date ends the rounds of settings, but not the requests."""
+    rig = GpsRig(quirks)
+    rig.run(5.0)
+    rig.sent.clear()
+    rig.run(30.0)
+    assert 8 <= len(rig.requests) <= 11
+    rig.dated = True
+    rig.run(6.0)
+    rig.sent.clear()
+    rig.run(10.0)
+    assert rig.requests == []
+
+
+@WORKS
+def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
+    """The date is requested while the robot drives, at least 15 ms after a motion."""
+    rig = GpsRig(quirks)
+    rig.run(5.0)
+    rig.sent.clear()
+    rig.order(20, 20, 20.0)
+    assert 5 <= len(rig.requests) <= 7
+    motions = [at for at, line in rig.sent if line.startswith(MOTION)]
+    for at in rig.requests:
+        assert at - max(motion for motion in motions if motion <= at) >= 0.0149
+    assert rig.board.truth.x_m > 3.0
+
+
+@WORKS
+def test_past_midnight_positions_are_fixes_and_the_time_comes_back(quirks: Quirks) -> None:
+    """The date of the new day is requested at once; the GPS has a date all the time."""
+    rig = GpsRig(quirks, utc_s=UTC_S + DAY_S - 10, dated=True)
+    rig.run(5.0)
+    rig.fixes()
+    rig.run(10.0)
+    times = [reading.utc_s for reading in rig.readings if isinstance(reading, TimeReading)]
+    assert len(fixes := rig.fixes()) >= 6
+    assert all(fixes)
+    assert times.count(None) <= 2
+    known = [time for time in times if time is not None]
+    assert known[-1] // DAY_S == known[0] // DAY_S + 1
+    assert sum(at >= 10 for at in rig.requests) <= 2
+
+
+def test_no_date_is_requested_from_a_board_that_ignores_its_gps() -> None:
+    """The public firmware sends zeros as position, time and date."""
+    rig = GpsRig(FIRMWARE, dated=True)
+    rig.run(5.0)
+    rig.sent.clear()
+    rig.run(20.0)
+    assert rig.requests == []
+
+
+def test_no_date_is_requested_where_dates_come_periodically() -> None:
+    """A request would replace the period that the user has set."""
+    rig = GpsRig(DOCUMENTED)
+    rig.driver.settings = LoisEcuSettings(
+        periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000, Stream.GPS_POSITION: 1000}
+    )
+    rig.run(6.0)
+    rig.sent.clear()
+    rig.run(15.0)
+    assert rig.requests == []
+    assert not any(rig.fixes())
+    rig.dated = True
+    rig.run(2.5)
+    assert rig.fixes()[-1]
