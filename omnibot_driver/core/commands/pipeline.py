@@ -177,8 +177,10 @@ class CommandPipeline:
 
     def count_refused(self, count: int, now: float) -> list[str]:
         """Note that ``count`` displacements so far were impossible; return notices for the user."""
-        fault = self._monitor.count_refused(count, now) if self.monitored and self._obeys else None
-        return self._react_to(fault, now)
+        if not (self.monitored and self._obeys):
+            self._monitor.disregard_refused(count)
+            return []
+        return self._react_to(self._monitor.count_refused(count, now), now)
 
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float

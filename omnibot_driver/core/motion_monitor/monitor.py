@@ -135,6 +135,10 @@ class MotionMonitor:
         driven = self._history.current is None or self._history.driven(now - LAG_S)
         return self._blame(Fault.BEYOND_LIMITS, now) if driven else Fault.UNCOMMANDED
 
+    def disregard_refused(self, count: int) -> None:
+        """Note the number of rejected displacements, as above, while robots are not monitored."""
+        self._refused = self._refused_before = count
+
     def check(
         self, motion: BodyTwist, seconds: float, stamp_s: float, *, heading_known: bool
     ) -> Fault | None:

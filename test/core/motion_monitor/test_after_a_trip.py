@@ -13,6 +13,7 @@ from disobedient_robots import (
 from robots import estop
 
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.omnibot import BoardSettings
 
@@ -27,6 +28,31 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
     bench.configure(motion_monitor=True)
     assert stopped_after_s(bench, SLOWLY) <= 1.0
     assert bench.session.figures(bench.now).commands.interlock
+
+
+def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
+    """A motion limit is too low and is corrected when the motion monitor is switched on again."""
+    bench = started(BoardSettings(running=True))
+    for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
+        bench.configure(motion_monitor=False, motion=limits)
+        assert try_to_drive(bench, 1.0) == 10
+    assert bench.session.refused.displacements > 4
+    bench.configure(motion_monitor=True)
+    assert try_to_drive(bench, 2.0) == 20
+    assert bench.session.figures(bench.now).commands.trips == 0
+
+
+def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
+    """The limit is still too low, so it takes four more displacements."""
+    bench = started(BoardSettings(running=True))
+    too_low = MotionLimits(fastest_mps=0.01)
+    bench.configure(motion_monitor=False, motion=too_low)
+    assert try_to_drive(bench, 1.0) == 10
+    bench.configure(motion=too_low)
+    bench.run(0.12)
+    assert bench.session.figures(bench.now).commands.trips == 0
+    bench.run(0.08)
+    assert bench.session.figures(bench.now).commands.trips == 1
 
 
 def test_a_refused_command_says_why() -> None:
