@@ -17,7 +17,6 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import (
     Point,
-    PoseStamped,
     Quaternion,
     Transform,
     TransformStamped,
@@ -235,7 +234,7 @@ def age(stamp: Time, now_ns: int) -> float:
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
 
 
-def is_stamped(stamped: TwistStamped | PoseStamped) -> bool:
+def is_stamped(stamped: TwistStamped) -> bool:
     """Return whether the message has a stamp; zero means none."""
     stamp = stamped.header.stamp
     return bool(stamp.sec or stamp.nanosec)

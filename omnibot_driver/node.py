@@ -191,7 +191,7 @@ class OmniBotDriver(Node):
             obey = self._obey("wheel_cmd", _wheels)
             self.create_subscription(Float32MultiArray, "wheel_cmd", obey, 1)
         if Authority.POSE in authorities:
-            obey = self._obey("cmd_pose", self._pose, may_be_old=messages.is_stamped)
+            obey = self._obey("cmd_pose", self._pose)  # a planner's stamp is not the send time
             self.create_subscription(PoseStamped, "cmd_pose", obey, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, DEEP)
 

@@ -55,18 +55,28 @@ omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
 """
 
 
-@pytest.mark.parametrize("topic", ["cmd_vel", "wheel_cmd"])
+@pytest.mark.parametrize("topic", ["cmd_vel", "wheel_cmd", "cmd_pose"])
 def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
-    board: PtyBoard, start_driver: Start, probe_of: Start, tmp_path: Path, topic: str
+    start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path, topic: str
 ) -> None:
-    """The middleware has the time of a message without a stamp; the next command is obeyed."""
-    hold = tmp_path / "hold"
-    driver: Driver = start_driver(board.path, before=HELD_UP.format(path=str(hold)))
+    """The middleware has its send time, whatever the stamp of a goal; the next one is obeyed."""
+    hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
+    board: PtyBoard = start_board(control=control, running=True)
+    driver: Driver = start_driver(
+        board.path, control_method=control, before=HELD_UP.format(path=str(hold))
+    )
     probe: Probe = probe_of(driver)
+    odometry = probe.listen(Odometry, "odom")
     probe.wait_for_state("nominal")
-    message: Any = Twist() if topic == "cmd_vel" else Float32MultiArray(data=[10.0, 0.0, 0.0])
+    probe.wait_for(lambda: len(odometry) > 10)
+    message: Any = Float32MultiArray(data=[10.0, 0.0, 0.0])
     if topic == "cmd_vel":
+        message = Twist()
         message.linear.x = 0.3
+    elif topic == "cmd_pose":
+        message = PoseStamped()
+        message.header.stamp = probe.node.get_clock().now().to_msg()
+        message.pose.position.x, message.pose.orientation.w = 0.25, 1.0
     commands, estop = probe.publisher(type(message), topic), probe.publisher(Bool, "estop")
     driver.answers.clear()  # the probe does not publish it again
     for _ in range(10):  # a stall of the computer is another reason to refuse it
