@@ -247,12 +247,13 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
 
 def _owner(path: str) -> str:
     """Return the process that holds the lock on this file, in brackets; empty if unknown."""
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, ValueError):
         status = os.stat(path)
         device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"
         for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
             _, kind, _, _, pid, file, *_ = line.replace("-> ", "").split()
             if kind == "FLOCK" and file == f"{device}:{status.st_ino}":
-                name = Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip()
+                # The kernel cuts a name after 15 bytes, which may be within a character.
+                name = Path(f"/proc/{pid}/comm").read_text("utf-8", errors="replace").strip()
                 return f" (process {pid}, {name})"
     return ""

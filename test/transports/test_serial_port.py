@@ -6,6 +6,7 @@ import fcntl
 import os
 import termios
 import threading
+from pathlib import Path
 
 import pytest
 from listener import PATIENCE_S, STOP
@@ -61,6 +62,20 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
         SerialPort(terminal.path, 115200)
     port.close()
+
+
+def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Terminal) -> None:
+    """The kernel keeps 15 bytes of a name, and a letter may have two."""
+    own = Path("/proc/self/comm")
+    before = own.read_bytes()
+    port = SerialPort(terminal.path, 115200)
+    own.write_bytes("fourteen bytesä".encode())
+    try:
+        with pytest.raises(LinkError, match=rf"\(process {os.getpid()}, fourteen bytes"):
+            SerialPort(terminal.path, 115200)
+    finally:
+        own.write_bytes(before.strip())
+        port.close()
 
 
 def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
