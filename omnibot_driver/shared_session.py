@@ -100,6 +100,7 @@ class SharedSession:
                         raise CommandRefused(WAITED)
                     action(self.session, wish, now)
                 except CommandRefused as error:
+                    self.session.interlocks.refused(now)
                     if not self.outbox.full:
                         self.outbox.put(partial(self._refused, str(error)))
                     raise

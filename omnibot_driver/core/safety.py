@@ -150,6 +150,7 @@ class SafetyStops:
         self._task.give_up("the driver stalled meanwhile; call again")
         self._board.stalled()
         self._policy.halt(now)
+        self._commanding.interlock.be_active(now)
         self._reporter.notify(
             [f"driver stalled for {seconds:.1f} s; robot stopped until the next command"]
         )

@@ -69,14 +69,14 @@ class Session:
         self._commands = commanding.policy
         self._calibration = measurement.inertial.calibration
         liveness = self._liveness = Liveness(board.traits)
-        self._interlocks = Interlocks(board, modes, commanding, self._calibration, liveness)
+        self.interlocks = Interlocks(board, modes, commanding, self._calibration, liveness)
         self._task = LongTask()
         reporter = self._reporter = Reporter(board, modes, measurement, commanding, self._task)
         safety = self._safety = SafetyStops(
             board, modes, measurement, commanding, liveness, reporter, self._task
         )
         self.inbound = Inbound(board, modes, measurement, commanding, liveness, reporter, safety)
-        self.shutdown = Shutdown(board, modes, self._commands, self._interlocks)
+        self.shutdown = Shutdown(board, modes, self._commands, self.interlocks)
 
     # State
 
@@ -152,15 +152,15 @@ class Session:
         self._measurement.restart()
         self._liveness.begin(now)
         self._mode_manager.opened(now)
-        self._interlocks.missing = self._reporter.missing = missing
+        self.interlocks.missing = self._reporter.missing = missing
         if missing:
             self._commands.halt(now)
 
     def closed(self, now: float) -> None:
         """End the connection, as the port is lost or closed."""
         self.inbound.end(now)
-        self._interlocks.missing = self._reporter.missing = ""
-        why = self._interlocks.why_not_request()  # at the driver's end
+        self.interlocks.missing = self._reporter.missing = ""
+        why = self.interlocks.why_not_request()  # at the driver's end
         why = why or "the port was lost meanwhile; call again once it is back"
         for given_up in (self._mode_manager.closed, self._calibration.give_up, self._task.give_up):
             given_up(why)
@@ -212,7 +212,7 @@ class Session:
 
         Raises RequestRefused at once if that is not possible now.
         """
-        if reason := self._interlocks.why_not_request():
+        if reason := self.interlocks.why_not_request():
             raise RequestRefused(reason)
         self.inbound.process(now)  # earlier data is not an answer
         self._mode_manager.request(request, token, now)
@@ -226,7 +226,7 @@ class Session:
 
         Raises RequestRefused at once if that is not possible now.
         """
-        if reason := self._interlocks.why_not_calibrate():
+        if reason := self.interlocks.why_not_calibrate():
             raise RequestRefused(reason)
         self._calibration.measure(token, now)
 
@@ -236,7 +236,7 @@ class Session:
         ``name`` is used in messages after the word "a". Raises RequestRefused at once if the task
         cannot begin.
         """
-        if reason := self._interlocks.why_not_task():
+        if reason := self.interlocks.why_not_task():
             raise RequestRefused(reason)
         self._task.begin(name, token, limit_s, now)
 
@@ -297,7 +297,7 @@ class Session:
 
     def _command(self, wish: Command, now: float) -> None:
         motion, expires_at = wish
-        if reason := self._interlocks.why_not_drive(motion, now):
+        if reason := self.interlocks.why_not_drive(motion, now):
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
         if not motion.is_zero and self._calibration.wake_at < math.inf:

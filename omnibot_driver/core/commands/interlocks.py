@@ -40,6 +40,10 @@ class Interlocks:
         """Return the reason why requests are refused now; empty if they are allowed."""
         return "the driver is shutting down" if self.leaving else self.missing
 
+    def refused(self, now: float) -> None:
+        """Note that a motion command was refused, by this module or before it arrived here."""
+        self._interlock.be_active(now)
+
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Return the reason why this motion is refused; empty if the motion is allowed.
 

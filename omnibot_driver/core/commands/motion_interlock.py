@@ -55,12 +55,19 @@ class MotionInterlock:
         if self.until is Until.ESTOP:
             self.start()
 
+    def be_active(self, now: float) -> None:
+        """Note that a sender may be active, so that the pause that ends a refusal begins anew.
+
+        A refused command shows that its sender is still active, whatever the reason. While the
+        process stalls, nothing shows whether a sender pauses.
+        """
+        self._commanded_at = now
+
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Note a command, and return the reason why it is refused; empty if not.
 
         ``stands``: whether it is a command to stand still, which is always allowed. The pause of
-        ``timeout_s`` that ends a refusal begins after the last motion command, refused or not,
-        because a refused command shows that its sender is still active.
+        ``timeout_s`` that ends a refusal begins after the last motion command or ``be_active``.
         """
         silent = now - self._commanded_at >= timeout_s
         if not stands:

@@ -93,6 +93,18 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
     assert not bench.session.figures(bench.now).commands.interlock
 
 
+def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
+    """The commands that were sent during the stall are lost; the pause begins after it."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    bench.now += 3.0
+    bench.session.stood_still(3.0, bench.now)
+    bench.run(0.3)
+    assert try_to_drive(bench, 2.0) == 0
+    bench.run(0.6)
+    assert try_to_drive(bench, 0.1) == 1
+
+
 def test_the_e_stop_works_while_motion_is_refused() -> None:
     """The release of the e-stop does not end the refusal."""
     bench = on_the_wrong_switch("earth")

@@ -1,0 +1,87 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Commands that are refused before they reach the motion interlock, after it has tripped."""
+
+import math
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import pytest
+from disobedient_robots import SLOWLY, on_the_wrong_switch, stopped_after_s
+from session_bench import Bench
+
+from omnibot_driver import cdr
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.session import Session
+from omnibot_driver.shared_session import SharedSession
+from omnibot_driver.transit import Delay
+
+Action = Callable[[Session, None, float], None]
+
+
+def drive(session: Session, _wish: None, now: float) -> None:
+    session.command_twist(BodyTwist(*SLOWLY), now)
+
+
+REFUSED: dict[str, Action] = {
+    "NaN": lambda session, _, now: session.command_twist(BodyTwist(math.nan, 0.0, 0.0), now),
+    "no Twist": lambda _session, _wish, _now: (cdr.twist(b""), None)[1],
+    "an old stamp": lambda session, _, now: session.command_twist(
+        BodyTwist(*SLOWLY), now, age_s=9.0
+    ),
+    "a long time in transit": lambda _session, _wish, _now: Delay(9.0, 0.0).require("cmd_vel", 0.5),
+    "the wrong number of wheels": lambda session, _, now: session.command_wheels((1.0, 1.0), now),
+}
+
+
+class Sender:
+    """Sends commands to the session of a bench, at the time of the bench."""
+
+    def __init__(self, bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+        clock = SimpleNamespace(monotonic=lambda: bench.now)
+        monkeypatch.setattr("omnibot_driver.shared_session.time", clock)
+        monkeypatch.setattr("omnibot_driver.shared_session.boot_time_s", lambda: bench.now)
+        self._bench = bench
+        self._shared = SharedSession(bench.session, bench.events.extend, lambda _reason: None, None)
+
+    def is_obeyed(self, action: Action, sent_ns: tuple[int, ...] = ()) -> bool:
+        """Send a command, and let 0.1 s pass."""
+        try:
+            self._shared.command(action, None, sent_ns)
+        except CommandRefused:
+            return False
+        finally:
+            self._bench.run(0.1)
+        return True
+
+
+@pytest.mark.parametrize("refused", REFUSED.values(), ids=REFUSED)
+def test_a_sender_of_refused_commands_does_not_pause(
+    refused: Action, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a stop by the motion monitor, only silence for the timeout allows motion again."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    sender = Sender(bench, monkeypatch)
+    assert not any(sender.is_obeyed(refused) for _ in range(10))
+    assert not sender.is_obeyed(drive)
+    bench.run(0.5)
+    assert sender.is_obeyed(drive)
+
+
+def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each of them was sent before or during the stall."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    sender = Sender(bench, monkeypatch)
+    monkeypatch.setattr(
+        "omnibot_driver.stall_detector.StallDetector.outlived_by",
+        lambda _detector, sent_ns, _now: sent_ns > 0,
+    )
+    assert not any(sender.is_obeyed(drive, (0,)) for _ in range(10))
+    assert not sender.is_obeyed(drive, (1,))
+    bench.run(0.5)
+    assert sender.is_obeyed(drive, (1,))
