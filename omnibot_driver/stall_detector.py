@@ -40,6 +40,9 @@ class StallDetector:
 
     The watchdog's thread calls ``passed``; every thread calls ``begun`` before it acts.
     ``outlived_by`` is never True while ``begun`` would report a stall.
+
+    All times are kept by the steady clock, so a step of the time of day moves none of them. The
+    difference of the two clocks is taken at each ``passed``.
     """
 
     def __init__(self) -> None:
@@ -47,6 +50,8 @@ class StallDetector:
         self._begun = False
         self._over_at = -math.inf
         self._from_ns = self._until_ns = 0
+        self._day_ns = 0
+        """Time of day at which the steady clock showed 0, in ns."""
 
     def begun(self, now: float) -> float:
         """Return the length of a stall so far, in s, once for each stall; otherwise 0."""
@@ -61,10 +66,11 @@ class StallDetector:
         if self._begun:
             self._begun = False
             if now >= self._over_at + LATEST_S:  # else commands of the last are still in transit
-                self._from_ns = wall_ns - _ns(now - self._passed_at + LATEST_S)
+                self._from_ns = _ns(self._passed_at - LATEST_S)
             self._over_at = now
-            self._until_ns = wall_ns + _ns(SETTLE_S)
+            self._until_ns = _ns(now + SETTLE_S)
         self._passed_at = now
+        self._day_ns = wall_ns - round(now * 1e9)
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
         """Return False for a command that may have been sent before or during a recent stall.
@@ -73,7 +79,9 @@ class StallDetector:
         """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False
-        return now >= self._over_at + LATEST_S or not self._from_ns <= sent_ns <= self._until_ns
+        if now >= self._over_at + LATEST_S:
+            return True
+        return not self._from_ns <= sent_ns - self._day_ns <= self._until_ns
 
 
 def _ns(seconds: float) -> int:

@@ -108,6 +108,24 @@ def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
     assert standstill.outlived_by(wall_ns(104.9), 116.0)
 
 
+@pytest.mark.parametrize("step_s", [-3600.0, -4.0, -1.0, 1.0, 4.0, 3600.0])
+def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_old(
+    step_s: float,
+) -> None:
+    """NTP sets the clock; send times are by the clock as it is now."""
+    standstill = resumed(3.0)
+    standstill.passed(103.5, wall_ns(103.5))
+    standstill.passed(103.6, wall_ns(103.6 + step_s))
+    assert standstill.outlived_by(wall_ns(103.59 + step_s), 103.6)
+    assert not standstill.outlived_by(wall_ns(102.0 + step_s), 103.6)
+    standstill.begun(105.0)  # the interval of both stalls is by one clock
+    standstill.passed(105.0, wall_ns(105.0 + step_s))
+    standstill.passed(105.4, wall_ns(105.4 + step_s))
+    for sent in (102.0, 103.3, 104.9):
+        assert not standstill.outlived_by(wall_ns(sent + step_s), 105.4), sent
+    assert standstill.outlived_by(wall_ns(105.39 + step_s), 105.4)
+
+
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
     """Later commands of this sender are accepted again."""
