@@ -64,6 +64,7 @@ class Notices:
     def __init__(self) -> None:
         self._lost, self._refused = ThrottledNotice(), ThrottledNotice()
         self._overruns = 0
+        self._overran_at = -math.inf
         self._told: set[str] = set()
         self._standing = ""
 
@@ -73,12 +74,13 @@ class Notices:
         ``lost``: lost odometry frames so far; ``overruns``: overruns of the serial port so far.
         """
         news = []
+        if overruns != self._overruns:
+            self._overruns, self._overran_at = overruns, now
         if more := self._lost.since_told(lost, now):
-            overrun, self._overruns = overruns > self._overruns, overruns
             news.append(
                 f"odometry frames lost in this computer: {more}; the serial port overran: reduce"
                 " the load, or use another adapter"
-                if overrun
+                if now - self._overran_at < NEWS_S  # an earlier one is not the cause
                 else f"odometry frames lost on the line: {more}; check cable and hub"
             )
         total = refused.imu + refused.displacements + refused.poses

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 from toys.line_board import LineBoard
 
+from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.omnibot import OmniBot
-from omnibot_driver.core.reporting.notices import why_silent
+from omnibot_driver.core.reporting.notices import Notices, why_silent
 from omnibot_driver.core.traits import Traits
 
 
@@ -21,3 +22,15 @@ def test_a_baudrate_is_advice_only_where_it_can_be_set(traits: Traits, bytes_cam
     assert " cable" in text
     assert ("baudrate" in traits.to_check) is traits.baudrate
     assert "baudrate" not in replace(traits, baudrate=False).to_check
+
+
+def test_an_overrun_of_the_port_is_blamed_only_for_frames_lost_at_about_its_time() -> None:
+    """The port overruns without a loss of frames; an hour later the cable loses some."""
+    notices, none = Notices(), Refused(0, 0, 0)
+    assert notices.counted(0, 0, none, 100.0) == []
+    assert notices.counted(0, 1, none, 100.1) == []
+    (late,) = notices.counted(2, 1, none, 3700.0)
+    assert late == "odometry frames lost on the line: 2; check cable and hub"
+    assert notices.counted(3, 2, none, 3705.0) == []
+    (soon,) = notices.counted(3, 2, none, 3710.0)
+    assert soon.startswith("odometry frames lost in this computer: 1; the serial port overran")
