@@ -47,7 +47,8 @@ class Inbound:
 
         A command that arrives between both calls is handled as if it came before the bytes. That
         would be wrong if the bytes change the mode. This method then calls ``process`` itself and
-        returns an empty list. Requests other than commands call ``process`` first.
+        returns an empty list; the caller's ``process`` then returns True. Requests other than
+        commands call ``process`` first.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -62,6 +63,7 @@ class Inbound:
         self.process(now)
         if after.running and not before.running:
             self._safety.set_out(now)
+        self._reporter.news_at = now  # so that the next ``process`` returns True
         return []
 
     def process(self, now: float) -> bool:

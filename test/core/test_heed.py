@@ -19,25 +19,31 @@ from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 TICK_S = 0.01
 
 
-def opened() -> Session:
+def opened(*, run: bool = True) -> Session:
     values = boards.check_all({})
     board = omnibot.settings(values)
     settings = parameters.session_settings(values, omnibot.kinematics(values))
-    session = Session(OmniBot(board), settings, run=True)
+    session = Session(OmniBot(board), settings, run=run)
     session.opened(0.0)
     return session
 
 
+REQUESTS = {500: Request.START, 1000: Request.PAUSE, 1500: Request.START, 2000: Request.RESET}
+
+
+@pytest.mark.parametrize("run", [True, False])
 @pytest.mark.parametrize("drives", [False, True])
-def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool) -> None:
+def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
+    drives: bool, run: bool
+) -> None:
     """Nothing is written or reported while the board starts, runs, is paused and restarts."""
-    session, board = opened(), SimulatedBoard(BoardSettings(seed=2))
+    session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0
     for tick in range(3000):
         now = tick * TICK_S
         data = board.step()
-        if tick in (1000, 1500):
-            session.request(Request.PAUSE if tick == 1000 else Request.START, "asked", now)
+        if tick in REQUESTS:
+            session.request(REQUESTS[tick], "asked", now)
         if drives and tick % 5 == 0:
             with suppress(CommandRefused):
                 session.command_twist(BodyTwist(0.1, 0.0, 0.0), now)
