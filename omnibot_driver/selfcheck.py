@@ -46,7 +46,7 @@ def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
 
 def clock_advice(port: str, use_sim_time: bool) -> str:
     """Return a warning about simulated time for a board that runs in real time; otherwise empty."""
-    if not use_sim_time or port.startswith(WITHOUT_CLOCK):
+    if not use_sim_time or port.lower().startswith(WITHOUT_CLOCK):
         return ""
     return (
         f"use_sim_time is set, but the board on {port} runs in real time, so stamps and the age of"
@@ -59,7 +59,7 @@ def waiting_advice(port: str, now_ns: int) -> str:
 
     A recording has stamps of its own, so this is not checked for it.
     """
-    if now_ns or port.startswith(RECORDING):
+    if now_ns or port.lower().startswith(RECORDING):
         return ""
     return (
         "use_sim_time is set but nothing publishes /clock, so no measurements are published; start"

@@ -57,6 +57,8 @@ def test_a_port_without_such_a_timer_is_left_alone(tmp_path: Path, port: str) ->
         ("/dev/ttyUSB0", False, False),
         ("sim://", True, False),
         ("replay://bag", True, False),
+        ("SIM://", True, False),
+        ("Replay://bag", True, False),
     ],
 )
 def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
@@ -75,6 +77,7 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
         ("sim://?imu_only", 0, True),
         ("sim://", 1, False),
         ("replay://bag", 0, False),
+        ("REPLAY://bag", 0, False),
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
