@@ -138,29 +138,31 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        Returns whether Stop was sent and the threads have ended. Afterwards ``stands`` shows
-        whether the robot was proved at rest.
+        Returns whether this call has sent Stop and ended the threads. If the port was lost while
+        the robot drove, the reader sends Stop if it can open the port again. Afterwards ``stands``
+        shows whether the robot was proved at rest.
         """
-        told = False
         with self._shared.lock:
-            if not self._shared.leaving:
+            if ends := not self._shared.leaving:
                 self._shared.leaving = True
                 self._shared.on_exit = on_exit
                 self._stop_for_good()
                 self._shared.write(self._session.shutdown.sequence(on_exit, time.monotonic()))
                 if self._shared.port is not None:
                     told = self._shared.write_error is None and not self._shared.port.missing
+                    self._shared.told = told
                     self._shared.stood = told and self._session.shutdown.stands
                     self._shared.port.interrupt()
                     self._shared.port = None  # nothing may be sent after the shutdown sequence
-                self.unstopped = not told and self._session.shutdown.owed
             self._shared.closing.set()
             self._shared.changed.notify_all()
         *serving, teller = self._threads
         self._join(serving)
         self._shared.outbox.close()
         self._join([teller])
-        return told and not any(thread.is_alive() for thread in serving)
+        # The reader may have opened a lost port again and sent Stop. If it hangs, it has the lock.
+        self.unstopped = not self._shared.told and self._session.shutdown.owed
+        return ends and self._shared.told and not any(thread.is_alive() for thread in serving)
 
     @staticmethod
     def _join(threads: Sequence[threading.Thread]) -> None:

@@ -184,6 +184,9 @@ class Reader:
                 self._shared.write(
                     self._session.shutdown.sequence(self._shared.on_exit, time.monotonic())
                 )
+                if self._closing.is_set() and self._shared.port is not None:
+                    told = self._shared.write_error is None and not port.missing
+                    self._shared.told = told and self._session.shutdown.owed
             else:  # Stop, directly after what can no longer be discarded
                 port.write_if_room(self._session.shutdown.broken_off())
             lines = len(port.descriptors or ())  # of several, some may be open and need a stop

@@ -56,6 +56,9 @@ class SharedSession:
         """Whether the link is about to end."""
         self.on_exit: OnExit = "stop"
         """State in which the link leaves the board when it ends."""
+        self.told = False
+        """Whether the last Stop was written to every line when the link ended, or later to a port
+        that was lost while the robot drove."""
         self.stood = False
         """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()

@@ -112,16 +112,38 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
-    """The cable is back, but the driver ends before it would have opened the port again."""
+    """The cable is back, but the driver ends before it would have opened the port again.
+
+    It knows that the stop was sent and is unconfirmed.
+    """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
     link = link_to(str(name), listener, ours)
     link.reconnect_interval_s = 3600.0
-    with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)):
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)) as lost:
         link.start()
         listener.wait_for(lambda: ours.state == "nominal")
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        assert lost.wait_for(lambda b: "velocity" in kinds(b), PATIENCE_S)
     listener.wait_for(lambda: len(listener.reports) == 2)
     with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)) as board:
-        link.close("stop")
+        assert link.close("stop")
+        assert not link.unstopped
+        assert not link.stands
         assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
     wait_for_the_end_of("omnibot-reader")
+
+
+def test_a_robot_that_was_lost_while_it_drove_is_known_not_to_be_stopped() -> None:
+    """The cable is not back when the driver ends."""
+    listener, ours = Listener(), session()
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
+        link = link_to(board.path, listener, ours)
+        link.start()
+        listener.wait_for(lambda: ours.state == "nominal")
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        assert board.wait_for(lambda b: "velocity" in kinds(b), PATIENCE_S)
+    listener.wait_for(lambda: ours.state == "disconnected")
+    for _ in range(2):
+        assert not link.close("stop")
+        assert link.unstopped
