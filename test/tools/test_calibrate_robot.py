@@ -113,6 +113,12 @@ def test_what_happens_on_the_way_ends_it_at_rest(
         robot.call("start")
 
 
+def test_a_value_of_the_diagnostics_is_found_by_its_name(robot: Robot, rigged: Rig) -> None:
+    """A name that the driver's diagnostics do not have gives an empty text."""
+    assert robot.diagnosed("Port") == rigged.port.path
+    assert robot.diagnosed("Motor balance") == ""
+
+
 def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
     """The odometry shows the distance; commands beyond the bounds are never sent."""
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
