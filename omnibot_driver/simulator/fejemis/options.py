@@ -6,6 +6,7 @@ Knows the names, values and effects of options. Must not know what runs the boar
 """
 
 import argparse
+from math import inf
 from typing import get_args
 
 from omnibot_driver.simulator.fejemis.board import SimulatedFejemis
@@ -40,6 +41,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     for name, effect in _SWITCHES:
         parser.add_argument(f"--{name}", action="store_true", help=effect)
+    parser.add_argument(
+        "--no-start-line",
+        action="store_true",
+        help="a boot does not end with the line '# Starting main loop'",
+    )
+    parser.add_argument(
+        "--boot",
+        type=_seconds,
+        default=_DEFAULT.boot_s,
+        metavar="SECONDS",
+        help="duration of a boot (default 0.4)",
+    )
     parser.add_argument(
         "--swapped", action="store_true", help="the front Teensy is at the first port"
     )
@@ -93,11 +106,13 @@ def from_arguments(arguments: argparse.Namespace) -> SimulatedFejemis:
             firmware=Firmware(
                 sums=arguments.sums == "on",
                 reverse=arguments.reverse,
+                says_start=not arguments.no_start_line,
                 **{name: getattr(arguments, name) for name in names},
             ),
             seed=arguments.seed,
             swapped=arguments.swapped,
             ids=arguments.ids,
+            boot_s=arguments.boot,
             uptime_s=arguments.uptime,
             volts=arguments.volts,
             front_m=arguments.front_m,
@@ -123,6 +138,16 @@ def _ids(text: str) -> tuple[int, int]:
     if not (drive.isdecimal() and front.isdecimal()):
         raise argparse.ArgumentTypeError(f"{text!r} is not like 90,91")
     return int(drive), int(front)
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1.0
+    if not 0.0 <= seconds < inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a duration in seconds")
+    return seconds
 
 
 def _chance(text: str) -> float:

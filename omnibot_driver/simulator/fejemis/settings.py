@@ -32,6 +32,8 @@ class Firmware:
     shows_source: the heartbeat of the drive Teensy has the source of the last ``rc``; otherwise
         only 10 or -1.
     single_precision: times are float32, so after an hour they have steps of 0.2 ms.
+    says_start: a boot ends with the line ``# Starting main loop``. If that line is damaged, the
+        host sees the same as from a firmware without it.
     exact_words: a command without numbers is recognised only if its line has nothing else, not even
         a space, as related firmware compares ``stop``.
     """
@@ -46,6 +48,7 @@ class Firmware:
     confirms: bool = False
     shows_source: bool = True
     single_precision: bool = False
+    says_start: bool = True
     exact_words: bool = True
 
 

@@ -176,7 +176,8 @@ class Teensy(Generic[C]):
                 return
             self._booted = True
             self.started()
-            self.say("# Starting main loop")
+            if self.firmware.says_start:
+                self.say("# Starting main loop")
         if self._arrived and not self.hung:
             arrived, self._arrived = self._arrived, []
             for text in arrived:

@@ -71,6 +71,28 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
     assert rig.board.front.clock_s > 2.5
 
 
+@pytest.mark.parametrize("boot_s", [0.0, 0.05, 0.4])
+@pytest.mark.parametrize("says_start", [True, False])
+def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
+    boot_s: float, *, says_start: bool
+) -> None:
+    """The time in the lines begins at zero with the boot."""
+    rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
+    began = rig.now
+    rig.board.befall("drive", "restart")
+    rig.run(boot_s - 0.004)
+    rig.say(DRIVE, "ignored")
+    rig.run(0.01)
+    rig.say(DRIVE, "sub pose 20")
+    rig.run(0.1)
+    lines = [(at - began, text) for at, port, text in rig.lines if port == DRIVE]
+    starts = [at for at, text in lines if text == "# Starting main loop"]
+    assert starts == ([pytest.approx(boot_s, abs=0.003)] if says_start else [])
+    poses = [(at, text) for at, text in lines if text.startswith("pose")]
+    assert len(poses) == pytest.approx(5, abs=1)
+    assert all(float(text.split()[1]) == pytest.approx(at, abs=0.003) for at, text in poses)
+
+
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
     """The front half no longer sends the angle; the drive half uses the last one it received."""
     rig = Rig().booted()
@@ -243,18 +265,21 @@ def test_options_reach_the_board_by_a_url() -> None:
     """The fault names are those of the command line."""
     url = (
         "sim://?sums=off&reverse=clamped&swapped&ids=90,7&fault=1:front:silent&fault=2:drive:hung"
-        "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100"
+        "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100&boot=0.05&no-start-line"
     )
     board, _ = options.from_url(url, options.load(MODULE))
     settings = board.settings  # type: ignore[attr-defined]
     assert (settings.firmware.sums, settings.firmware.reverse) == (False, "clamped")
     assert settings.firmware.timed_velocity
+    assert (settings.boot_s, settings.firmware.says_start) == (0.05, False)
     assert [fault.what for fault in settings.faults] == ["silent", "hung"]
     assert (settings.ids, settings.swapped, settings.front_m) == ((90, 7), True, 3.0)
     json.dumps(board.facts)
 
 
-@pytest.mark.parametrize("wrong", ["fault=5:rear:silent", "fault=5:drive:hall-broken", "ids=a,b"])
+@pytest.mark.parametrize(
+    "wrong", ["fault=5:rear:silent", "fault=5:drive:hall-broken", "ids=a,b", "boot=-1"]
+)
 def test_a_wrong_option_is_refused(wrong: str) -> None:
     """An example is a fault of the angle sensor in the drive half, which does not have one."""
     with pytest.raises(options.OptionError):
