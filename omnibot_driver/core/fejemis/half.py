@@ -9,7 +9,7 @@ what a message is used for.
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final, Literal
 
 from omnibot_driver.core.fejemis.decoder import DecoderStatistics, FejemisDecoder
@@ -90,12 +90,15 @@ class Half:
         """Whether lines to the board have a sum."""
         return bool(self.decoder.sums) and not self.decoder.doubtful
 
-    def feed(self, data: bytes, now: float) -> list[Message]:
-        """Return the messages in these bytes.
+    def feed(self, data: bytes, now: float) -> Iterator[Message]:
+        """Yield the messages in these bytes; handle each before the next is requested.
 
+        A message may change the state of the board: after a restart, earlier times are forgotten.
         Those with an implausible board time are left out, and poses before the first heartbeat.
         """
-        return [message for message in self.decoder.feed(data, now) if self._admit(message, now)]
+        for message in self.decoder.feed(data, now):
+            if self._admit(message, now):
+                yield message
 
     @property
     def unknown_streams(self) -> list[str]:

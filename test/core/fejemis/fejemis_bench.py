@@ -29,7 +29,7 @@ class Bench:
     """A session with both simulated boards.
 
     ``hears``: channels on which the robot receives bytes. ``speaks``: channels on which the driver
-    receives bytes from the robot.
+    receives bytes from the robot. ``read_s``: time between two reads of a port, in s.
     """
 
     def __init__(
@@ -55,6 +55,8 @@ class Bench:
         self.hears, self.speaks = {DRIVE, FRONT}, {DRIVE, FRONT}
         self.carry: Callable[[int, bytes], bytes] = lambda _, data: data
         """Function that changes or drops the bytes from the robot, by channel."""
+        self.read_s = 0.0
+        self._unread, self._read_at = [b"", b""], [-math.inf, -math.inf]
         self.events: list[Event] = []
         self.written: list[tuple[float, int, bytes]] = []
 
@@ -77,7 +79,11 @@ class Bench:
         self.now += self.robot.tick_s
         for channel, data in self.robot.advance():
             data = self.carry(channel, data)
-            if channel in self.speaks and data:
+            if channel in self.speaks:
+                self._unread[channel] += data
+        for channel, data in enumerate(self._unread):
+            if data and self.now > self._read_at[channel] + self.read_s - 1e-9:
+                self._unread[channel], self._read_at[channel] = b"", self.now
                 self.session.inbound.receive(data, self.now, channel)
                 self.settle()
         if self.now >= self.session.wake_at:
