@@ -1,27 +1,22 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pairs gyro and acceleration lines, which carry no time, into IMU samples with a time.
+"""Converts pairs of gyro and acceleration lines, which carry no time, into samples with a time.
 
 The board measures both every ``PERIOD_S`` of its own clock, and sends them together. So samples are
 counted, and a sample's time is a phase plus a whole count of periods. Phase and count come from the
 arrivals: a sample does not arrive before its time, and one that comes after a pose in the stream is
-not older than that pose.
+not older than that pose. `imu_pairs.py` finds the pairs.
 """
 
 import math
 from collections import deque
 from typing import Final
 
-from omnibot_driver.core.fejemis.messages import Acceleration, Gyro
+from omnibot_driver.core.fejemis.imu_pairs import PERIOD_S, Pair
 from omnibot_driver.core.fejemis.settings import AccelerationUnit
 from omnibot_driver.core.readings import ImuReading, Vector3
 
-PERIOD_S: Final = 0.01
 STANDARD_GRAVITY: Final = 9.80665
-PAIR_WITHIN_S: Final = 0.005
-"""Largest delay between the two lines of one sample, in s: half a period.
-
-Both lines leave the board in one cycle, unless one of them was subscribed later."""
 LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Shortest interval of arrivals, in periods, at which a late sample proves a loss.
@@ -34,8 +29,11 @@ PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 
 
-class ImuPairing:
-    """Pairs gyro and acceleration lines into samples; ``unit``: unit of the acceleration lines."""
+class ImuSamples:
+    """Samples of the IMU in SI units; ``unit``: unit of the acceleration lines.
+
+    ``rates``, ``forces``: the last sample in rad/s and m/s², NaN before the first.
+    """
 
     def __init__(self, unit: AccelerationUnit) -> None:
         self.unit: AccelerationUnit = unit
@@ -44,55 +42,34 @@ class ImuPairing:
         self.begin()
 
     def begin(self) -> None:
-        """Forget all samples and the phase, as the board's streams start again."""
-        self._gyro: tuple[Gyro, float] | None = None
-        self._acceleration: tuple[Acceleration, float] | None = None
+        """Forget the count and the phase, as the board's streams start again."""
         self._count = 0
-        self._skipped = 0
-        """Count of samples since the last report of which only gyro or acceleration came."""
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
         self._floor_s: deque[float] = deque(maxlen=PHASE_BLOCKS)
         self._block_s, self._block_from = math.inf, 0
         self._delay_s = 0.0
 
-    def gyro(self, gyro: Gyro, now: float) -> ImuReading | None:
-        """Take the gyro's half of a sample; return the sample if it is complete."""
-        self._skipped += self._gyro is not None
-        self._gyro = gyro, now
-        return self._whole(now)
-
-    def acceleration(self, acceleration: Acceleration, now: float) -> ImuReading | None:
-        """Take the accelerometer's half of a sample; return the sample if it is complete."""
-        self._skipped += self._acceleration is not None
-        self._acceleration = acceleration, now
-        return self._whole(now)
-
-    def _whole(self, now: float) -> ImuReading | None:
-        if self._gyro is None or self._acceleration is None:
-            return None
-        (gyro, gyro_at), (acceleration, acceleration_at) = self._gyro, self._acceleration
-        if abs(gyro_at - acceleration_at) > PAIR_WITHIN_S:
-            return None
-        self._gyro = self._acceleration = None
+    def reading(self, pair: Pair) -> ImuReading:
+        """Convert a pair of lines to SI units."""
+        gyro, acceleration = pair.gyro, pair.acceleration
         scale = STANDARD_GRAVITY if self.unit == "g" else 1.0
         self.rates = math.radians(gyro.x), math.radians(gyro.y), math.radians(gyro.z)
         self.forces = (scale * acceleration.x, scale * acceleration.y, scale * acceleration.z)
         return ImuReading(self.forces, self.rates)
 
-    def sampled_s(self, arrived_s: float, not_before_s: float) -> float:
-        """Return the board's time of the sample that has just come, in s.
+    def sampled_s(self, arrived_s: float, not_before_s: float, skipped: int) -> float:
+        """Return the board's time of the next sample, in s.
 
         ``arrived_s``: its arrival in the board's time. ``not_before_s``: the board's time of the
-        pose that came before it.
+        pose that came before it. ``skipped``: count of samples before it that were left out.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
             self._phase_s = self._arrived_s = arrived_s
             return arrived_s
         since_s, self._arrived_s = arrived_s - self._arrived_s, arrived_s
-        self._count += 1 + self._skipped
-        self._skipped = 0
+        self._count += 1 + skipped
         time_s = self._phase_s + self._count * PERIOD_S
         lost = math.ceil(max(0.0, (not_before_s - CYCLE_S - time_s) / PERIOD_S))
         delay_s = arrived_s - time_s - lost * PERIOD_S

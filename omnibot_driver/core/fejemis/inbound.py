@@ -64,6 +64,8 @@ class Inbound:
                 half.restarted = False
                 self._restarted(half, now)
             self._hear(half, message, now)
+        if half.role == "drive":
+            self._translation.settle(half.clock, now)
         if half.not_understood(now):
             self._told.tell(
                 f"many lines from the {self._ports.role(channel)} board are damaged or not"

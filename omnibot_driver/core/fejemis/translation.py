@@ -9,7 +9,8 @@ import math
 from typing import Final
 
 from omnibot_driver.core.fejemis.front_wheel import FrontWheel
-from omnibot_driver.core.fejemis.imu import ImuPairing
+from omnibot_driver.core.fejemis.imu import ImuSamples
+from omnibot_driver.core.fejemis.imu_pairs import ImuPairs, Pair
 from omnibot_driver.core.fejemis.messages import (
     Acceleration,
     Attitude,
@@ -33,7 +34,7 @@ from omnibot_driver.core.fejemis.readings import (
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
-from omnibot_driver.core.readings import ExtraReading, ImuReading, NoticeReading, Reading
+from omnibot_driver.core.readings import ExtraReading, NoticeReading, Reading
 
 TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
@@ -49,7 +50,8 @@ class Translation:
         self._settings = settings
         self.front = FrontWheel()
         self.odometry = PoseOdometry(settings.track_m)
-        self._imu = ImuPairing(settings.acceleration_unit)
+        self._imu = ImuSamples(settings.acceleration_unit)
+        self._pairs = ImuPairs()
         self.stamped = StampedReadings()
         self._low_told_at = -math.inf
         self._low = False
@@ -64,15 +66,17 @@ class Translation:
         """Forget the state of earlier connections."""
         self.front.begin()
         self.odometry.begin()
-        self._imu.begin()
-        self._pose_s = -math.inf
+        self._begin_imu()
         self._imu_at = self._imu_stamp_s = -math.inf
 
     def restarted(self) -> None:
         """Forget the odometry's frame and the IMU's sampling times: the drive board restarted."""
         self.odometry.forget()
+        self._begin_imu()
+
+    def _begin_imu(self) -> None:
         self._imu.begin()
-        self._pose_s = -math.inf
+        self._pairs.begin()
 
     def add(self, reading: Reading, now: float) -> None:
         """Add a reading whose timestamp is its time of arrival, ``now``."""
@@ -98,18 +102,20 @@ class Translation:
         self.stamped.skew_ppm = clock.skew_ppm
         match message:
             case BoardPose():
-                self._pose_s = message.time_s
+                self._pairs.pose(message.time_s)
                 stamp_s = clock.host_s(message.time_s)
                 for reading in self.odometry.readings(message, now):
                     self.stamped.add(reading, stamp_s, now)
+                self.settle(clock, now)
             case WheelSpeeds():
+                self._pairs.other("vel")
                 self.odometry.speeds(message, now)
             case Gyro():
-                self._sample(self._imu.gyro(message, now), clock, now)
+                self._pairs.gyro(message, now)
             case Acceleration():
-                self._sample(self._imu.acceleration(message, now), clock, now)
+                self._pairs.acceleration(message, now)
             case Attitude():
-                self._orient(message, now)
+                self._pairs.attitude(message, now)
             case Magnetic():
                 x, y, z = (
                     TESLA_PER_MICROTESLA * axis for axis in (message.x, message.y, message.z)
@@ -122,17 +128,23 @@ class Translation:
             case Distance(keyword="sr04"):
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
-    def _sample(self, reading: ImuReading | None, clock: TeensyClock, now: float) -> None:
-        if reading is None:
-            return
-        stamp_s = now
-        if clock.known:
-            sampled_s = self._imu.sampled_s(clock.board_s(now), self._pose_s)
-            stamp_s = clock.host_s(sampled_s)
-        self._imu_at, self._imu_stamp_s = now, min(stamp_s, now)
-        self.stamped.add(reading, stamp_s, now)
+    def settle(self, clock: TeensyClock, now: float) -> None:
+        """Add the IMU samples that are complete, as a pose came or the read has ended."""
+        for item in self._pairs.take():
+            if isinstance(item, Pair):
+                self._sample(item, clock)
+            else:
+                self._orient(*item, now)
 
-    def _orient(self, message: Attitude, now: float) -> None:
+    def _sample(self, pair: Pair, clock: TeensyClock) -> None:
+        stamp_s = pair.at
+        if clock.known:
+            board_s = clock.board_s(pair.at)
+            stamp_s = clock.host_s(self._imu.sampled_s(board_s, pair.pose_s, pair.skipped))
+        self._imu_at, self._imu_stamp_s = pair.at, min(stamp_s, pair.at)
+        self.stamped.add(self._imu.reading(pair), stamp_s, pair.at)
+
+    def _orient(self, message: Attitude, came_at: float, now: float) -> None:
         if math.isnan(self._imu.rates[0]):
             return
         oriented = OrientedImuReading(
@@ -140,8 +152,8 @@ class Translation:
             self._imu.rates,
             self._imu.forces,
         )
-        fresh = now - self._imu_at < PERIOD_S
-        self.stamped.add(ExtraReading(oriented), self._imu_stamp_s if fresh else now, now)
+        fresh = came_at - self._imu_at < PERIOD_S
+        self.stamped.add(ExtraReading(oriented), self._imu_stamp_s if fresh else came_at, now)
 
     def _battery(self, message: Battery, now: float) -> None:
         low = message.cells > 0 and message.volts < message.cells * self._settings.low_cell_v

@@ -7,10 +7,11 @@ import math
 import random
 
 import pytest
-from fejemis_bench import DRIVE, FRONT, nominal
+from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.events import Extra
-from omnibot_driver.core.fejemis.imu import ImuPairing
+from omnibot_driver.core.fejemis.imu import ImuSamples
+from omnibot_driver.core.fejemis.imu_pairs import ImuPairs, Pair
 from omnibot_driver.core.fejemis.messages import Acceleration, Gyro
 from omnibot_driver.core.fejemis.readings import OrientedImuReading
 from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
@@ -40,7 +41,7 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
     If one character in a thousand is lost, so are three lines in a hundred.
     """
     chance = random.Random(f"{ppm} {loss}")
-    clock, imu = TeensyClock(), ImuPairing("m/s^2")
+    clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
     phase_s, start_s = chance.random() * 0.01, chance.random() * 50
     samples = sorted(
         [(n * 0.02 + 0.0031, "pose") for n in range(20 * 50)]
@@ -54,15 +55,17 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
         if kind == "pose" and chance.random() >= loss:
             pose_s = round(board_s, 5)
             assert clock.see(pose_s, arrived)
+            pairs.pose(pose_s)
             off["pose"].append(clock.host_s(pose_s) - true_s)
         elif kind == "imu":
-            reading = None
             if chance.random() >= loss:
-                imu.gyro(Gyro(0.0, 0.0, 0.0), arrived)
+                pairs.gyro(Gyro(true_s, 0.0, 0.0), arrived)
             if chance.random() >= loss:
-                reading = imu.acceleration(Acceleration(0.0, 0.0, 9.8), arrived)
-            if reading and clock.known:
-                sampled_s = imu.sampled_s(clock.board_s(arrived), pose_s)
+                pairs.acceleration(Acceleration(true_s, 0.0, 9.8), arrived)
+            for pair in pairs.take():
+                assert isinstance(pair, Pair)
+                assert pair.at == arrived
+                sampled_s = imu.sampled_s(clock.board_s(pair.at), pair.pose_s, pair.skipped)
                 off["imu"].append(min(arrived, clock.host_s(sampled_s)) - true_s)
     assert within(off["pose"][200:]) < 5e-5
     assert within(off["imu"][400:]) < 2e-4
@@ -94,27 +97,12 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
     assert stamps[-1] == 2.0
 
 
-@pytest.mark.parametrize("gyro_first", [True, False])
-def test_a_sample_is_a_gyro_line_and_an_acceleration_line(*, gyro_first: bool) -> None:
-    """Both lines may come first; a sample is lost if either of its lines is lost."""
-    imu = ImuPairing("g")
-
-    def say(now: float, *, gyro: bool = True, acceleration: bool = True) -> list[ImuReading]:
-        lines = [
-            (gyro, lambda: imu.gyro(Gyro(180.0, 0.0, -180.0), now)),
-            (acceleration, lambda: imu.acceleration(Acceleration(0.0, 0.0, 1.0), now)),
-        ]
-        told = [line() for heard, line in lines[:: 1 if gyro_first else -1] if heard]
-        return [reading for reading in told if reading]
-
-    (reading,) = say(1.0)
+def test_a_sample_has_si_units() -> None:
+    """The board sends degrees per second, and on some firmware g."""
+    pair = Pair(Gyro(180.0, 0.0, -180.0), Acceleration(0.0, 0.0, 1.0), 1.0, 1.0, 0, doubtful=False)
+    reading = ImuSamples("g").reading(pair)
     assert reading.angular_velocity == pytest.approx((math.pi, 0.0, -math.pi))
     assert reading.specific_force == pytest.approx((0.0, 0.0, 9.80665))
-    assert say(1.01, gyro=False) == []
-    assert len(say(1.02)) == 1
-    assert say(1.03, acceleration=False) == []
-    assert say(1.04, acceleration=False) == []
-    assert len(say(1.05)) == 1
 
 
 @pytest.mark.parametrize("sums", [True, False])
@@ -198,3 +186,73 @@ def test_what_waited_while_the_host_was_stalled_is_no_restart() -> None:
         if clock.restarted:
             break
     assert 2 <= n <= 4
+
+
+def numbered() -> Bench:
+    """Return a bench whose gyro and acceleration lines have the number of the cycle, in x."""
+    bench = nominal()
+    drive = bench.robot.drive
+    drive._items["gyro"] = lambda: f"gyro {drive._cycles % 20_000 / 1000:.3f} 0.100 0.200"
+    drive._items["acc"] = lambda: f"acc {drive._cycles % 20_000 / 1000:.4f} 0.1000 9.8000"
+    bench.run(0.3)
+    bench.events.clear()
+    return bench
+
+
+def cycles_of(bench: Bench) -> list[tuple[float, float]]:
+    """Return the numbers of both lines of each published sample."""
+    return [
+        (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
+        for e in bench.imu
+    ]
+
+
+@pytest.mark.parametrize("kept", ["all", "lost", "twice"])
+def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
+    """A read every 100 ms brings ten samples; one line in a hundred is lost, or comes twice."""
+    bench = numbered()
+    chance = random.Random(5)
+    times = {"all": 1, "lost": 0, "twice": 2}[kept]
+
+    def carry(_: int, data: bytes) -> bytes:
+        lines = data.splitlines(keepends=True)
+        return b"".join(line * (times if chance.random() < 0.01 else 1) for line in lines)
+
+    bench.read_s, bench.carry = 0.1, carry
+    bench.run(6.0)
+    cycles = cycles_of(bench)
+    assert all(gyro == force for gyro, force in cycles)
+    assert len(cycles) > (565 if kept == "lost" else 580)
+
+
+@pytest.mark.parametrize("pause_s", [0.001, 0.006])
+def test_a_sample_whose_lines_come_in_pieces_is_published(pause_s: float) -> None:
+    """The pieces have 1 to 60 bytes, so the pause may come between the two lines of a sample."""
+    bench = numbered()
+    chance = random.Random(7)
+    unsent, sent_at = bytearray(), bench.now
+
+    def carry(channel: int, data: bytes) -> bytes:
+        nonlocal sent_at
+        if channel != DRIVE:
+            return data
+        unsent.extend(data)
+        piece = b""
+        while unsent and sent_at + pause_s <= bench.now + 1e-9:
+            size = chance.randint(1, 60) if pause_s > 0.001 else chance.randint(20, 60)
+            piece += bytes(unsent[:size])
+            del unsent[:size]
+            sent_at += pause_s
+        if not unsent:
+            sent_at = bench.now
+        return piece
+
+    bench.carry = carry
+    bench.run(1.0)
+    bench.events.clear()
+    bench.run(5.0)
+    cycles = cycles_of(bench)
+    assert all(gyro == force for gyro, force in cycles)
+    numbers = [round(gyro * 1000) for gyro, _ in cycles]
+    steps = {(b - a) % 20_000 for a, b in itertools.pairwise(numbers)}
+    assert steps == {10}

@@ -1,0 +1,245 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Pairs of gyro and acceleration lines: whatever the reads and losses, both are of one sample."""
+
+import itertools
+import math
+import random
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from omnibot_driver.core.fejemis.imu_pairs import ImuPairs, Pair
+from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
+
+LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
+KNOWN_S = 0.5
+"""Time in s after which the order of the lines is known, at reads of 100 ms at most."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line that the board sends at ``sent_s``; ``number``: its sample."""
+
+    sent_s: float
+    kind: str
+    number: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The order of a cycle's lines; ``apart_s``: between the two lines of a sample.
+
+    ``odd``: whether the lines that come every second cycle come with odd samples.
+    """
+
+    order: str
+    apart_s: float = 0.0
+    odd: bool = False
+
+    def lines(self, seconds: float) -> list[Line]:
+        """Return the lines of a stream without losses."""
+        kinds = {kind[0]: kind for kind in LENGTHS}
+        lines = []
+        for number in range(round(seconds * 100)):
+            at_s, second = number * 0.01, False
+            for letter in self.order:
+                if letter in "ga":
+                    at_s += self.apart_s if second else 0.0
+                    second = True
+                if letter in "ga" or number % 2 == self.odd:
+                    lines.append(Line(at_s, kinds[letter], number))
+        return lines
+
+
+LAYOUTS = [
+    Layout("pvgai"),
+    Layout("gaipv"),
+    Layout("agipv"),
+    Layout("pvagi", odd=True),
+    Layout("gaipv", apart_s=0.002),
+    Layout("pvgai", apart_s=0.001, odd=True),
+    Layout("piga", apart_s=0.003),
+    Layout("pga"),
+]
+layouts = st.sampled_from(LAYOUTS)
+chances = st.integers(0, 10_000).map(random.Random)
+Read = tuple[float, list[Line]]
+
+
+def damaged(lines: list[Line], chance: random.Random, lost: float, twice: float) -> list[Line]:
+    """Return the lines without the lost ones, and with some of them twice."""
+    kept = [line for line in lines if chance.random() >= lost]
+    return [line for line in kept for _ in range(1 + (chance.random() < twice))]
+
+
+def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) -> list[Read]:
+    """Return the reads, each with its time, of a reader that reads at these intervals."""
+
+    def read(line: Line) -> int:
+        return math.floor((line.sent_s - phase_s) / period_s) + 1
+
+    return [(n * period_s + phase_s, list(some)) for n, some in itertools.groupby(lines, read)]
+
+
+def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[float]) -> list[Read]:
+    """Return the reads of a slow line: pieces of 1 to 60 bytes with these pauses between them."""
+    reads: list[Read] = []
+    now, due, sent = 0.0, 0, 0
+    for line in lines:
+        due += LENGTHS[line.kind]
+        if now < line.sent_s:
+            now = line.sent_s
+        while sent < due:
+            sent += chance.randint(1, 60)
+            now += chance.choice(pauses_s)
+        if reads and reads[-1][0] == now:
+            reads[-1][1].append(line)
+        else:
+            reads.append((now, [line]))
+    return reads
+
+
+def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -> list[Read]:
+    """Return the reads of a prompt reader that now and then stalls for up to 0.15 s."""
+    reads: list[Read] = []
+    free_at = 0.0
+    for _, some in itertools.groupby(lines, lambda line: line.sent_s):
+        for line in some:
+            now = max(free_at, line.sent_s + chance.uniform(0.0002, 0.001))
+            if chance.random() < stalls:
+                now += chance.uniform(0.0, 0.15)
+            free_at = now
+            if reads and reads[-1][0] == now:
+                reads[-1][1].append(line)
+            else:
+                reads.append((now, [line]))
+    return reads
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The sample numbers of both lines of each pair given, and the reads that brought them."""
+
+    given: list[tuple[int, int]]
+    false: list[tuple[int, int]]
+    excused: list[tuple[int, int]]
+    """False pairs that came late, in one read, without a pose after them in this read."""
+
+
+def outcome(reads: list[Read]) -> Outcome:
+    """Pair the lines of these reads."""
+    pairs, given = ImuPairs(), []
+    for now, lines in reads:
+        for line in lines:
+            match line.kind:
+                case "gyro":
+                    pairs.gyro(Gyro(float(line.number), 0.0, 0.0), now)
+                case "acc":
+                    pairs.acceleration(Acceleration(float(line.number), 0.0, 9.8), now)
+                case "pose":
+                    pairs.pose(round(7.0 + line.sent_s, 5))
+                    given += pairs.take()
+                case "imupose":
+                    pairs.attitude(Attitude(0.0, 0.0, 0.0), now)
+                case _:
+                    pairs.other(line.kind)
+        given += pairs.take()
+    numbers = [
+        (int(pair.gyro.x), int(pair.acceleration.x)) for pair in given if isinstance(pair, Pair)
+    ]
+    false = [pair for pair in numbers if pair[0] != pair[1]]
+    return Outcome(numbers, false, [pair for pair in false if not decidable(pair, reads)])
+
+
+def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
+    """Return whether the stream shows that a pair has lines of two samples."""
+    wanted = {("gyro", pair[0]), ("acc", pair[1])}
+    found = [(now, line) for now, lines in reads for line in lines]
+    both = [
+        (at, now, line)
+        for at, (now, line) in enumerate(found)
+        if (line.kind, line.number) in wanted
+    ]
+    _, one_at, first = both[0]
+    at, other_at, _ = next(one for one in both if one[2].kind != first.kind)
+    posed = any(now == other_at and line.kind == "pose" for now, line in found[at:])
+    late = one_at - first.sent_s >= 0.004
+    return not late or other_at - one_at >= 0.005 or posed
+
+
+def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Read]) -> None:
+    """Check that each sample came once, after the order was known; the last may still wait."""
+    assert result.false == []
+    known = next(line.number for now, some in reads if now > KNOWN_S for line in some)
+    wanted = range(known + 1, lines[-1].number - 3)
+    numbers = [gyro for gyro, _ in result.given]
+    assert numbers == sorted(set(numbers))
+    assert set(wanted) <= set(numbers)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+@pytest.mark.parametrize("period_s", [0.001, 0.004, 0.0075, 0.02, 0.033, 0.1])
+def test_every_sample_is_given_if_no_line_is_lost(layout: Layout, period_s: float) -> None:
+    """The reads come at regular intervals, shorter or longer than the period of the samples."""
+    lines = layout.lines(4.0)
+    for phase_s in (0.0, 0.0003, 0.0031):
+        reads = reads_every(lines, period_s, phase_s)
+        assert_nothing_is_missing(outcome(reads), lines, reads)
+
+
+pauses = st.sampled_from([[0.001], [0.006], [0.001, 0.006], [0.0]])
+
+
+@given(layouts, chances, pauses)
+@settings(max_examples=60, deadline=None)
+def test_every_sample_is_given_in_pieces(
+    layout: Layout, chance: random.Random, pauses_s: list[float]
+) -> None:
+    """The line may be slower than the board, so the pieces fall behind."""
+    lines = layout.lines(3.0)
+    reads = reads_of_pieces(lines, chance, pauses_s)
+    assert_nothing_is_missing(outcome(reads), lines, reads)
+
+
+@given(layouts, chances, st.floats(0.0, 0.1))
+@settings(max_examples=60, deadline=None)
+def test_every_sample_is_given_by_a_reader_that_stalls(
+    layout: Layout, chance: random.Random, stalls: float
+) -> None:
+    """A stall may come between the two lines of a sample."""
+    lines = layout.lines(3.0)
+    reads = reads_with_stalls(lines, chance, stalls)
+    assert_nothing_is_missing(outcome(reads), lines, reads)
+
+
+@given(
+    layouts,
+    chances,
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 0.1),
+    st.one_of(st.floats(0.001, 0.15), st.none()),
+    st.floats(0.0, 0.1),
+)
+@settings(max_examples=150, deadline=None)
+def test_no_pair_has_lines_of_two_samples(
+    layout: Layout,
+    chance: random.Random,
+    lost: float,
+    twice: float,
+    period_s: float | None,
+    stalls: float,
+) -> None:
+    """Up to a tenth of the lines is lost or comes twice, at regular or at stalled reads.
+
+    The exception cannot be decided: the lines came late, and the read has no later pose.
+    """
+    lines = damaged(layout.lines(3.0), chance, lost, twice)
+    reads = reads_with_stalls(lines, chance, stalls)
+    if period_s is not None:
+        reads = reads_every(lines, period_s, chance.uniform(0.0, period_s))
+    result = outcome(reads)
+    assert result.false == result.excused
