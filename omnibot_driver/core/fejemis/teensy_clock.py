@@ -71,7 +71,8 @@ class TeensyClock:
         self.restarted = False
         if self._fit is not None:
             late_s = now - self.host_s(board_s)
-            if not -EARLY_S <= late_s <= LATE_S and not self._is_new_time(board_s, now):
+            plausible = -EARLY_S <= late_s <= LATE_S and board_s >= self._last_s - EARLY_S
+            if not plausible and not self._is_new_time(board_s, now):
                 return False
         else:
             self._begin_at(board_s, now)

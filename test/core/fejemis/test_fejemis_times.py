@@ -85,6 +85,18 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
     assert clock.restarted
 
 
+def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
+    """The new times look like times that came less than a second late, but they go back."""
+    clock = TeensyClock()
+    assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
+    restarts = 0
+    for n in range(10):
+        clock.see(0.1 + 0.02 * n, 5.7 + 0.02 * n)
+        restarts += clock.restarted
+    assert restarts == 1
+    assert clock.host_s(0.28) == pytest.approx(5.88, abs=0.01)
+
+
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
     """The artificial clock gives times that go back, and one after the time of the call."""
     stamped = StampedReadings()
