@@ -21,7 +21,7 @@ from omnibot_driver.core.fejemis.messages import (
     Message,
 )
 from omnibot_driver.core.fejemis.settings import LineSums
-from omnibot_driver.core.fejemis.teensy_clock import TeensyClock
+from omnibot_driver.core.fejemis.teensy_clock import EARLY_S, TeensyClock
 
 Role = Literal["drive", "front"]
 ROLES: Final[Mapping[int, Role]] = {90: "drive", 91: "front"}
@@ -41,6 +41,8 @@ NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 TOGETHER: Final = ("gyro", "acc")
 """Streams subscribed in one packet, so that the board sends both in the same cycle."""
 AGAIN_S: Final = 0.5
+ASK_AGAIN_S: Final = 0.1
+"""Time between two requests for the heartbeat in s, while a restart cannot be ruled out."""
 MANY: Final = 30
 """Number of damaged or unknown lines per second up to which the user is not notified.
 
@@ -55,6 +57,9 @@ class Half:
     """State of one board; ``identity``: from its heartbeats, None before the first.
 
     ``restarted``: whether the board has restarted; the caller resets this flag.
+
+    If the needed stream pauses, the board may have restarted, even if its start line was lost. The
+    half is then unsure until a heartbeat shows that the board's time has continued.
     """
 
     def __init__(self, line_sums: LineSums) -> None:
@@ -78,12 +83,20 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the stream arrives without which the robot must not be driven."""
+        """Whether the stream arrives without which the robot must not be driven, and the board has
+        not restarted since it was configured."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
         self._at: dict[str, float] = {}
         self._next_at = -math.inf
+        self._unsure_at: float | None = None
+        self._ask_at = -math.inf
+
+    @property
+    def unsure(self) -> bool:
+        """Whether the board may have restarted, so it may lack the user's settings."""
+        return self._unsure_at is not None
 
     @property
     def sums(self) -> bool:
@@ -137,10 +150,17 @@ class Half:
     @property
     def wake_at(self) -> float:
         """Time at which ``due`` has work, in s."""
-        return self._next_at
+        return self._next_at if self._unsure_at is None else min(self._next_at, self._ask_at)
 
     def due(self, now: float) -> list[bytes]:
         """Return the lines to send now: a request for the heartbeat, or missing subscriptions."""
+        texts = self._subscriptions(now)
+        if self.unsure and now >= self._ask_at:
+            self._ask_at = now + ASK_AGAIN_S
+            texts.append(b"hbti")
+        return texts
+
+    def _subscriptions(self, now: float) -> list[bytes]:
         if now < self._next_at:
             return []
         self._next_at = now + AGAIN_S
@@ -159,6 +179,8 @@ class Half:
             self._left = True  # subscriptions of another program would use up the bandwidth
             every = (f"sub {key} {period}" for key, period in STREAMS[self.role].items())
             return [b"leave", *(text.encode("ascii") for text in every)]
+        if NEEDED[self.role] in wanted and not self.unsure:
+            self._unsure_at, self._ask_at = now, now
         return texts
 
     def _admit(self, message: Message, now: float) -> bool:
@@ -176,6 +198,10 @@ class Half:
         if isinstance(message, Heartbeat):
             self.heartbeat = message
             self.note("hbt", now)
+            if self._unsure_at is not None:
+                sent_at = self.clock.host_s(message.time_s)
+                if sent_at >= self._unsure_at - EARLY_S:  # an older one may be before a restart
+                    self._unsure_at = None
         self.heard_at = now
         return True
 
@@ -214,6 +240,7 @@ class Half:
         self.restarted = self.heartbeat is not None or self.clock.known
         self.clock.begin()
         self.subscribe_again()
+        self._unsure_at = None  # the caller configures the board again
 
 
 def keyword_of(message: Message) -> str:

@@ -85,7 +85,10 @@ class Watch:
             return False
         unheard_s = now - half.came_at(NEEDED[role])
         if unheard_s < FLOWS_S:
-            half.ready = half.heartbeat is not None
+            if half.unsure:
+                half.ready = False
+            elif unheard_s <= 0.0:  # a heartbeat alone is not the data that ends a start
+                half.ready = True
         elif half.ready and unheard_s > SILENT_S and now >= self._patient_until:
             what = "is silent" if silent else f"no longer sends `{NEEDED[role]}`"
             self._told.halt(
@@ -124,4 +127,10 @@ class Watch:
             return "no angle of the front wheel for 60 ms; check the front board"
         if self.unposed:
             return "no pose from the drive board for 0.25 s; check the drive board and its cable"
+        for half in self._ports.halves:
+            if half.unsure:
+                return (
+                    f"the {half.role} board was silent and may have restarted; wait until its"
+                    " heartbeat arrives"
+                )
         return ""

@@ -2,12 +2,16 @@
 
 """A board that restarts: short and long boots, lost start lines, and reads of several lengths."""
 
+import contextlib
 import itertools
+import random
 
 import pytest
-from fejemis_bench import DRIVE, Bench, nominal
+from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.messages import BoardPose
+from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.fejemis.sums import with_sum
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
@@ -78,3 +82,129 @@ def test_every_restart_stops_the_robot_and_is_reported(
     assert bench.robot.standing
     assert bench.robot.half(half).subscriptions == before
     assert_odometry_is_right(bench, 0.02)
+
+
+FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
+
+
+def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
+    """Restart a board while commands come; return the refusals of these commands.
+
+    The robot must not be driven from the loss of the board's stream to its configuration.
+    """
+    robot, refusals = bench.robot, []
+    bench.drive_on(0.3, 0.0, 0.5)
+    robot.half(half).reboot()
+    began = bench.now
+    while bench.now < began + 6.0:
+        try:
+            bench.drive(0.3)
+        except CommandRefused as refused:
+            refusals.append(str(refused))
+        if robot.drive.reference[0] and bench.now > began + 0.15:
+            assert robot.front.config.angle_offset_deg == 3.0, bench.now - began
+        bench.run(0.02)
+    assert not robot.standing
+    assert any(f"{half} board has restarted" in text for text in bench.notices)
+    return refusals
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("read_s", [0.001, 0.02, 0.1])
+@pytest.mark.parametrize("boot_s", [0.0, 0.05, 0.4])
+@pytest.mark.parametrize("says_start", [True, False])
+def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
+    boot_s: float, read_s: float, *, says_start: bool
+) -> None:
+    """Without the start line, only its heartbeats show that it has lost the user's settings."""
+    bench = nominal(
+        Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
+        FejemisSettings(written=FRONT_OFFSET),
+    )
+    bench.run(3.0)
+    bench.read_s = 0.05 if read_s == 0.1 else read_s  # an angle of 60 ms is too old to drive
+    refusals = drive_through_a_restart(bench, "front")
+    if not says_start:
+        assert any("may have restarted" in text for text in refusals)
+
+
+def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
+    """A late read may bring a heartbeat that the board sent before it restarted."""
+    bench = nominal()
+    bench.run(2.0)
+    half, front = bench.board._ports.halves[FRONT], bench.robot.front
+    old = with_sum(front._items["hbt"]().encode("ascii")) + b"\n"
+    bench.speaks = {DRIVE}
+    bench.run_until(lambda: half.unsure)
+    bench.session.inbound.receive(old, bench.now, FRONT)
+    assert half.unsure
+    new = with_sum(front._items["hbt"]().encode("ascii")) + b"\n"
+    bench.session.inbound.receive(new, bench.now, FRONT)
+    assert not half.unsure
+
+
+@pytest.mark.parametrize("half", ["drive", "front"])
+@pytest.mark.parametrize("pause_s", [0.9, 1.3, 3.0])
+def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
+    half: str, pause_s: float
+) -> None:
+    """When the state is nominal again, the next command drives the robot."""
+    bench = nominal()
+    bench.speaks = {FRONT if half == "drive" else DRIVE}
+    bench.run(pause_s)
+    assert any(half.unsure for half in bench.board._ports.halves)
+    bench.speaks = {DRIVE, FRONT}
+    bench.run(0.02)
+    bench.run_until(lambda: bench.session.state == "nominal")
+    assert not any(half.unsure for half in bench.board._ports.halves)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
+    """The answer decides at once; the board's own heartbeats come only every 0.4 s."""
+    bench = nominal()
+    bench.speaks = {DRIVE}
+    bench.run_until(lambda: bench.board._ports.halves[FRONT].unsure)
+    mark = bench.now
+    bench.run(0.5)
+    assert bench.lines(FRONT, mark).count("hbti") == pytest.approx(5, abs=1)
+    bench.speaks = {DRIVE, FRONT}
+    mark = bench.now
+    bench.run_until(lambda: not bench.board._ports.halves[FRONT].unsure)
+    assert bench.now - mark < 0.13
+
+
+@pytest.mark.parametrize("read_s", [0.001, 0.05])
+def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) -> None:
+    """For 10 s, one line in twenty from the boards is lost."""
+    bench = nominal()
+    chance = random.Random(3)
+
+    def carry(_: int, data: bytes) -> bytes:
+        lines = data.splitlines(keepends=True)
+        return b"".join(line for line in lines if chance.random() >= 0.05)
+
+    bench.carry, bench.read_s = carry, read_s
+    for _ in range(100):
+        with contextlib.suppress(CommandRefused):  # the angle may be too old for a moment
+            bench.drive(0.2)
+        bench.run(0.1)
+        assert not any(half.unsure for half in bench.board._ports.halves)
+    assert not any("restarted" in text for text in bench.notices)
+
+
+@pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
+def test_a_stall_of_the_computer_is_no_long_suspicion(stall_s: float) -> None:
+    """All lines of the stall come in one read; the next heartbeat ends the suspicion."""
+    bench = nominal()
+    bench.run(2.0)
+    read_s, bench.read_s = bench.read_s, stall_s
+    bench.run(stall_s + 0.1)
+    bench.read_s = read_s
+    bench.run(0.15)
+    assert not any(half.unsure for half in bench.board._ports.halves)
+    bench.drive(0.3)
+    bench.run(0.3)
+    assert not bench.robot.standing
+    assert not any("restarted" in text for text in bench.notices)
