@@ -210,6 +210,7 @@ def test_laps_are_told_in_english(
             true_pose=Pose(),
             points=[],
             real="-p port:=/dev/ttyUSB0",
+            page="docs/boards/omnibot.md",
         )
     )
     assert f" s, {told}\n" in capsys.readouterr().out
@@ -218,9 +219,12 @@ def test_laps_are_told_in_english(
 def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The text omits the IMU, and the command for the real robot names the board."""
+    """The text omits the IMU, and the page and the command for the real robot name the board."""
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
-    cart = Capability(title="cart", imu=False, sideways=False, ports=("port",), real=real)
+    page = "docs/boards/cart.md"
+    cart = Capability(
+        title="cart", imu=False, sideways=False, ports=("port",), real=real, page=page
+    )
     display.introduce(cart, (" --board cart", "-p board:=cart -p port:=/dev/pts/1"), "/d", "X=1", 9)
     display.report(
         display.Drive(
@@ -233,6 +237,7 @@ def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
             true_pose=Pose(),
             points=[],
             real=real,
+            page=page,
         )
     )
     told = capsys.readouterr().out
