@@ -32,7 +32,8 @@ class Adjusting(Moves):
     @property
     def motor_balance(self) -> str:
         """The measured ratio of the left to the right motor's speed, as a text."""
-        return f"{self.loop.balance:.3f}" if self.loop.balance_is_measured else "unknown"
+        ratio = self.loop.measured_balance
+        return "unknown" if ratio is None else f"{ratio:.3f}"
 
     def _adjust(self, now: float) -> Packets:
         """Return the command that corrects the motors' units by the measured speed, if needed."""

@@ -51,11 +51,6 @@ GREET_S: Final = 1.0
 
 The server answers them after the move; a restarted server answers at once.
 """
-GREET_CHECKED_S: Final = 0.3
-"""Time in s from a check of the IMU to the first HELLO, and between two of them.
-
-The answer shows that the check was lost, and that the server was not absent.
-"""
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which stops are sent while the e-stop is latched.
 
@@ -102,7 +97,7 @@ class Ground:
         """Begin a new connection: the server may be moving the robot."""
         self.conversation.connect()
         self.jobs.cancel("the connection was lost meanwhile; call again once it is back")
-        self.jobs.logging = self.jobs.ended = False
+        self.jobs.forget_log()
         self.odometry.connect()
         self._turns.connect()
         self._polls.connect()
@@ -131,6 +126,7 @@ class Ground:
         self._conflict = self._lost_told = False
         self._asked_count: tuple[int, float] | None = None
         self._greet_s = self._free_s = math.inf
+        self._greeted_s = -math.inf
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
         self.heard_s = self.appeared_s = -math.inf
@@ -172,7 +168,8 @@ class Ground:
     def _appears(self, now: float) -> None:
         """Note that the server may have been restarted: it then starts up, and has no log."""
         self.appeared_s = now
-        self.jobs.logging = self.jobs.ended = False
+        self.jobs.log_may_be_lost = self.jobs.logging
+        self.jobs.ended = False
 
     def take(self) -> list[Reading]:
         """Return the readings and the results of jobs that came since the last call."""
@@ -228,6 +225,7 @@ class Ground:
         return tuple((word.channel, word.request().data) for word in said)
 
     def _greet(self, now: float) -> Packets:
+        self._greeted_s = now
         return ((words.COMMAND, words.HELLO.request().data),)
 
     def _ask(self, request: Request, now: float) -> Packets:

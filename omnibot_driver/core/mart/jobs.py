@@ -25,6 +25,7 @@ TIMES: Final = 3
 """Largest number of attempts at a job in REPEATED."""
 
 CHECK: Final = "check controller and network"
+EXIT_LOST: Final = "if it has ended, start it again; if it still answers, call again"
 COPY: Final = (
     "the server has ended: copy the file from the controller, before ~/start_log deletes it"
 )
@@ -61,15 +62,20 @@ class Jobs:
     """The job that is under way, and the results of those that have ended.
 
     ``done``: results that the caller has not taken yet; ``logging``: whether LOG was answered with
-    ok in this connection; ``ended``: whether EXIT was sent, which ends the server; ``moving``:
+    ok in this connection; ``log_may_be_lost``: whether the server may have been restarted since;
+    ``ended``: whether EXIT was sent, which ends the server; ``moving``:
     whether the controlled move of the job was sent.
     """
 
     def __init__(self) -> None:
         self.done: list[JobDone] = []
-        self.logging = self.ended = False
+        self.forget_log()
         self.moving = False
         self._clear()
+
+    def forget_log(self) -> None:
+        """Note that the server has no log, as it was restarted."""
+        self.logging = self.log_may_be_lost = self.ended = False
 
     def _clear(self) -> None:
         self.job: Job | None = None
@@ -120,6 +126,11 @@ class Jobs:
                 "no log was started: call ~/start_log first; without a log the server would end"
                 " and send no file"
             )
+        if job is Job.LOG_FILE and self.log_may_be_lost:
+            raise RequestRefused(
+                "the server may have been restarted, and a restarted one would end and send no"
+                " file: copy the file from the controller, or begin a new log by ~/start_log"
+            )
         self.job, self._token = job, token
         self._request = WORD_OF[job].request(*arguments)
         self._until_s = now + WITHIN_S.get(job, USUAL_S)
@@ -149,7 +160,8 @@ class Jobs:
             self._name, self._size = reply.file
             self._piece_s = now + QUIET_S
         else:
-            self.logging |= job is Job.LOG
+            if job is Job.LOG:
+                self.logging, self.log_may_be_lost = True, False
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
@@ -159,11 +171,9 @@ class Jobs:
         if self.job in REPEATED and self._tries < TIMES:
             self._waiting = False
         else:
-            self._finish(
-                False,
-                f"the controller did not answer {word.text}; "
-                + ("start the server again, as EXIT ends it" if self.ended else CHECK),
-            )
+            advice = EXIT_LOST if self.ended else CHECK
+            self.ended = False
+            self._finish(False, f"the controller did not answer {word.text}; {advice}")
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
         """Evaluate the reply to a controlled move, and end the docking job if it was its move."""

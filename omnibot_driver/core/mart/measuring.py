@@ -44,6 +44,9 @@ class Measuring(Starts):
             changed = self._turned(reply.number, answer.when, now)
             if self.odometry.heading.is_zero and not was_zero:
                 self.health.outlived = False  # the server has been restarted
+                self.jobs.forget_log()
+            elif reply.number and self._started_s < self.appeared_s <= answer.when.from_s:
+                self.jobs.log_may_be_lost = False  # a restarted server reports zero until RM
             certain = answer.when.from_s >= self._begun_s and not answer.when.doubtful
             if changed and certain and self.state in (State.REVERSING, State.TURNING):
                 self.health.heading_changed(self.motion)

@@ -81,10 +81,12 @@ class Motors:
         A change of units that was lost or duplicated while learning falsifies the lines, so the
         ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
         """
-        usual = self._settings.motor_balance
-        units = max(units, BALANCE_UNITS)
-        ratio = self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
+        usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
+
+    def _line_ratio(self, units: float) -> float:
+        units = max(units, BALANCE_UNITS)
+        return self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
 
     def _mean_speed(self, units: float) -> float:
         """Return the mean speed of both motors at these units, in nominal units; not negative."""

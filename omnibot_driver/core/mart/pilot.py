@@ -15,7 +15,6 @@ from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.ground import (
     ESTOP_REPEAT_S,
-    GREET_CHECKED_S,
     GREET_S,
     STARTS_UP_S,
 )
@@ -24,6 +23,7 @@ from omnibot_driver.core.mart.required_motion import is_standstill
 from omnibot_driver.core.mart.states import (
     HALTS,
     LAST_HALTS,
+    ROLLING,
     Motion,
     State,
 )
@@ -41,8 +41,8 @@ It is shorter than STARTS_UP_S, so that the first motion uses the measured volta
 """
 VOLTS_S: Final = 10.0
 """Longest time in s for which VOLTS waits for a network that loses nothing."""
-GREETED: Final = {State.MOVING: GREET_S, State.CHECKING: GREET_CHECKED_S}
-"""Intervals in s at which HELLO is sent in the states in which the server may be silent."""
+SILENT_S, GREET_AGAIN_S = 0.15, 0.1
+"""Times in s: without a reply, plus two exchange durations, to the first HELLO; between two."""
 COPY_S: Final = 0.25
 """If ENC is unanswered for this time in s after a controlled move, a duplicate may be running."""
 
@@ -121,14 +121,13 @@ class Pilot(Hearing):
             return self._ask_s if pending is None else pending.until_s
         if pending is not None:
             times = [pending.until_s, self.jobs.wake_at, self._copy_stop_s]
-            if self.state in GREETED:
-                times.append(self._greet_s)
+            times.append(self._greets_at)
             if self.state is State.MOVING:
                 times.append(self._free_s)
             return min(times)
         if self.state is State.SERVING:
             return self.jobs.wake_at
-        times = [max(self._polls.wake_at(self.state), now + 0.004)]
+        times = [max(self._polls.wake_at(self.state), now + 0.004), self._greets_at]
         if self.state is State.STILL and isinstance(self._wanted, EmergencyStop):
             times.append(max(now + 0.01, self._estop_said_s + ESTOP_REPEAT_S))
         if self.state is State.STILL and not is_standstill(self._wanted):
@@ -165,12 +164,22 @@ class Pilot(Hearing):
         if self.state is State.MOVING and now >= self._free_s:
             self._named_in_a_move(now)
             return self._keep_stopping(now)
-        if self.state in GREETED and now >= self._greet_s:
-            self._greet_s = now + GREETED[self.state]
+        if now >= self._greets_at:
+            self._greet_s = now + GREET_S
             return self._greet(now)
         if self.conversation.pending is not None:
             return NO_PACKETS
         return self._act(now) or self._poll(now)
+
+    @property
+    def _greets_at(self) -> float:
+        """The time at which to send HELLO, whose answer shows that the server was not absent."""
+        if self.state is State.MOVING:
+            return self._greet_s
+        if self.state in (State.STILL, State.CHECKING, *ROLLING):
+            silent_s = SILENT_S + 2 * self.conversation.answered_trip_s
+            return max(self.heard_s + silent_s, self._greeted_s + GREET_AGAIN_S)
+        return math.inf
 
     @property
     def _copy_stop_s(self) -> float:

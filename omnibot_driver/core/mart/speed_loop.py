@@ -72,8 +72,7 @@ class SpeedLoop(Motors):
     """The controller of both motors' speeds in one motion.
 
     ``trip_s``: duration of an exchange, by which the times of measurements are uncertain; ``part``:
-    sum of the last changes of both sides, each without sign and as a part of that side's units;
-    ``balance_is_measured``: whether both wheels have been measured in a drive.
+    sum of the last changes of both sides, each without sign and as a part of that side's units.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -81,7 +80,7 @@ class SpeedLoop(Motors):
         self.trip_s = 0.0
         self._right, self._left = _Side(self._right_line), _Side(self._left_line)
         self._least_units = LEAST_UNITS
-        self.balance_is_measured = False
+        self._balance_is_measured = False
         self.begin(0, False, 0.0)
 
     def begin(self, units: int, reverse: bool, now: float) -> None:
@@ -150,6 +149,11 @@ class SpeedLoop(Motors):
         return self._balance(self.units)
 
     @property
+    def measured_balance(self) -> float | None:
+        """The same as measured in a drive, not limited; None before the first one."""
+        return self._line_ratio(self.units) if self._balance_is_measured else None
+
+    @property
     def bend(self) -> float:
         """Relative standard deviation of ``left_over_right``."""
         return math.sqrt(UNEQUAL**2 + self._unsure)
@@ -189,7 +193,7 @@ class SpeedLoop(Motors):
                 )
             else:
                 self._learn(self._left)
-                self.balance_is_measured = True
+                self._balance_is_measured = True
             self._clear(now)
 
     def _learn(self, side: _Side) -> None:

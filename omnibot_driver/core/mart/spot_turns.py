@@ -24,6 +24,11 @@ OFF, OFF_AGAIN = 0.05, 0.12
 The first holds until a turn has taught how fast the motors turn; later a correction would often
 cost more than the error.
 """
+HELD, LEAST_LESSON = 0.6, 0.6
+"""Parts of the commanded rate: below the first a robot whose motors are known is held; and the
+least that one turn teaches, so that the next one has no more than 1.7 times the units."""
+EVEN: Final = 0.15
+"""Largest change of the rate, as a part of its mean, of a turn that shows anything."""
 SAME, CORRECTIONS = 0.2, 2
 """Relative difference up to which two rates count as the same, and how often each is corrected."""
 STEADY: Final = 0.03
@@ -142,27 +147,36 @@ class SpotTurns:
         Its stop tells how fast the motors turn with their units, so the next turn is better. This
         is not done while the commanded rate changes.
         """
-        if disturbed or not self._is_seen(steady_s, rate_radps):
+        if disturbed or not self._is_seen(steady_s):
             return False
         if not math.isclose(rate_radps, self._corrected_radps, rel_tol=SAME):
             self._corrected_radps, self._corrections = rate_radps, 0
         seen_radps = self._odometry.speeds.means[1]
+        if self._is_held(seen_radps):
+            return False
         most_radps = (OFF_AGAIN if self._has_learned else OFF) * abs(rate_radps)
         if abs(seen_radps - rate_radps) <= most_radps or self._corrections >= CORRECTIONS:
             return False
-        if self._loop.corrected_spin_units(self.units, seen_radps, rate_radps) == self.units:
+        lesson_radps = self._lesson(seen_radps)
+        if self._loop.corrected_spin_units(self.units, lesson_radps, rate_radps) == self.units:
             return False
         self._corrections += 1
         return True
 
-    def _is_seen(self, seconds: float, rate_radps: float) -> bool:
-        """Return whether a turn shows how fast the motors turn.
+    def _is_seen(self, seconds: float) -> bool:
+        """Return whether a turn of this duration shows how fast the motors turn."""
+        speeds = self._odometry.speeds
+        if seconds < SPINS_UP_S + speeds.window_s or abs(self._odometry.spun_rad) <= SEEN_RAD:
+            return False
+        return abs(speeds.changes[1]) < EVEN * abs(speeds.means[1])
 
-        ``seconds``: its duration; ``rate_radps``: its commanded rate, of which it may fall short.
-        """
-        least_s = SPINS_UP_S + self._odometry.speeds.window_s
-        turned_rad = max(abs(self._odometry.spun_rad), abs(rate_radps) * seconds / 2)
-        return seconds >= least_s and turned_rad > SEEN_RAD
+    def _is_held(self, seen_radps: float) -> bool:
+        """Return whether something holds the robot, so that its rate teaches nothing."""
+        return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
+
+    def _lesson(self, seen_radps: float) -> float:
+        """Return the rate to learn from a measured one: the robot may have been held a little."""
+        return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number cannot be the angle that the stop of this turn reports.
@@ -179,20 +193,24 @@ class SpotTurns:
         most_rad = UNSURE_RAD + UNSURE_PART * abs(expected_rad) + abs(self._rate_radps) * 2 * trip_s
         return abs(told_rad - expected_rad) > most_rad
 
-    def stopped(self, degrees: float, uncounted_s: float, turned_s: float) -> None:
+    def stopped(
+        self, degrees: float, uncounted_s: float, turned_s: float, *, disturbed: bool
+    ) -> None:
         """Evaluate the angle that the stop has reported, in degrees.
 
         ``uncounted_s``: time from the last count to the stop; ``turned_s``: time since the turn has
-        begun.
+        begun; ``disturbed``: whether a reply to the setting may have been that to another command.
         """
         odometry = self._odometry
         spun_rad = odometry.spun_rad
         odometry.spin_told(degrees)
-        if not (self.units and self._is_seen(turned_s, self._rate_radps)):
+        if disturbed or not (self.units and self._is_seen(turned_s)):
             return
         rate_radps = self.seen_radps
+        if self._is_held(rate_radps):
+            return
         if abs(spun_rad) > TOLD_RAD:
             whole_rad = abs(spun_rad + rate_radps * (uncounted_s + SLOWING_S))
             rate_radps *= abs(math.radians(degrees)) / whole_rad
-        self._loop.spun(self.units, rate_radps)
+        self._loop.spun(self.units, self._lesson(rate_radps))
         self._has_learned = True

@@ -15,7 +15,6 @@ from omnibot_driver.core.mart.adjusting import Adjusting
 from omnibot_driver.core.mart.conversation import SLOW_S, Answer
 from omnibot_driver.core.mart.ground import (
     ESTOP_REPEAT_S,
-    GREET_CHECKED_S,
     GREET_S,
     STARTS_UP_S,
 )
@@ -90,6 +89,9 @@ class Starts(Adjusting):
         motion, twist = self._wish(now)
         if motion is not Motion.SPIN or self.refusal or now < self.appeared_s + STARTS_UP_S:
             return None
+        network = self.conversation
+        if network.disturbed(now) and now < network.certain_from_s(words.SSP):
+            return None  # a copy of another reply would be taken for that to SSP
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _copies_may_come(self, now: float) -> bool:
@@ -123,7 +125,7 @@ class Starts(Adjusting):
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
             return NO_PACKETS
         self._require(word)
-        self.state, self._greet_s = State.CHECKING, now + GREET_CHECKED_S
+        self.state = State.CHECKING
         if word is words.CHECK:
             self.odometry.wheel.may_begin_anew = True
         return self._ask(self.imu.request, now)

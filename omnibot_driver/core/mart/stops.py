@@ -191,7 +191,12 @@ class Stops(Ground, ABC):
             self.odometry.wheel.refused()
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
             uncounted_s = max(0.0, stopping.began_s - self.odometry.wheel.told_s)
-            self._turns.stopped(result.number, uncounted_s, now - self._begun_s)
+            self._turns.stopped(
+                result.number,
+                uncounted_s,
+                now - self._begun_s,
+                disturbed=self.conversation.disturbed(now),
+            )
         if motion is Motion.STRAIGHT:
             self.odometry.doubt.end_straight()
         if isinstance(result, Fail):

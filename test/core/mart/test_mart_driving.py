@@ -90,6 +90,27 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
     assert abs(bench.error.yaw_rad) < 0.1
 
 
+@pytest.mark.parametrize("learned", [False, True])
+def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
+    """Something brakes the robot for a second, as a door sill or a foot."""
+    bench = MartBench("source").ready()
+    if learned:
+        bench.command(0.0, 0.5, 4.0)
+        bench.command(0.0, 0.0, 2.0)
+    bench.run_until(lambda: bench.try_command(0.0, 0.5) or not bench.robot.stands, 2.0)
+    chassis = bench.server.chassis
+    gains = chassis._gain_right, chassis._gain_left
+    chassis._gain_right, chassis._gain_left = 0.3 * gains[0], 0.3 * gains[1]
+    bench.command(0.0, 0.5, 1.2)
+    chassis._gain_right, chassis._gain_left = gains
+    fastest_radps = 0.0
+    for _ in range(60):
+        bench.command(0.0, 0.5, 0.1)
+        fastest_radps = max(fastest_radps, bench.robot.board.facts["yaw_rate_radps"])
+    assert fastest_radps < (0.6 if learned else 0.9)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.2)
+
+
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: float) -> None:
     """The heading is not reported in B, and nothing was driven forward before."""
@@ -108,6 +129,13 @@ def test_the_balance_of_the_motors_is_shown_once_it_is_measured() -> None:
     assert bench.board.figures.own["Motor balance"] == "unknown"
     bench.command(0.3, 0.0, 4.0)
     assert float(bench.board.figures.own["Motor balance"]) == pytest.approx(1.051, abs=0.01)
+
+
+def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> None:
+    """For its own predictions, the driver assumes at most 8 %."""
+    bench = MartBench("source", motor_inequality=0.18).ready()
+    bench.command(0.3, 0.0, 6.0)
+    assert float(bench.board.figures.own["Motor balance"]) == pytest.approx(1.198, abs=0.02)
 
 
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
@@ -156,7 +184,7 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
-def test_a_quiet_gyro_on_a_straight_way_is_no_dead_imu(firmware: Firmware) -> None:
+def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
     """A heading that does not change for long is a sign of a dead IMU.
 
     On a straight drive without gyro noise, it changes only because the driver steers a little.

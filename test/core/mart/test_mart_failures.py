@@ -8,6 +8,7 @@ from mart_bench import MartBench
 from mart_campaign import FIRMWARES
 
 from omnibot_driver.core.mart import MartSettings
+from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware, Kind
 from omnibot_driver.simulator.mart.settings import Stuck
 
@@ -42,7 +43,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
     assert bench.robot.stands is (firmware == "documented")
 
 
-def test_one_failed_reset_of_the_imu_is_no_dead_imu() -> None:
+def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
     """A failed RST IMU leaves the IMU closed, so it is repeated; the third failure is accepted."""
     bench = MartBench("source").ready()
     bench.server.imu.alive = False
@@ -212,7 +213,7 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 @pytest.mark.parametrize("firmware", FIRMWARES)
 @pytest.mark.parametrize("stuck", ["left", "right", "both"])
 @pytest.mark.parametrize("driving", [False, True])
-def test_a_stuck_motor_is_no_motion_that_goes_on(
+def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     driving: bool, stuck: Stuck, firmware: Firmware
 ) -> None:
     """Both motors are off, and stay so although the command goes on. The next command drives.
@@ -270,6 +271,17 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
         assert not bench.robot.stands
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(seed: int) -> None:
+    """HELLO is sent when replies are missing, so a motion begins soon after its command."""
+    bench = MartBench("source", NetworkFaults(lose=0.1), seed=seed).ready()
+    appeared = set()
+    for _ in range(300):
+        bench.run(0.1)
+        appeared.add(bench.board._pilot.appeared_s)
+    assert len(appeared) <= 3
+
+
 @pytest.mark.parametrize("after_s", [0.0, 0.02, 0.05, 0.1])
 def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_soon(
     after_s: float,
@@ -322,7 +334,7 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
 
 
-def test_a_push_long_after_an_rm_that_failed_is_no_defect_of_the_server() -> None:
+def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
     """A server that answers ``fail`` although it moves shows this at once."""
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58

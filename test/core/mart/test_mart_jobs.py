@@ -178,6 +178,28 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
         bench.board.ask(Job.LOG_FILE, "token", bench.now)
 
 
+def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
+    """The repeated stop finds no motion, as after a restart. The heading shows that there is none.
+
+    A second ``~/start_log`` on a restarted server would delete the file.
+    """
+    bench = MartBench("source").ready()
+    assert bench.job(Job.LOG).success
+    bench.command(0.3, 0.3, 2.0)
+    advance, lost = bench.robot.advance, []
+
+    def lose() -> list[Packet]:
+        out = advance()
+        if not lost and bench.said()[-1:] == [b"SRM"] and (0, b"ok") in out:
+            lost.append(out.remove((0, b"ok")))
+        return out
+
+    bench.robot.advance = lose  # type: ignore[method-assign]
+    bench.command(0.0, 0.0, 4.0)
+    assert lost
+    assert bench.job(Job.LOG_FILE).success
+
+
 def test_the_clock_is_set_while_the_robot_stands() -> None:
     """TIME gets six numbers, in UTC; it is not sent while the robot is driven."""
     bench = MartBench().ready()

@@ -56,7 +56,7 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
         assert bench.error.way_m < 0.05
 
 
-def test_a_copy_of_an_ok_is_no_turn_where_the_start_was_lost() -> None:
+def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
     """The ok of RST IMU comes twice; L and all queries after it are lost.
 
     The copy seems to acknowledge L, but the count is still that of the motion before: the robot did
@@ -131,7 +131,7 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
     assert odometry.told(9.0, blind_since_s=None).covariance.xx > 0.3**2
 
 
-def test_a_count_that_stays_while_the_robot_is_driven_is_no_motion() -> None:
+def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
     """The acknowledgement of the start was a copy of another ok."""
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
