@@ -46,7 +46,7 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(
                     name,
                     default_value="",
-                    description=f"{description}; empty: what params_file says.",
+                    description=f"{description}. If empty, the value in params_file is used.",
                 )
                 for name, (_, description) in OVERRIDES.items()
             ),

@@ -78,7 +78,7 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
 
 
 @pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
-def test_what_is_no_board_is_refused_with_those_there_are(wrong: object) -> None:
+def test_an_unknown_board_is_refused_with_the_names_of_the_known_ones(wrong: object) -> None:
     """The value may have any type; the error lists the boards."""
     with pytest.raises(ParameterError, match="'board' must be "):
         boards.check_all({"board": wrong})

@@ -23,7 +23,7 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
     assert calibration.load(path, PARAMETERS) == {"gyro_bias": bias}
 
 
-def test_no_file_yet_is_no_calibration(tmp_path: Path) -> None:
+def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
     """An empty file contains no calibration either; the folder is created with the file."""
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}
@@ -65,7 +65,7 @@ def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
     assert str(path) in str(caught.value)
 
 
-def test_a_folder_is_no_file(tmp_path: Path) -> None:
+def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
     """A folder at the file's path is an error that says it cannot be read."""
     with pytest.raises(ParameterError, match="cannot be read"):
         calibration.load(tmp_path, PARAMETERS)

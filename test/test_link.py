@@ -76,7 +76,7 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 
 
 def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:
-    """The figures are: why the port cannot be opened, how often it was, and the bytes each way."""
+    """Why the port cannot be opened, how often it was opened, and bytes in each direction."""
     listener, name = Listener(), tmp_path / "board"
     link = link_to(str(name), listener, session())
     link.start()

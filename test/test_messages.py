@@ -40,7 +40,7 @@ def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, ag
     assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
 
 
-def test_a_zero_stamp_is_no_stamp() -> None:
+def test_a_zero_stamp_is_not_a_stamp() -> None:
     """A command without a stamp is as old as its message."""
     assert messages.age(Time(), 1_700_000_000 * 10**9) == 0.0
 
@@ -86,7 +86,7 @@ def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
         (goal(turn=(0.0, math.sin(0.25), 0.0, math.cos(0.25))), "tilted by 29°"),
     ],
 )
-def test_a_goal_that_is_no_place_on_the_floor_is_refused_with_a_reason(
+def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
     wrong: PoseStamped, said: str
 ) -> None:
     """The frame is wrong, a number or rotation is missing, or it is not upright."""

@@ -114,7 +114,7 @@ def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
         open_recording(f"replay://{path}")
 
 
-def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
+def test_what_is_not_a_bag_is_refused(tmp_path: Path) -> None:
     """The path is missing, an empty folder, or another file."""
     (tmp_path / "notes.txt").write_text("hello")
     (tmp_path / "torn.mcap").write_bytes(b"\x89MCAP0\r\n")

@@ -99,12 +99,13 @@ class SafetyStops:
             if not latched:
                 self._reporter.notify([f"e-stop latched by {by}"])
             self._policy.latch(now)
-            self._task.give_up("the e-stop was latched meanwhile")
+            self._task.give_up("the e-stop was latched during the request")
             if self._mode_manager.phase is CLOSED:
                 return "e-stop latched; the port is not open; the stop will be sent when it opens"
             if missing := self._reporter.missing:
                 return (
-                    f"e-stop latched; {missing}: the driver sends the stop on the other lines only"
+                    f"e-stop latched; {missing}: the driver sends the stop on the other lines only;"
+                    " cut the motor power if the robot moves"
                 )
             if self._board.mode is Mode.UNKNOWN:
                 return (

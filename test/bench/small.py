@@ -23,7 +23,7 @@ PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
 """Parts of one core that driver and floor get, each for itself."""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
-"""How long a group runs in each of its periods, in s: the shortest that the kernel permits."""
+"""Processor time in s that a cgroup gets per period; the kernel permits no less."""
 CGROUP: Final = Path("/sys/fs/cgroup")
 NAMES: Final = ("ours", "floor")
 RELAY: Final = "measurements"

@@ -55,7 +55,7 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
     assert odometry.refused_poses == 1
 
 
-def test_a_board_that_was_paused_is_no_doubt_where_the_odometry_begins() -> None:
+def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
     """The duration of the first displacement is unknown, but it cannot add any uncertainty yet."""
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
@@ -206,7 +206,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """Each such change makes goals in the old frame invalid."""
+    """Each change of the board's frame makes goals in the old frame invalid."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
     counted = [odometry.alignments]

@@ -154,7 +154,7 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
     assert bench.robot.stands
 
 
-def test_what_is_no_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
+def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
     """The previous command stays active."""
     bench.drive_on()
     with pytest.raises(CommandRefused, match="NaN or infinity"):

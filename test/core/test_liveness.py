@@ -53,7 +53,7 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
     assert liveness.wake_at(driven=False) == 14.0
 
 
-def test_a_stall_is_no_silence_of_the_board(liveness: Liveness) -> None:
+def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
     """After a stall the board has its full time again, since its data may wait to be read."""
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)

@@ -99,7 +99,7 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     assert "config/<board>.yaml" in ended.stdout
 
 
-def test_help_that_is_not_read_to_its_end_is_no_error() -> None:
+def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
     """A pager that is closed early is one example."""
     reading, writing = os.pipe()
     os.close(reading)

@@ -121,7 +121,7 @@ def test_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "give the folder of a bag" in refused(tmp_path / "nothing", capsys)
 
 
-def test_what_is_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_not_a_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The cases are a folder without a bag, a text file, and broken MCAP and SQLite files."""
     (tmp_path / "folder").mkdir()
     assert "neither metadata.yaml nor" in refused(tmp_path / "folder", capsys)

@@ -53,7 +53,7 @@ def test_a_long_gap_is_worse(drive: Drive) -> None:
     assert said(drive, "Gaps", "odom", "1 gap").level is Level.BAD
 
 
-def test_a_pause_is_no_gap(drive: Drive) -> None:
+def test_a_pause_is_not_a_gap(drive: Drive) -> None:
     """The driver's state explains the missing messages."""
     drive.states += [(16.9, "paused"), (18.0, "nominal")]
     drive.imu.drop(17.0, 18.0)
@@ -62,7 +62,7 @@ def test_a_pause_is_no_gap(drive: Drive) -> None:
     assert "paused for 1.1 s" in said(drive, "State", "ominal").text
 
 
-def test_a_lost_board_is_told_and_is_no_gap_besides(drive: Drive) -> None:
+def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
     """State and streams show the same event, so it is reported once."""
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
@@ -70,7 +70,7 @@ def test_a_lost_board_is_told_and_is_no_gap_besides(drive: Drive) -> None:
     assert [finding.subject for finding in troubles(drive)] == ["State"]
 
 
-def test_the_end_of_the_driver_is_no_lost_board(drive: Drive) -> None:
+def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
     """A driver that ends publishes ``disconnected`` last, and then nothing more."""
     drive.states.append((19.5, "disconnected"))
     assert not troubles(drive)
@@ -114,7 +114,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
     ]
 
 
-def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
+def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
     """In the complete log every second reading is missing."""
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.imu, name, getattr(drive.imu, name)[::2])
@@ -180,7 +180,7 @@ def test_nothing_but_nan_is_told(drive: Drive) -> None:
     assert {finding.subject for finding in troubles(drive)} == {"IMU", "Odometry", "Commands"}
 
 
-def test_what_an_estop_refuses_is_no_trouble(drive: Drive) -> None:
+def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
     """The driver warns of each refused command; only other refusals are reported."""
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))

@@ -77,14 +77,14 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     assert said(drive, "IMU", "gyro measured 1.000 times").level is Level.GOOD
 
 
-def test_a_gap_in_the_odometry_is_no_rest(drive: Drive) -> None:
+def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
     """The robot turns during the gap, so those gyro readings are not a bias."""
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
-def test_an_even_turn_is_no_rest_without_odometry(drive: Drive) -> None:
-    """Rest is then found from the IMU alone, where a steady turn looks like a bias."""
+def test_without_odometry_an_even_turn_is_not_taken_for_rest(drive: Drive) -> None:
+    """Rest is detected from the IMU alone, where a steady turn looks like a bias."""
     drive.odom.drop(0.0, 99.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
@@ -150,7 +150,7 @@ def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
     assert said(drive, "Commands", "without a command").level is Level.WARN
 
 
-def test_an_estop_is_noted_and_what_it_stops_is_no_trouble(drive: Drive) -> None:
+def test_an_estop_is_noted_and_what_it_stops_is_not_trouble(drive: Drive) -> None:
     """Commands continue while the e-stop keeps the robot at rest."""
     drive.estops += [(10.0, True), (19.0, False)]
     rows = drive.odom.stamp_s > 10.1
@@ -178,7 +178,7 @@ def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
     assert "by 0.50 m" in leap.text
 
 
-def test_a_reset_of_the_odometry_is_noted_and_is_no_way(drive: Drive) -> None:
+def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None:
     """The pose begins again at zero; the jump is not added to the distance."""
     way = said(drive, "Odometry", "Driven").text.split(",")[0]
     drive.odom.values[450:, :3] = 0.0

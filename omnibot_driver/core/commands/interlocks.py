@@ -66,7 +66,7 @@ class Interlocks:
             return f"the board is {mode.value}{hint}"
         unheard_s = self._liveness.unheard_s
         if not stands and now - self._liveness.heard_at >= unheard_s:
-            return f"no data from the board for {unheard_s:g} s"
+            return f"no data from the board for {unheard_s:g} s; check its power and cable"
         if not stands and (refusal := self._board.refusal):
             return refusal
         return tripped

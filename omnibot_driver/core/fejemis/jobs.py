@@ -131,7 +131,7 @@ class Jobs:
         if self.powering_off:
             self._stay_on(SAID)
         if self.job is Job.POWER_OFF:
-            self.cancel("a start has cancelled it")
+            self.cancel("~/start has cancelled it; the power stays on")
         self.powering_off = False
 
     def begin(self) -> None:

@@ -283,7 +283,7 @@ class LoisConversation:
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Send a command that may be repeated, until it has surely arrived."""
+        """Send a command several times, as lines are lost; repeating it must be harmless."""
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:

@@ -23,8 +23,8 @@ class StreamStatistics:
 
     All values only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    ``imu_period_s``: period of the IMU readings in s, if the board sends them and displacements at
-    the pace of one clock; a lost displacement then means lost IMU readings too. Otherwise None.
+    ``imu_period_s``: period of IMU readings in s if one clock of the board paces both IMU readings
+    and displacements, so that a lost displacement means lost IMU readings; otherwise None.
     """
 
     imu_period_s: float | None = None

@@ -22,7 +22,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s without a set-point after which a robot is not driven any more."""
+"""Time in s without a set-point after which the robot is treated as not driven."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15

@@ -217,7 +217,7 @@ class OmniBot:
         """Do nothing: the board does not have a command that resets only its odometry."""
 
     def leave(self) -> None:
-        """Do nothing when the driver ends: ``due`` returns no packets that could be left out."""
+        """Do nothing: this board has no periodic packets to end before the driver ends."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Return the stream that encodes commands and repeats their frames."""

@@ -128,10 +128,10 @@ class CommandEncoder:
             )
         if any(map(begins_with_a_letter, nearest(*counts))):
             raise CommandRefused(
-                f"cmd_pose refused: in the board's own frame the goal is x {pose.x_m:.2f} m, y"
-                f" {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and a damaged line could turn one"
-                " of these numbers into a command to start, pause or reset the board: choose"
-                " another goal, or call ~/reset to begin a new frame at the robot's position"
+                f"cmd_pose refused: the goal (in the board's own frame: x {pose.x_m:.2f} m, y"
+                f" {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad) has a byte that a damaged line"
+                " could turn into a start, pause or reset; choose another goal, or call ~/reset to"
+                " begin a new frame at the robot's position"
             )
         return ZEROS_BEFORE_MOTION + frames.command(frames.VELOCITY_MODE, *harmless(counts))
 

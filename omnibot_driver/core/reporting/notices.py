@@ -32,7 +32,10 @@ STOP_BLIND: Final = (
     "stop unconfirmed: the board does not measure its wheels after this command; check by eye"
     " that the robot has stopped (reported once)"
 )
-STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
+STOP_UNANSWERED: Final = (
+    "stop unconfirmed: the board is not responding; if the robot moves, cut its motor power; then"
+    " check cable and power"
+)
 STOP_UNMEASURED: Final = (
     "stop unconfirmed: no odometry frames from the board; check by eye that the robot has stopped,"
     " and check cable and hub"

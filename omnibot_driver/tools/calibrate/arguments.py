@@ -269,7 +269,8 @@ SUBCOMMANDS: Final = {
         _geometry,
     ),
     "step": (
-        "response of each wheel to a step, its motor, better gains; wheels off the ground",
+        "each wheel's response to a step; computes its motor and better gains; wheels off the"
+        " ground",
         _step,
     ),
 }

@@ -92,8 +92,7 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     square_rad = math.atan2(float(level @ np.cross(forward, left)), float(forward @ left))
     if abs(square_rad - math.pi / 2) > SQUARE_RAD:
         raise Contradiction(
-            "the tilts of the two raised sides should be 90° apart, and are"
-            f" {math.degrees(square_rad):.0f}°: repeat both tilts"
+            f"the two tilts point {math.degrees(square_rad):.0f}° apart instead of 90°: repeat both"
         )
     body = np.array(
         [
@@ -117,8 +116,8 @@ def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
         raise Contradiction(f"it was turned by {math.degrees(turn_rad):.0f}° only")
     if turn_rad < 0:
         raise Contradiction(
-            f"by gyro and gravity together it was turned to the right, by"
-            f" {-math.degrees(turn_rad):.0f}°"
+            f"gyro and gravity show a turn to the right by {-math.degrees(turn_rad):.0f}°: turn the"
+            " robot to the left"
         )
     return turn_rad
 

@@ -174,7 +174,7 @@ def _gravity(force: Array) -> Iterator[Finding]:
                 Level.WARN,
                 "IMU",
                 f"{figure}.",
-                "Put the robot on level ground; if it was, set imu_rpy in the description.",
+                "Put the robot on level ground. If it was level, set imu_rpy in the description.",
             )
         else:
             yield Finding(Level.GOOD, "IMU", f"{figure}.")

@@ -79,7 +79,8 @@ def judge(log: Log) -> Iterator[Finding]:
             Level.BAD,
             "Odometry",
             f"{counted(broken, 'message')} of odom with NaN or infinity.",
-            "This driver publishes none: find out who else publishes odom.",
+            "This driver never publishes them: find the other publisher"
+            " (ros2 topic info --verbose odom).",
         )
     if len(odom) < 2:
         return

@@ -163,7 +163,7 @@ def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     )
 
 
-def test_an_acceleration_of_zero_is_no_limit() -> None:
+def test_an_acceleration_of_zero_is_not_a_limit() -> None:
     """The value 0 switches the limit off."""
     wanted = BodyTwist(0.5, -0.5, 0.5)
     assert SpeedLimits().approach(BodyTwist(-0.5, 0.5, -0.5), wanted, 0.0) == wanted

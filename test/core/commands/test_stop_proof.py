@@ -60,7 +60,7 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
     assert proof.takes_s < 4.0  # the long displacement is taken for a gap
 
 
-def test_one_displacement_alone_is_no_proof_however_long_it_is(proof: StopProof) -> None:
+def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopProof) -> None:
     """Boards with a ``delta_period`` of 0.1 s may send such long displacements."""
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
@@ -111,7 +111,7 @@ def test_a_robot_that_moves_is_not_proved_to_stand(
     assert not proof.proved
 
 
-def test_a_displacement_of_unknown_duration_is_no_evidence(proof: StopProof) -> None:
+def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) -> None:
     """The first displacement after a pause includes all motion since the pause began."""
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)

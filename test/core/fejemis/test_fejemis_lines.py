@@ -134,7 +134,7 @@ def test_every_message_is_understood(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", DAMAGED)
-def test_what_no_board_says_is_no_message(text: str) -> None:
+def test_what_no_board_sends_is_not_a_message(text: str) -> None:
     """Lines with too few fields, implausible numbers or unknown keywords are rejected."""
     assert parse(text) is None
 

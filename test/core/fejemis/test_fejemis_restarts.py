@@ -195,7 +195,7 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
 
 
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
-def test_a_stall_of_the_computer_is_no_long_suspicion(stall_s: float) -> None:
+def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
     """All lines of the stall come in one read; the next heartbeat ends the suspicion."""
     bench = nominal()
     bench.run(2.0)

@@ -183,7 +183,7 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
     assert clock.host_s(10.18) == pytest.approx(100.2, abs=0.01)
 
 
-def test_what_waited_while_the_host_was_stalled_is_no_restart() -> None:
+def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
     """Lines of a board that did not restart arrive all at once, but their times increase."""
     clock = TeensyClock()
     for n in range(100):

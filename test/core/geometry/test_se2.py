@@ -29,7 +29,7 @@ def test_unroll_and_roll_are_inverse(displacement: Pose) -> None:
 
 
 @pytest.mark.parametrize("turn", [0.0, 5e-324, 1e-300, -1e-300, 1e-9, -1e-9])
-def test_a_turn_of_almost_nothing_is_no_trouble(turn: float) -> None:
+def test_a_turn_of_almost_nothing_is_not_trouble(turn: float) -> None:
     """A turn near zero causes neither a division by zero nor a loss of digits."""
     assert xyyaw(roll(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)
     assert xyyaw(log_of(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)

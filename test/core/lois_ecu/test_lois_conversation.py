@@ -222,7 +222,7 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
         (b"hello world\n", "line of this board"),
     ],
 )
-def test_what_is_no_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
+def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
     """One notice names the likely cause, and the first valid line clears the notice."""
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []

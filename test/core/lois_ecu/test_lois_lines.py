@@ -147,7 +147,7 @@ def test_odometry_behind_ticks_is_told_by_its_length() -> None:
     ]
 
 
-def test_a_velocity_that_is_no_number_is_reported_as_such() -> None:
+def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
     """The velocity is reported as missing; the pose in the same report stays valid."""
     decoder = LoisDecoder()
     lines = encode_report(BoardOdometry(1.0, 2.0, 3.0, math.nan, math.inf, -math.inf))
@@ -207,7 +207,7 @@ def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
 
 
 @given(st.binary(max_size=20))
-def test_what_is_no_line_is_refused_by_name(data: bytes) -> None:
+def test_what_is_not_a_line_is_refused_by_name(data: bytes) -> None:
     """Any bytes are decoded or raise FrameError, never another exception."""
     with suppress(FrameError):
         decode_command(data)

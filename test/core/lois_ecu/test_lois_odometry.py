@@ -220,7 +220,7 @@ def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_sa
     assert last.pose.x_m == pytest.approx(82 * ours.tick_m, abs=0.04)
 
 
-def test_a_velocity_that_is_no_number_is_no_speed() -> None:
+def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
     """The velocity is ignored, and the heading in the same report is used."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(-20, -20), 0.0)

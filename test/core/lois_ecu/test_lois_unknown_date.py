@@ -58,7 +58,7 @@ class GpsRig(Rig):
 
 
 @WORKS
-def test_a_position_without_a_date_is_no_fix(quirks: Quirks) -> None:
+def test_a_position_without_a_date_is_not_a_fix(quirks: Quirks) -> None:
     """The GPS reports a position, and zeros as its date. Then it reports a date, too."""
     rig = GpsRig(quirks)
     rig.run(8.0)

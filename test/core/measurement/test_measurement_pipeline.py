@@ -95,7 +95,7 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
     assert "in this computer" in loss
 
 
-def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> None:
+def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
     """The robot rolled out without reports; its twist is unknown once, then zero."""
     bench.drive(0.5)
     bench.run(0.4)

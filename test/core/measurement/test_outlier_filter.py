@@ -104,7 +104,7 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 
 @pytest.mark.parametrize("across", [0.0, 0.05, -0.3])
 @pytest.mark.parametrize("knock", [12.0, -7.0, 5.6, -4.2])
-def test_a_knock_of_one_reading_that_is_no_bit_comes_out_at_once(
+def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
     """A knock that is short, or on a single axis, is not suspicious."""

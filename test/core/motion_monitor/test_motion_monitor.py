@@ -230,7 +230,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
     assert len(times) == 6
 
 
-def test_how_a_stopped_robot_rolls_out_is_no_second_fault() -> None:
+def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
     """The motion before Stop can have arrived is not a fault either."""
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)

@@ -49,7 +49,7 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
     assert xyyaw(lost) == pytest.approx((0.02 * missing, 0.01 * missing, 0.1 * missing))
 
 
-def test_what_took_an_unknown_time_is_no_side_of_a_gap() -> None:
+def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
     """The displacement may include all motion of a pause; the next one is used to fill the gap."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)

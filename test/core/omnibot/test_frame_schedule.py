@@ -36,7 +36,7 @@ def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
 
-def test_a_damaged_pose_is_no_imu_frame() -> None:
+def test_a_damaged_pose_is_not_an_imu_frame() -> None:
     """The damaged pose has 15 bytes, which is close to the 14 bytes of an IMU frame."""
     rhythm = nominal(0)
     for _ in range(5):

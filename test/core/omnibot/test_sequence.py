@@ -28,7 +28,7 @@ def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
 
 
 @given(counts, st.floats(0.0, 5.0))
-def test_the_next_count_is_no_gap_however_late_it_comes(count: int, late_s: float) -> None:
+def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
     """A host that hangs for up to five seconds does not lose a delta by that."""
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
@@ -62,7 +62,7 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
 @pytest.mark.parametrize("imus", [0, 4])
 @pytest.mark.parametrize("drift", [-0.01, 0.01])
 @pytest.mark.parametrize("elapsed_s", [20.0, 120.0, 400.0])
-def test_a_long_gap_of_a_board_whose_clock_drifts_is_no_restart(
+def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
     elapsed_s: float, drift: float, imus: int
 ) -> None:
     """The TTL side is unplugged, and the board's clock is 1 % slow or fast."""
@@ -140,7 +140,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
             assert sequence.pose(count // 2, count * 0.04) == Step(0)
 
 
-def test_a_pose_counter_that_begins_anew_is_no_gap() -> None:
+def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
     """A gap of this size would be longer than the time since the last delta."""
     sequence = Sequence()
     for count in range(25):
@@ -157,7 +157,7 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
     assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)
 
 
-def test_a_count_that_comes_again_is_no_wrap() -> None:
+def test_a_count_that_comes_again_is_not_a_wrap() -> None:
     """The first delta is false and came too early; the true one has the same count."""
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)

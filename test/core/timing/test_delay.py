@@ -20,7 +20,7 @@ def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
     assert 0.0 <= tally.squared_delay_s2 < tally.reads * TICK_S**2
 
 
-def test_a_pause_is_no_delay() -> None:
+def test_a_pause_is_not_a_delay() -> None:
     """The time since the last measurement is not a delay."""
     bench = Bench()
     bench.open()

@@ -63,7 +63,7 @@ def test_a_flip_changes_one_bit_and_no_length() -> None:
 
 
 @pytest.mark.parametrize("rate", ["-0.1", "1.1", "nan", "often"])
-def test_a_rate_that_is_no_chance_is_refused(rate: str) -> None:
+def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
     """The error message gives the range before anything starts."""
     for name, toy in (("lose", toy_lines), ("flip", toy_lines), ("duplicate", toy_udp)):
         with pytest.raises(options.OptionError, match="give a number from 0 to 1"):

@@ -136,7 +136,7 @@ def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key
     assert len([number for number, _ in rig.run(1.05) if number == port]) >= 10
 
 
-def test_help_is_a_flood_of_text_that_is_no_comment() -> None:
+def test_help_is_a_flood_of_text_without_comment_marks() -> None:
     """Each half prints the text of the manual, so a host receives many lines without ``#``."""
     rig = Rig().booted()
     drive, front = rig.ask(DRIVE, "help"), rig.ask(FRONT, "help")

@@ -12,7 +12,7 @@ TEST = Path(__file__).parents[2]
 ANSWERS: dict[str, str] = {
     "ticks_of_forward_targets": "test_standstill_is_proved_where_ticks_count",
     "odometry_stands_at_equal_speeds": "test_the_boards_own_odometry_would_be_wrong",
-    "velocity_may_be_nan": "test_a_velocity_that_is_no_number_is_no_speed",
+    "velocity_may_be_nan": "test_a_velocity_that_is_not_a_number_is_not_a_speed",
     "sign_of_command": "test_hard_steering_to_both_sides_is_followed",
     "keeps_speed_of_stalled_wheel": (
         "test_without_clearing_a_slower_start_fails_on_the_public_firmware"

@@ -152,7 +152,7 @@ def test_an_idle_gap_ends_half_a_frame() -> None:
     assert understood(short, "50", kind=IDLE_GAP) == [PAUSE]
 
 
-def test_a_pause_of_less_than_five_milliseconds_is_no_idle_gap() -> None:
+def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
     """The receiver continues to count, because bytes may be late."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     false = [ControlFrame(0x02, (0, 0, 255))]
