@@ -92,7 +92,7 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
     bag = write(tmp_path / "bag", [one, other])
     with pytest.raises(ToolError, match=r"--namespace, of /fleet/robot2, /robot1"):
         log_of(bag)
-    with pytest.raises(ToolError, match="no robot in the namespace /robot3; choose .* /fleet"):
+    with pytest.raises(ToolError, match=r"no robot in the namespace /robot3; choose .* /fleet"):
         log_of(bag, "robot3")
     for drive in (one, other):
         log = log_of(bag, drive.namespace[1:])
