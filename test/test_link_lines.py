@@ -126,7 +126,8 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
     assert lines.link.figures()[0].trouble == report
     answer = lines.link.call(lambda session, now: session.estop(True, now))
     assert answer.endswith(
-        "the line 'sense' is missing: the driver sends the stop on the other lines only"
+        "the line 'sense' is missing: the driver sends the stop on the other lines only; cut the"
+        " motor power if the robot moves"
     )
     lines.drive.read_until(20 * STOPS)
 
