@@ -1,0 +1,128 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of absences: a server that is restarted or lost gets no motion before it is ready."""
+
+import pytest
+from mart_bench import MartBench
+from mart_campaign import FIRMWARES
+
+from omnibot_driver.simulator.common.network import NetworkFaults
+from omnibot_driver.simulator.mart import Firmware
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("motion", "firmware", "boot_s"),
+    [((0.3, 0.1), "source", 0.3), ((0.3, 0.1), "firmware", 5.0), ((-0.2, 0.0), "source", 5.0)],
+)
+def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
+    motion: tuple[float, float], firmware: Firmware, boot_s: float
+) -> None:
+    """Its IMU is back, so it ends the old motion, but its stop port still awaits that end.
+
+    The next RM would never be answered, and nothing would stop it. A restart shows by a heading of
+    zero, or by a long silence.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(*motion, 2.5)
+    bench.server.imu.alive = False
+    bench.command(*motion, 3.0)
+    bench.run(7.0)
+    assert any(notice.startswith("server lost: ") for notice in bench.notices)
+    bench.server.imu.alive = True
+    bench.run(5.0)
+    assert bench.robot.board.facts["stop_port_hung"]
+    way_m = bench.server.chassis.way_m
+    assert "restart the server" in bench.try_command(0.3, 0.0)
+    bench.command(0.3, 0.0, 5.0)
+    assert bench.server.chassis.way_m == way_m
+    bench.server.restart(boot_s)
+    bench.run(boot_s + 5.0)
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("wanted", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)])
+@pytest.mark.parametrize("boot_s", [0.3, 1.0, 4.0])
+def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
+    wanted: tuple[float, float], boot_s: float
+) -> None:
+    """Voltage queries and motions would crash the server.
+
+    The robot, whose motors the restart did not stop, is stopped.
+    """
+    for offset_s in (0.0, 0.23, 0.46, 0.71):
+        bench = MartBench().ready()
+        bench.command(*wanted, 2.0 + offset_s)
+        bench.server.restart(boot_s)
+        bench.command(*wanted, 1.5)
+        bench.command(0.0, 0.0, 10.0)
+        assert not bench.server.crashed, (offset_s, bench.server.crashed)
+        assert bench.robot.stands
+        assert bench.session.state == "nominal"
+        bench.command(*(wanted if any(wanted) else (0.3, 0.0)), 3.0)
+        assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(seed: int) -> None:
+    """HELLO is sent when replies are missing, so a motion begins soon after its command."""
+    bench = MartBench("source", NetworkFaults(lose=0.1), seed=seed).ready()
+    appeared = set()
+    for _ in range(300):
+        bench.run(0.1)
+        appeared.add(bench.board._pilot.appeared_s)
+    assert len(appeared) <= 3
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.02, 0.05, 0.1])
+def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_soon(
+    after_s: float,
+) -> None:
+    """The check is not answered. The absence shows that the server was restarted."""
+    bench = MartBench().ready()
+    bench.run_until(lambda: bench.try_command(0.0, 0.5) or b"RST IMU" in bench.said()[-1:], 2.0)
+    bench.run(after_s)
+    bench.server.restart(1.0)
+    bench.command(0.0, 0.5, 6.0)
+    assert not bench.server.crashed
+    assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize(("x_m", "y_m"), [(3.0, 0.0), (0.0, 3.0)])
+@pytest.mark.parametrize("boot_s", [0.3, 3.0])
+def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
+    boot_s: float, x_m: float, y_m: float, firmware: Firmware
+) -> None:
+    """The motors keep their last command. A move of 3 m would be awaited for a minute."""
+    bench = MartBench(firmware).ready()
+    bench.go_to(x_m, y_m, 0.0)
+    bench.run_until(lambda: not bench.robot.stands, 5.0)
+    bench.run(0.6)
+    bench.server.restart(boot_s)
+    assert not bench.robot.stands
+    bench.run(boot_s)
+    assert bench.until_it_stands() < 5.0
+    bench.run(8.0)
+    assert bench.robot.stands
+    assert not bench.server.crashed
+    assert any("knows of no motion" in notice for notice in bench.notices)
+    assert not any("unconfirmed" in notice for notice in bench.notices)
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
+    firmware: Firmware,
+) -> None:
+    """The restart erased the speed set by SSP, and L without a speed never starts."""
+    bench = MartBench(firmware).ready()
+    for _ in range(3):
+        bench.command(0.0, 0.5, 3.0)
+        bench.run(2.0)
+    bench.server.restart()
+    bench.command(0.0, 0.5, 6.0)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
