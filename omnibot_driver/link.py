@@ -102,10 +102,15 @@ class Link:
         return self._shared.call(action)
 
     def command(
-        self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
+        self,
+        action: Callable[[Session, T, float], None],
+        wish: T,
+        sent_ns: Sequence[int],
+        *,
+        moves_base: bool = True,
     ) -> None:
-        """Pass a motion command to the session; see ``SharedSession.command``."""
-        self._shared.command(action, wish, sent_ns)
+        """Pass a command to the session; see ``SharedSession.command``."""
+        self._shared.command(action, wish, sent_ns, moves_base=moves_base)
 
     @property
     def reconnect_interval_s(self) -> float:

@@ -6,7 +6,6 @@ Nothing is computed here. Measurements are published by the link's reader thread
 executor sleeps unless a timer, a message, a service call or a parameter wakes it.
 """
 
-import contextlib
 import math
 import time
 import traceback
@@ -23,8 +22,8 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float32MultiArray
 
 from omnibot_driver import boards, cdr, declaration, messages, parameters, selfcheck
+from omnibot_driver.command_topics import Action, obeying
 from omnibot_driver.core.commands.set_points import Authority
-from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.reporting.figures import Refusals
 from omnibot_driver.core.session import Session
 from omnibot_driver.diagnostics import Diagnostics
@@ -34,12 +33,8 @@ from omnibot_driver.qos import DEEP
 from omnibot_driver.recording import is_recording, open_recording
 from omnibot_driver.replay import Replay
 from omnibot_driver.services import Services
-from omnibot_driver.stall_detector import boot_time_ns
-from omnibot_driver.transit import Arrival, Transit
 
 LOOK_EVERY_S = WARN_EVERY_S = 2.0
-MessageInfo = dict[str, int]
-Action = Callable[[Session, Any, float], None]
 
 
 class OmniBotDriver(Node):
@@ -202,33 +197,10 @@ class OmniBotDriver(Node):
         *,
         may_be_old: Callable[[Any], bool] = lambda _message: False,
     ) -> Callable[..., None]:
-        """Return a callback that passes each message to ``action``; the link reports a refusal.
+        def expires_s() -> float:
+            return float(self._values["cmd_vel_timeout"])
 
-        ``may_be_old`` returns True for a message whose transit time does not matter.
-        """
-        transit = Transit()
-
-        def callback(message: Any, info: MessageInfo) -> None:
-            longest_s = self._values["cmd_vel_timeout"]
-            now_ns = time.time_ns()
-            arrival = Arrival(
-                sent_ns=info["source_timestamp"],
-                received_ns=info["received_timestamp"],
-                now_ns=now_ns,
-                steady_ns=boot_time_ns(),
-                number=info.get("publication_sequence_number"),
-            )
-            delay = transit.delay(arrival, longest_s)
-
-            def obey(session: Session, message: Any, now: float) -> None:
-                if not may_be_old(message):
-                    delay.require(topic, longest_s)
-                action(session, message, now)
-
-            with contextlib.suppress(CommandRefused):
-                self._link.command(obey, message, delay.sent_ns)
-
-        return callback
+        return obeying(self._link, topic, action, expires_s, may_be_old=may_be_old)
 
     def _twist_stamped(self, session: Session, stamped: TwistStamped, now: float) -> None:
         age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)

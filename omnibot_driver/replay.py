@@ -88,9 +88,14 @@ class Replay:
         return False
 
     def command(
-        self, action: Callable[[Session, T, float], None], wish: T, _sent_ns: Sequence[int]
+        self,
+        action: Callable[[Session, T, float], None],
+        wish: T,
+        _sent_ns: Sequence[int],
+        *,
+        moves_base: bool = True,
     ) -> None:
-        """Pass the motion command ``wish`` to the session by ``call``; it moves no robot."""
+        """Pass the command ``wish`` to the session by ``call``; it moves no robot."""
         self.call(lambda session, now: action(session, wish, now))
 
     def close(self, _on_exit: OnExit) -> bool:

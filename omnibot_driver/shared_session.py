@@ -84,13 +84,19 @@ class SharedSession:
             self.outbox.hand_over()
 
     def command(
-        self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
+        self,
+        action: Callable[[Session, T, float], None],
+        wish: T,
+        sent_ns: Sequence[int],
+        *,
+        moves_base: bool = True,
     ) -> None:
         """Pass ``wish``, the motion that a sender wants, to the session by ``action``.
 
-        ``sent_ns``: the possible times of day, in ns, at which the command was sent. Raises
-        CommandRefused for a wish that waited while this process was stalled. Each refusal is also
-        delivered, in its place among the events, unless the outbox is full.
+        ``sent_ns``: the possible times of day, in ns, at which the command was sent.
+        ``moves_base``: the motion is that of the base, so a refusal concerns the motion interlock.
+        Raises CommandRefused for a wish that waited while this process was stalled. Each refusal is
+        also delivered, in its place among the events, unless the outbox is full.
         """
         try:
             with self.lock:
@@ -103,7 +109,8 @@ class SharedSession:
                         raise CommandRefused(WAITED)
                     action(self.session, wish, now)
                 except CommandRefused as error:
-                    self.session.interlocks.refused(now)
+                    if moves_base:
+                        self.session.interlocks.refused(now)
                     if not self.outbox.full:
                         self.outbox.put(partial(self._refused, str(error)))
                     raise

@@ -17,6 +17,7 @@ from std_msgs.msg import ColorRGBA, Float32, Header
 from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import declaration, messages
+from omnibot_driver.command_topics import obeying
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis import (
     BatteryReading,
@@ -84,7 +85,7 @@ class FejemisTopics:
                 qos_profile=DEEP,
             )
         node.create_service(SetBool, "~/brush", self._on_brush, qos_profile=DEEP)
-        node.create_subscription(Float32, "lift_cmd", self._on_lift, 1)
+        node.create_subscription(Float32, "lift_cmd", self._lift(link), 1)
         node.create_subscription(ColorRGBA, "led_cmd", self._on_led, 1)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -208,12 +209,23 @@ class FejemisTopics:
         response.message = trouble or sent
         return response
 
-    def _on_lift(self, message: Float32) -> None:
-        volts = message.data
-        if not math.isfinite(volts):
-            self._warn("lift_cmd rejected: contains NaN or infinity; fix the publishing node")
-            return
-        self._try("lift_cmd", lambda services, now: services.lift(volts, now), off=volts == 0.0)
+    def _lift(self, link: Any) -> Callable[..., None]:
+        """Return the callback of ``lift_cmd``; 0 V is obeyed at any age and in any state."""
+
+        def lift(session: Session, message: Float32, now: float) -> None:
+            board = cast(FejemisBoard, session.board)
+            if message.data and (why := _why_not_connected("lift_cmd", session)):
+                raise CommandRefused(why)
+            board.services.lift(message.data, now)
+
+        return obeying(
+            link,
+            "lift_cmd",
+            lift,
+            lambda: float(self._values["cmd_vel_timeout"]),
+            may_be_old=lambda message: message.data == 0.0,
+            moves_base=False,
+        )
 
     def _on_led(self, message: ColorRGBA) -> None:
         parts = (message.r, message.g, message.b)
@@ -221,12 +233,9 @@ class FejemisTopics:
             self._warn("led_cmd rejected: contains NaN or infinity; fix the publishing node")
             return
         red, green, blue = (round(255 * max(0.0, min(1.0, part * message.a))) for part in parts)
-        self._try("led_cmd", lambda services, now: services.set_led(red, green, blue, now))
-
-    def _try(
-        self, what: str, action: Callable[[Services, float], None], *, off: bool = False
-    ) -> None:
-        if trouble := self._say(what, action, off=off):
+        if trouble := self._say(
+            "led_cmd", lambda services, now: services.set_led(red, green, blue, now), off=False
+        ):
             self._warn(trouble)
 
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
@@ -236,12 +245,11 @@ class FejemisTopics:
         """
 
         def say(session: Session, now: float) -> str:
-            board = cast(FejemisBoard, session.board)
-            if not off and session.state in ("disconnected", "connecting"):
-                return f"{what} refused: {board.refusal or NOT_CONNECTED}"
+            if not off and (why := _why_not_connected(what, session)):
+                return why
             try:
-                action(board.services, now)
-            except (CommandRefused, RequestRefused) as error:
+                action(cast(FejemisBoard, session.board).services, now)
+            except RequestRefused as error:
                 return str(error)
             return ""
 
@@ -250,6 +258,13 @@ class FejemisTopics:
 
     def _warn(self, text: str) -> None:
         self._node.get_logger().warning(text, throttle_duration_sec=WARN_EVERY_S)
+
+
+def _why_not_connected(what: str, session: Session) -> str:
+    """Return why ``what`` is refused as the boards are not connected; empty if they are."""
+    if session.state in ("disconnected", "connecting"):
+        return f"{what} refused: {session.board.refusal or NOT_CONNECTED}"
+    return ""
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:

@@ -13,6 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import declaration, messages
 from omnibot_driver.boards.lois_ecu_record_topics import Recorder
+from omnibot_driver.command_topics import obeying
 from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.lois_ecu import TerminalLine
@@ -83,9 +84,8 @@ class LoisEcuTopics:
             self._values["terminal_mode"] != "host",
         )
         if duty and self._duty is None:
-            self._duty = self._node.create_subscription(
-                Float32MultiArray, "duty_cmd", self._on_duty, 1
-            )
+            obey = obeying(self._link, "duty_cmd", self._drive, self._expires_s)
+            self._duty = self._node.create_subscription(Float32MultiArray, "duty_cmd", obey, 1)
         elif not duty and self._duty is not None:
             self._node.destroy_subscription(self._duty)
             self._duty = None
@@ -166,15 +166,12 @@ class LoisEcuTopics:
         response.message = message if response.success else NOT_HEARD
         return response
 
-    def _on_duty(self, message: Float32MultiArray) -> None:
-        duties = list(message.data)
-        try:
-            self._link.command(self._drive, duties, ())
-        except CommandRefused as error:
-            self._node.get_logger().warning(str(error), throttle_duration_sec=2.0)
+    def _expires_s(self) -> float:
+        return float(self._values["cmd_vel_timeout"])
 
-    def _drive(self, session: Session, duties: list[float], now: float) -> None:
+    def _drive(self, session: Session, message: Float32MultiArray, now: float) -> None:
         """Command duties in percent, as wheel rates that the board's settings turn into them."""
+        duties = list(message.data)
         require_finite("duty_cmd", duties)
         if len(duties) != 2:
             raise CommandRefused(

@@ -116,6 +116,23 @@ def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe
     assert not robot.do(lambda board: board.vehicle.brush or board.vehicle.lift.volts)
 
 
+def test_a_lift_command_that_waited_while_the_driver_was_stalled_is_refused(
+    robot: TwoPorts, driver: Driver, probe: Probe
+) -> None:
+    """The lift does not move, and the base still obeys the next command at once."""
+    probe.wait_for_state("nominal")
+    lift = probe.publisher(Float32, "lift_cmd")
+    driver.process.send_signal(signal.SIGSTOP)
+    robot.stands_for_good()
+    lift.publish(Float32(data=6.0))
+    driver.answers.clear()  # the probe does not publish it again
+    driver.process.send_signal(signal.SIGCONT)
+    driver.wait_for_line("motion command refused: it waited")
+    robot.stands_for_good()
+    assert robot.do(lambda board: board.vehicle.lift.height) == 0.0
+    moves_again(probe, robot)
+
+
 def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) -> None:
     """Commands continue, but the drive half gets ``stop`` and shows that in its heartbeat."""
     with driven(probe, robot):

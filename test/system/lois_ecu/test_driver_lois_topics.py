@@ -4,6 +4,7 @@
 has."""
 
 import math
+import signal
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -86,6 +87,25 @@ def test_duties_are_commanded_in_duty_mode_alone(
     ecu.wait_for(lambda board: not board.standing)
     probe.remove(timer)
     ecu.stands_for_good()
+
+
+def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """The first command of its sender, so nothing is known of the sender's clock."""
+    ecu = ecu_of("firmware", stack)
+    driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
+    driver.process.send_signal(signal.SIGSTOP)
+    ecu.stands_for_good()
+    publisher.publish(Float32MultiArray(data=[30.0, 30.0]))
+    driver.answers.clear()  # the probe does not publish it again
+    driver.process.send_signal(signal.SIGCONT)
+    driver.wait_for_line("motion command refused: it waited")
+    ecu.stands_for_good()
+    assert ecu.do(lambda board: board.truth.x_m) == 0.0
 
 
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(

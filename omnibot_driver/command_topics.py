@@ -1,0 +1,58 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Callbacks of topics that command the robot: they pass each message, with its age, to the link.
+
+A command that has expired in transit, or that was sent while this process was stalled, is refused.
+"""
+
+import contextlib
+import time
+from collections.abc import Callable
+from typing import Any
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.session import Session
+from omnibot_driver.stall_detector import boot_time_ns
+from omnibot_driver.transit import Arrival, Transit
+
+MessageInfo = dict[str, int]
+Action = Callable[[Session, Any, float], None]
+
+
+def obeying(
+    link: Any,
+    topic: str,
+    action: Action,
+    expires_s: Callable[[], float],
+    *,
+    may_be_old: Callable[[Any], bool] = lambda _message: False,
+    moves_base: bool = True,
+) -> Callable[[Any, MessageInfo], None]:
+    """Return a callback that passes each message to ``action``; the link reports a refusal.
+
+    ``expires_s`` returns the age in s at which a command expires. ``may_be_old`` returns True for a
+    message whose transit time does not matter. ``moves_base``: whether the commands move the base,
+    and not another part of the robot.
+    """
+    transit = Transit()
+
+    def callback(message: Any, info: MessageInfo) -> None:
+        longest_s, now_ns = expires_s(), time.time_ns()
+        arrival = Arrival(
+            sent_ns=info["source_timestamp"],
+            received_ns=info["received_timestamp"] or now_ns,  # some middleware does not tell it
+            now_ns=now_ns,
+            steady_ns=boot_time_ns(),
+            number=info.get("publication_sequence_number"),
+        )
+        delay = transit.delay(arrival, longest_s)
+
+        def obey(session: Session, message: Any, now: float) -> None:
+            if not may_be_old(message):
+                delay.require(topic, longest_s)
+            action(session, message, now)
+
+        with contextlib.suppress(CommandRefused):
+            link.command(obey, message, delay.sent_ns, moves_base=moves_base)
+
+    return callback
