@@ -24,7 +24,7 @@ from geometry_msgs.msg import (
     Vector3,
 )
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import Imu, JointState, Range
 from std_msgs.msg import Header, UInt8MultiArray
 
 from omnibot_driver.core.commands.limits import require_finite
@@ -38,6 +38,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.status import Status
 
 UNMEASURED_VARIANCE: Final = 1e6
+RADIATION: Final = {"ultrasound": Range.ULTRASOUND, "infrared": Range.INFRARED}
 """Variance of z, roll and pitch, which planar odometry lacks, and of an unknown twist."""
 SHORTEST_QUATERNION: Final = 1e-3
 MOST_TILT_RAD: Final = 0.1

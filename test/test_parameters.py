@@ -277,3 +277,10 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
     with pytest.raises(ParameterError, match=f"'{commanded}' .* above '{possible}'"):
         check_all({possible: 0.3})
     assert check_all({commanded: fastest + 0.5, possible: 9.0})
+
+
+def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
+    """Consumers would discard every measurement of such a sensor."""
+    table = boards.table_for({"board": "fejemis"})
+    with pytest.raises(ParameterError, match=r"'tof_minimum' \(3 m\) must be below 'tof_maximum'"):
+        table.check_all({"board": "fejemis", "tof_minimum": 3.0, "tof_maximum": 2.0})

@@ -199,6 +199,13 @@ SENSORS: Final = (
         high=1.0,
     ),
     Parameter(
+        "tof_type",
+        "infrared",
+        "",
+        "Type of the time-of-flight sensor in range/tof.",
+        choices=("ultrasound", "infrared"),
+    ),
+    Parameter(
         "tof_field_of_view",
         0.44,
         "rad",
@@ -222,12 +229,26 @@ SENSORS: Final = (
         low=0.1,
         high=20.0,
     ),
+    Parameter(
+        "sonar_type",
+        "ultrasound",
+        "",
+        "Type of the sonar in range/sonar.",
+        choices=("ultrasound", "infrared"),
+    ),
     Parameter("sonar_field_of_view", 0.5, "rad", "Field of view of the sonar.", low=0.01, high=3.0),
     Parameter(
         "sonar_minimum", 0.02, "m", "Smallest distance that the sonar measures.", low=0.0, high=20.0
     ),
     Parameter(
         "sonar_maximum", 4.0, "m", "Largest distance that the sonar measures.", low=0.1, high=20.0
+    ),
+    Parameter(
+        "ir_type",
+        "infrared",
+        "",
+        "Type of both infrared sensors in range/ir1 and range/ir2.",
+        choices=("ultrasound", "infrared"),
     ),
     Parameter(
         "ir_field_of_view",

@@ -40,12 +40,7 @@ STEERING_EVERY_NS: Final = 40_000_000
 """Shortest time between two published steering angles, in ns. The angle comes 66 times a second;
 joint states are for display."""
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
-RANGES: Final = {
-    "tof": Range.INFRARED,
-    "sonar": Range.ULTRASOUND,
-    "ir1": Range.INFRARED,
-    "ir2": Range.INFRARED,
-}
+RANGES: Final = ("tof", "sonar", "ir1", "ir2")
 SERVICES: Final = {
     "calibrate_gyro": Job.CALIBRATE_GYRO,
     "calibrate_accelerometer": Job.CALIBRATE_ACCELEROMETER,
@@ -167,7 +162,7 @@ class FejemisTopics:
         self._ranges[reading.name].publish(
             Range(
                 header=self._header(stamp_ns, f"range_{reading.name}_link"),
-                radiation_type=RANGES[reading.name],
+                radiation_type=messages.RADIATION[self._values[f"{kind}_type"]],
                 field_of_view=self._values[f"{kind}_field_of_view"],
                 min_range=nearest,
                 max_range=farthest,

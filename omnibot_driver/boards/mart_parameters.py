@@ -142,6 +142,13 @@ DRIVING: Final = (
 
 SENSORS: Final = (
     Parameter(
+        "range_type",
+        "ultrasound",
+        "",
+        "Type of both sonars in range/front and range/rear.",
+        choices=("ultrasound", "infrared"),
+    ),
+    Parameter(
         "range_field_of_view",
         0.5,
         "rad",

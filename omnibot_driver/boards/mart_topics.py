@@ -106,7 +106,7 @@ class MartTopics:
         publisher.publish(
             Range(
                 header=Header(stamp=messages.time_message(stamp_ns), frame_id=frame),
-                radiation_type=Range.ULTRASOUND,
+                radiation_type=messages.RADIATION[self._values["range_type"]],
                 field_of_view=self._values["range_field_of_view"],
                 min_range=self._values["range_minimum"],
                 max_range=self._values["range_maximum"],
@@ -162,24 +162,25 @@ class MartTopics:
         Returns whether it succeeded, and the message for the caller.
         """
         answer = Future()
-        directory = Path(self._values["record_directory"]).expanduser()
-        path = (directory / PurePosixPath(done.name).name).absolute()
 
         def save() -> None:
             try:
+                directory = Path(self._values["record_directory"]).expanduser()
                 directory.mkdir(parents=True, exist_ok=True)
+                path = (directory / PurePosixPath(done.name).name).absolute()
                 path.write_text(done.content.decode("latin-1"), encoding="utf-8")
-                answer.set_result("")
+                answer.set_result((True, str(path)))
             except Exception as error:  # the caller must get an answer
-                answer.set_result(str(error))
+                answer.set_result((False, str(error)))
             if self._node.executor is not None:
                 self._node.executor.wake()
 
         threading.Thread(target=save, name="omnibot-save", daemon=True).start()
-        if trouble := await answer:
-            return False, f"{done.message}; not saved: {trouble}"
+        saved, text = await answer
+        if not saved:
+            return False, f"{done.message}; not saved: {text}"
         _, _, more = done.message.partition("; ")
-        return True, f"{path}" + (f"; {more}" if more else "")
+        return True, text + (f"; {more}" if more else "")
 
     def _answer(self, done: JobDone, _stamp_ns: int) -> None:
         if isinstance(done.token, Future):

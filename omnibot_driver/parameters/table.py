@@ -170,7 +170,7 @@ def table(
     return Table(
         board,
         {title: rows for title, rows in sections.items() if rows},
-        (_require_two_frames, _require_possible_speeds, *checks),
+        (_require_two_frames, _require_possible_speeds, _require_ranges, *checks),
     )
 
 
@@ -191,6 +191,17 @@ def _require_two_frames(values: Mapping[str, Any]) -> None:
             "parameter 'odom_frame' must differ from 'base_frame', but both are"
             f" '{values['odom_frame']}'"
         )
+
+
+def _require_ranges(values: Mapping[str, Any]) -> None:
+    """Reject a range sensor whose smallest distance is not below its largest one."""
+    for least in (name for name in values if name.endswith("_minimum")):
+        most = f"{least.removesuffix('minimum')}maximum"
+        if values[least] >= values[most]:
+            raise ParameterError(
+                f"parameter '{least}' ({values[least]:g} m) must be below '{most}'"
+                f" ({values[most]:g} m)"
+            )
 
 
 def _require_possible_speeds(values: Mapping[str, Any]) -> None:
