@@ -91,9 +91,9 @@ class Recorder:
 
     def _save(self, token: Future | None, reading: RecordReading) -> None:
         kind = reading.record.kind
-        folder = Path(self._values()["record_directory"]).expanduser()
-        path = folder / lois_ecu_records.file_name(kind, time.time())
         try:
+            folder = Path(self._values()["record_directory"]).expanduser()
+            path = folder / lois_ecu_records.file_name(kind, time.time())
             saved = lois_ecu_records.save(reading, path, partial(self._is_current, token))
         except Exception as error:  # the caller must get an answer
             self._end(

@@ -13,7 +13,7 @@ from typing import Any, Final
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import Driver
-from lois_ecu_rig import Ecu, driven, ecu_of
+from lois_ecu_rig import Ecu, driven, ecu_of, set_parameter
 from nav_msgs.msg import Odometry
 from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -193,6 +193,10 @@ def test_a_record_is_a_file_and_an_estop_ends_one(
     assert answer.success, answer.message
     assert Path(answer.message).parent == folder
     assert len(Path(answer.message).read_text().splitlines()) == 31
+    set_parameter(probe, "record_directory", "~nobody_of_this_name/records")
+    answer = probe.call(Trigger, "record_heading")
+    assert not answer.success
+    assert "could not be saved" in answer.message
     status = probe.listen(DiagnosticArray, "/diagnostics")
     waiting = probe.call_async(Trigger, "record_rpm")  # for ticks, which do not come
     probe.wait_for(lambda: "record of RPM: " in str(status[-1:]))

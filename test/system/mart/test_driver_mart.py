@@ -114,6 +114,22 @@ def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
     assert not docked[-1].data
 
 
+def test_a_download_that_cannot_be_saved_ends_with_the_reason(
+    mart: Mart, start_driver: Start, probe_of: Start
+) -> None:
+    """The home directory of an unknown user does not exist; the driver continues."""
+    folder = "~nobody_of_this_name/records"
+    probe: Probe = probe_of(start_driver(mart.url, board="mart", record_directory=folder))
+    probe.wait_for_state("nominal")
+    for _ in range(2):
+        with driven(probe, mart, 0.3, 0.0):
+            pass
+        mart.stands_for_good()
+        answer = probe.call(Trigger, "download_last_move")
+        assert not answer.success
+        assert "not saved" in answer.message, answer.message
+
+
 def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
     """Each motion is ended by its own stop command, and the server still answers."""
     for motion in MOTIONS.values():
