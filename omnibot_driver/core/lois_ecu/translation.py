@@ -35,6 +35,8 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.readings import DisplacementReading
 
 DAY_S: Final = 86400
+UNKNOWN_FROM_YEAR: Final = 38
+"""Year of the century from which a date is not one that the receiver knows."""
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
@@ -124,7 +126,7 @@ class Translation:
                 self._gps_works |= located
                 return [FixReading(latitude, longitude, located and self._dated)]
             case GpsDate():
-                self._date = report if report.month and report.day else None
+                self._date = report if _is_date(report) else None
                 self._dated = self._date is not None
             case GpsTime():
                 self._time.sent(1)
@@ -214,6 +216,15 @@ class Translation:
             return None
         day = _days_since_1970(2000 + date.year, date.month, date.day)
         return day * DAY_S + time.hours * 3600 + time.minutes * 60 + time.seconds
+
+
+def _is_date(date: GpsDate) -> bool:
+    """Return whether the receiver knows the date.
+
+    Before that it sends zeros, or the beginning of its calendar, such as 1980. Seconds from 2038 on
+    do not fit into a ROS time.
+    """
+    return bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
 
 
 def _days_since_1970(year: int, month: int, day: int) -> int:

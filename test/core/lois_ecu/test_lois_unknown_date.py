@@ -29,18 +29,26 @@ WORKS = pytest.mark.parametrize(
 class GpsRig(Rig):
     """A robot with a GPS that has no date until ``dated`` is set; ``sent``: lines and their times.
 
-    ``requests``: the times of the requests of a date.
+    ``requests``: the times of the requests of a date. ``unknown``: the date that the GPS sends
+    while it has none.
     """
 
-    def __init__(self, quirks: Quirks, *, utc_s: int = UTC_S, dated: bool = False) -> None:
+    def __init__(
+        self,
+        quirks: Quirks,
+        *,
+        utc_s: int = UTC_S,
+        dated: bool = False,
+        unknown: tuple[int, int, int] = (0, 0, 0),
+    ) -> None:
         self.sent: list[tuple[float, bytes]] = []
-        self.dated = dated
+        self.dated, self.unknown = dated, unknown
         super().__init__(LoisSettings(quirks=quirks, running=True, utc_s=utc_s), LoisEcuSettings())
         self.board._sayings.fix = partial(self._fix, self.board._sayings.fix)  # type: ignore[method-assign]
 
     def _fix(self, true: "partial[Fix]", now_s: float) -> Fix:
         fix = true(now_s)
-        return fix if self.dated else replace(fix, date=(0, 0, 0))
+        return fix if self.dated else replace(fix, date=self.unknown)
 
     def say(self, data: bytes) -> None:
         self.sent += [(self.now, line) for line in data.splitlines(keepends=True)]
@@ -58,10 +66,17 @@ class GpsRig(Rig):
 
 
 @WORKS
-def test_a_position_without_a_date_is_not_a_fix(quirks: Quirks) -> None:
-    """The GPS reports a position, and zeros as its date. Then it reports a date, too."""
-    rig = GpsRig(quirks)
+@pytest.mark.parametrize("unknown", [(0, 0, 0), (80, 1, 6), (99, 8, 22)], ids=str)
+def test_a_position_without_a_date_is_not_a_fix(
+    quirks: Quirks, unknown: tuple[int, int, int]
+) -> None:
+    """The GPS reports a position, and zeros or the start of its calendar as its date.
+
+    Then it reports a date, too.
+    """
+    rig = GpsRig(quirks, unknown=unknown)
     rig.run(8.0)
+    assert not any(time.utc_s for time in rig.readings if isinstance(time, TimeReading))
     assert len(fixes := rig.fixes()) >= 5
     assert not any(fixes)
     rig.dated = True
