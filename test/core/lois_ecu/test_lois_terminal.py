@@ -126,6 +126,16 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
     assert not bench.robot.stands
 
 
+def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
+    """The present command was given in percent by the old scale."""
+    bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
+    bench.drive_on(0.3, 3.0)
+    configure(bench, LoisEcuSettings(drive_mode="duty", duty_scale=500.0))
+    with pytest.raises(CommandRefused, match="duty_scale is changing to 500"):
+        bench.drive()
+    bench.run_until(lambda: bench.robot.stands)
+
+
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
     """The public firmware reads only as fast as the compass, at 4800 baud, so only Stop is sent."""
     bench = Bench("firmware")
