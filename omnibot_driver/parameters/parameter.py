@@ -11,6 +11,8 @@ from omnibot_driver.core.errors import ParameterError
 TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a string"}
 """Names of the types in ROS."""
 QUOTE: Final = "YAML reads on, off, yes and no as true or false; put the word in quotes"
+DUMPED_UNSET: Final = "null"
+"""Value of an unset parameter in the file of ``ros2 param dump``, as the driver reads it."""
 NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six")
 Item = int | float | str
 Value = bool | Item | list[int] | list[float] | list[str] | None
@@ -77,7 +79,7 @@ class Parameter:
 
     def check(self, value: object) -> Value:
         """Return the value in the parameter's own type; raise ParameterError if it is wrong."""
-        if value is None and self.unset:
+        if self.unset and value in (None, DUMPED_UNSET):
             return None
         if isinstance(self.default, list):
             items: Value = self._check_list(value)
