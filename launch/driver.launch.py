@@ -12,6 +12,7 @@ from launch_ros.substitutions import FindPackageShare
 from omnibot_driver.boards import PROFILES
 
 OVERRIDES = {
+    "board": (str, "Motor board of the robot"),
     "port": (str, "Serial device or pyserial URL of the board"),
     "front_port": (str, "Serial device of the front board, for a robot that has one (fejemis)"),
     "publish_tf": (bool, "Whether the driver publishes odom to base_link on /tf"),
@@ -21,6 +22,11 @@ OVERRIDES = {
 
 def driver_node(context: LaunchContext) -> list[Node]:
     """Return the driver node; an empty argument leaves the choice to the parameter file."""
+    file = LaunchConfiguration("params_file").perform(context)
+    if not file:
+        board = LaunchConfiguration("board").perform(context) or "omnibot"
+        share = FindPackageShare("omnibot_driver")
+        file = PathJoinSubstitution([share, "config", f"{board}.yaml"]).perform(context)
     overrides = {
         name: ParameterValue(LaunchConfiguration(name), value_type=type_)
         for name, (type_, _) in OVERRIDES.items()
@@ -32,7 +38,7 @@ def driver_node(context: LaunchContext) -> list[Node]:
             executable="driver",
             name="omnibot_driver",
             namespace=LaunchConfiguration("namespace"),
-            parameters=[LaunchConfiguration("params_file"), overrides],
+            parameters=[file, overrides],
             output="screen",
         )
     ]
@@ -46,25 +52,16 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(
                     name,
                     default_value="",
+                    choices=["", *PROFILES] if name == "board" else None,
                     description=f"{description}. If empty, the value in params_file is used.",
                 )
                 for name, (_, description) in OVERRIDES.items()
             ),
             DeclareLaunchArgument(
-                "board",
-                default_value="omnibot",
-                choices=list(PROFILES),  # launch would ignore a file that is missing
-                description="Motor board of the robot, for which params_file is chosen.",
-            ),
-            DeclareLaunchArgument(
                 "params_file",
-                default_value=[
-                    PathJoinSubstitution(
-                        [FindPackageShare("omnibot_driver"), "config", LaunchConfiguration("board")]
-                    ),
-                    ".yaml",
-                ],
-                description="YAML file with the driver's parameters, `board` among them.",
+                default_value="",
+                description="YAML file with the driver's parameters. If empty, it is the file of"
+                " the board in this package's config/ (omnibot.yaml without a board).",
             ),
             DeclareLaunchArgument(
                 "namespace",

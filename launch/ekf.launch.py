@@ -9,6 +9,7 @@ description.launch.py. A board without parameters for the filter is refused.
 """
 
 from pathlib import Path
+from typing import Any
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
@@ -30,7 +31,7 @@ FRAMES = {
 }
 
 
-def include(name: str, arguments: dict[str, str]) -> IncludeLaunchDescription:
+def include(name: str, arguments: dict[str, Any]) -> IncludeLaunchDescription:
     """Return an action that includes another launch file of this package."""
     path = PathJoinSubstitution([FindPackageShare("omnibot_driver"), "launch", name])
     return IncludeLaunchDescription(
@@ -45,7 +46,7 @@ def generate_launch_description() -> LaunchDescription:
         parameter: ParameterValue([prefix, frame], value_type=str)
         for parameter, frame in FRAMES.items()
     }
-    board = LaunchConfiguration("board")
+    board = PythonExpression(["'", LaunchConfiguration("board"), "' or 'omnibot'"])
     file = PythonExpression(
         ["'ekf.yaml' if '", board, "' == 'omnibot' else 'ekf_", board, ".yaml'"]
     )
@@ -53,9 +54,10 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument(
                 "board",
-                default_value="omnibot",
-                choices=["omnibot", *FILTERED],
-                description="Motor board of the robot, for which ekf_params_file is chosen.",
+                default_value="",
+                choices=["", "omnibot", *FILTERED],
+                description="Motor board of the robot. If empty, the filter and the description"
+                " are those of omnibot, and the driver's board is that in params_file.",
             ),
             DeclareLaunchArgument(
                 "ekf_params_file",
@@ -65,7 +67,7 @@ def generate_launch_description() -> LaunchDescription:
                 description="YAML file with the filter's parameters; the frames are set here.",
             ),
             include("driver.launch.py", {"publish_tf": "false"}),
-            include("description.launch.py", {}),
+            include("description.launch.py", {"board": board}),
             Node(
                 package="robot_localization",
                 executable="ekf_node",

@@ -178,9 +178,9 @@ def test_a_board_without_a_parameter_file_is_refused(
         for action in started().words[0]
         if action.kind == "DeclareLaunchArgument" and action.words == ("board",)
     )
-    usual = argument["default_value"]
-    assert {usual} < set(argument["choices"]) <= set(boards.PROFILES)
-    for board in set(argument["choices"]) - {usual}:
+    chosen = set(argument["choices"]) - {argument["default_value"]}
+    assert {"omnibot"} < chosen <= set(boards.PROFILES)
+    for board in chosen - {"omnibot"}:
         assert (ROOT / "config" / parameters_of.format(board)).is_file(), board
 
 
@@ -218,10 +218,26 @@ def test_the_parameter_file_is_that_of_the_board(
     """Another file can be given instead, which names its own board."""
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
+    given = parameters(launch("driver.launch.py", "board:=lois_ecu")["driver"])
+    assert (given["board"], given["drive_mode"]) == ("lois_ecu", "rpm")
     own = tmp_path / "own.yaml"
-    own.write_text("/**:\n  ros__parameters:\n    board: omnibot\n")
-    started = launch("driver.launch.py", "board:=omnibot", f"params_file:={own}")
-    assert parameters(started["driver"]) == {"board": "omnibot"}
+    own.write_text("/**:\n  ros__parameters:\n    board: lois_ecu\n")
+    for file in ("driver", "ekf"):
+        started = launch(f"{file}.launch.py", f"params_file:={own}")
+        assert parameters(started["driver"])["board"] == "lois_ecu"
+
+
+@needs_launch
+@pytest.mark.parametrize("file", ["driver", "ekf", "simulation"])
+def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
+    launch: Callable[..., Started], tmp_path: Path, file: str
+) -> None:
+    """Otherwise the driver would send OmniBot's frames to another board."""
+    own = tmp_path / "own.yaml"
+    own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")
+    started = launch(f"{file}.launch.py", "board:=lois_ecu", f"params_file:={own}")
+    given = parameters(started["driver"])
+    assert (given["board"], given["max_linear_speed"]) == ("lois_ecu", 0.3)
 
 
 @needs_launch
