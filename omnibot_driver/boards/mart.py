@@ -50,7 +50,7 @@ def make(values: Mapping[str, Any]) -> MartBoard:
 
 
 def settings(values: Mapping[str, Any]) -> MartSettings:
-    """Make the board's settings, which its data does not reveal, from checked values."""
+    """Make the settings that the board does not report, from checked parameter values."""
     wheels = kinematics(values)
     sign = -1 if values["encoder_inverted"] else 1
     return MartSettings(
@@ -86,7 +86,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
     """Create this board's own topics and services, and return its publishing functions.
 
-    They are the battery, sonars, dock; gyro bias, docking, log and downloads.
+    The topics show battery, sonars and dock; the services are for gyro, docking, log, downloads.
     """
     from omnibot_driver.boards.mart_topics import MartTopics  # needs ROS
 

@@ -10,14 +10,14 @@ import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds of a minute in which TIME with the next minute arrives before that minute."""
+"""Seconds of a minute at which TIME with the next minute is sent, to arrive before that minute."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second for TIME (UTC), or None if it must wait.
 
-    ``now_s``: this computer's time in s since 1970. If a correct clock may not be set back, the
-    next minute is sent shortly before it begins; the clock then is up to 4 s fast.
+    ``now_s``: this computer's time in s since 1970. Without ``may_set_back``, the next minute
+    is sent shortly before it begins; the clock then is up to 4 s fast.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters that the MART controller has and other boards need not have. Knows no ROS."""
+"""The parameters that only some boards have, among them the MART controller; without ROS."""
 
 from typing import Final
 
@@ -87,8 +87,8 @@ DRIVING: Final = (
         "network_delay",
         0.3,
         "s",
-        "Longest time that a datagram may take in either direction. Commands wait for it where a"
-        " late copy could do harm.",
+        "Longest time that a datagram may take in either direction. The driver waits for this time"
+        " before a command that a late copy of an earlier command could disturb.",
         low=0.01,
         high=0.3,
     ),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The adjustment of the motors' units while the robot drives, and what the motors teach.
+"""The adjustment of the motors' units while the robot drives, and the learning from drives.
 
 This module knows the present motion and its measured speed; it does not know how a motion begins or
 ends. Time is an argument.
@@ -17,13 +17,13 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""Time in s of constant heading after which the driver turns the robot a little; units for that.
+"""After WAG_S (s) of constant heading, the driver turns the robot a little, by WAG_UNITS.
 
-A change of the heading then shows that the IMU is alive and the robot has driven straight.
+If the heading then changes, the IMU works and the robot has driven straight.
 """
 
 STARTED_M: Final = 0.01
-"""Distance of a wheel in m from which its motor has certainly turned it."""
+"""Distance in m that a wheel must roll to prove that its motor has turned it."""
 
 
 class Adjusting(Moves):
@@ -47,7 +47,7 @@ class Adjusting(Moves):
         change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
         self.commanded = twist
         if change is None and self._heading_is_told and self._frozen_s > WAG_S:
-            change = (-WAG_UNITS, WAG_UNITS)  # a living IMU shows it; the next change undoes it
+            change = (-WAG_UNITS, WAG_UNITS)  # a working IMU shows this; the next change undoes it
         if change is None:
             return NO_PACKETS
         right, left = change
@@ -79,16 +79,16 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Note that the left wheel, which nothing measures, may have turned for this time."""
+        """Add uncertainty: the unmeasured left wheel may have turned for this time."""
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
         turn_rad = min(math.pi, most_m / self._settings.track_m)
         self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
 
     def _learn_standing(self) -> None:
-        """Learn that the motors need more units than those of the present motion to turn.
+        """Learn that the motors do not turn with the units of the present motion.
 
-        A robot that has moved before was blocked, which teaches nothing.
+        If the robot has moved before in this motion, it is blocked, and nothing is learned.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.spun_rad) * self._settings.track_m / 2

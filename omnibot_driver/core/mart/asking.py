@@ -2,8 +2,8 @@
 
 """The queries to the server after the stop port was used for an unknown motion.
 
-SL ends RM and B in such a way that a later SM or SRM hangs the server for good. So SM and SRM are
-sent only once RST IMU has shown that the server knows of no motion (it refuses RST IMU during a
+SL ends RM and B in such a way that a later SM or SRM hangs the server permanently. So SM and SRM
+are sent only once RST IMU has shown that the server knows of no motion (it refuses RST IMU during a
 motion), or the encoder has shown that the robot moves. This module knows commands and replies. Time
 is an argument.
 """

@@ -118,7 +118,7 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that a datagram from this channel brings.
 
-        NOTHING_MEASURED is added if a reply brings no reading and none came for UNREAD_S.
+        NOTHING_MEASURED is added if a reply brings no reading and no reading came for UNREAD_S.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
@@ -207,9 +207,10 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server has not driven by RM since its start, so that its clock may jump.
+        """Whether the server has not driven by RM since its start, so its clock may be set back.
 
-        The first sample of RM covers the time since the last sample of the previous RM.
+        RM integrates the heading over the time since the previous RM. If the clock was set back,
+        this heading is useless.
         """
         return self._pilot.odometry.heading.is_zero
 
@@ -233,7 +234,7 @@ class Conductor:
         return self._pilot.wake_at
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the order is below the slowest speeds; False for each GoTo."""
+        """Return whether the order's speeds count as a standstill; False for a GoTo."""
         if isinstance(order, GoTo):
             return False
         return not isinstance(order, Drive) or not (

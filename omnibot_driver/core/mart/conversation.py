@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The exchange with the server: one request at a time, and the choice of its reply.
+"""The exchange with the server: one request at a time, and the matching of replies.
 
-Replies carry no number, and datagrams are lost, duplicated and late. So a reply is matched by its
-form, its failure text and the least time that its command takes. A reply that does not match is
-regarded as late and discarded. After an unanswered query, no query with the same form of reply is
-sent until the missing reply can no longer come. The queries that are needed for driving cannot
-wait: their answers are marked as doubtful, and the reader compares them with the expected values.
+Replies carry no sequence number, and datagrams can be lost, duplicated or late. So a reply is
+matched by its form, its failure text and the least time that its command takes. A reply that does
+not match is regarded as late and discarded. After an unanswered query, no query with the same form
+of reply is sent until the missing reply can no longer come. The queries that are needed for driving
+cannot wait: the replies to them are marked as doubtful, and their recipient compares them with the
+expected values.
 Time is an argument.
 """
 
@@ -90,7 +91,8 @@ class Conversation:
 
     ``delay_s``: longest time that a datagram may be on its way, in s; ``discarded``: number of late
     replies so far; ``trip_s``: average duration of a query in s, longer after unanswered ones;
-    ``answered_trip_s``: the same of answered queries; ``missed_s``: when a reply was last given up.
+    ``answered_trip_s``: average duration of the answered queries in s; ``missed_s``: time at which
+    the driver last stopped waiting for a reply.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -122,7 +124,7 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Note that this reply is the one that was owed, unless it is a copy of another."""
+        """Note that a missing reply has come: this one, unless it is a copy of another reply."""
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
 
@@ -219,7 +221,7 @@ class Conversation:
         self._answers[pending.word] = reply, now + self.delay_s
         from_s = pending.sent_s
         if doubtful or self.disturbed(now):
-            from_s = min(from_s, now - self.delay_s)  # it may answer an earlier question
+            from_s = min(from_s, now - self.delay_s)  # it may answer an earlier query
         when = Moment(now - took_s / 2, from_s, now, doubtful)
         return Answer(pending.request, reply, took_s, when)
 

@@ -15,11 +15,11 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.odometry.covariance import Covariance
 
 WAY_STDDEV: Final = 0.004
-"""Standard deviation in m of the distance after 1 m; it grows with the root of the distance."""
+"""Standard deviation in m of the distance after 1 m; it grows with its square root."""
 GYRO_WALK: Final = 0.002
-"""Standard deviation in rad of the heading after 1 s of motion, as the gyro is shaken.
+"""Standard deviation in rad of the heading after 1 s of motion: random walk of the gyro.
 
-It grows with the root of the time.
+The motion shakes the gyro. The deviation grows with the square root of the time.
 """
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
@@ -28,18 +28,18 @@ END_M, END_RAD = 0.004, math.radians(0.4)
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviation of a turn on the spot that the server reports in whole degrees.
 
-The first is in rad, the second a part of the turn.
+The first is in rad, the second is relative to the turn.
 """
 PIVOT: Final = 0.01
 """Offset of the centre of a turn on the spot, as a part of the track."""
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation of the heading after a straight controlled move, in rad."""
 BEND_WALK: Final = 0.5
-"""Part of the error of a turn known from commands alone that is independent in each step."""
+"""If a turn is known from commands alone, this part of its error is independent in each step."""
 ASTRAY: Final = 0.7
 """Position error, as a part of the distance driven, per rad² of heading variance."""
 SPREAD: Final = 0.3
-"""Standard deviation of a time within an interval, as a part of the interval (1/√12)."""
+"""Standard deviation of a time that is uniform in an interval of length 1 (1/√12)."""
 CLOCK_S: Final = 0.01
 """Least uncertainty of a reply's time, in s, as on a good network."""
 Errors = list[tuple[float, float, float, float]]

@@ -43,13 +43,16 @@ The server opens its ports before it is complete. VOLTS and most motions crash a
 just started; a crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""Time in s, plus a number of exchange durations, without a reply that shows an absence."""
+"""A longer time without a reply shows an absence: in s, plus a number of exchange durations."""
 ABSENT_BUSY_S: Final = 2.5
-"""Time in s without a reply that shows an absence of a server that may be busy, as by a stop."""
-GREET_S: Final = 1.0
-"""Time in s from the start of a controlled move to the first HELLO, and between two of them.
+"""A longer time in s than this without a reply shows an absence of a server that may be busy.
 
-The server answers them after the move; a restarted server answers at once.
+A stop, for example, keeps the server busy.
+"""
+GREET_S: Final = 1.0
+"""Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
+
+The server answers HELLO after the move; a restarted server answers at once.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which stops are sent while the e-stop is latched.

@@ -45,17 +45,17 @@ OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Time in s after an RM that failed within which a motion is that of this RM."""
+"""Time in s after a failed RM; a motion within this time is caused by that RM."""
 
 
 class Health:
     """The health of robot and server.
 
-    ``imu``: the results of the IMU's checks; ``stranger``: the name that another server gives, or
-    empty; ``heading_told``: motions besides RM in which RMRA was seen to change;
-    ``heading_changes``: number of such changes in the present motion; ``reference_fails``: number
-    of bare ``fail`` replies to RM in a row; ``outlived``: whether the server has ended a motion
-    only after the stop port was used, so that its stop port or its next motion may hang.
+    ``imu``: the results of the IMU's checks; ``stranger``: the name of a server that is not a
+    motion controller, else empty; ``heading_told``: motions besides RM in which RMRA was seen to
+    change; ``heading_changes``: number of such changes in the present motion; ``reference_fails``:
+    number of bare ``fail`` replies to RM in a row; ``outlived``: whether the server has ended a
+    motion only after the stop port was used, so that its stop port or its next motion may hang.
     """
 
     def __init__(self, imu: ImuProof) -> None:

@@ -83,9 +83,9 @@ class Hearing(Measuring):
             return
         self.health.stranger = ""
         if self._stopping is not None and self._stopping.asks_name(now):
-            self._stopped(now)  # the port is free: the move is over, its reply was lost
+            self._stopped(now)  # the port is free, so the move is over and its reply was lost
         if self.state is State.MOVING and now >= self._started_s + GREET_S:
-            self._free_s = min(self._free_s, now + self._delay_s)  # its reply may be on its way
+            self._free_s = min(self._free_s, now + self._delay_s)  # the reply may be on its way
         if self.state is State.ASKING:
             self._named_s = now
         if self.state is State.LOST:
@@ -95,7 +95,8 @@ class Hearing(Measuring):
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion: a server that gives its name is not busy with a controlled move.
 
-        Its reply to the move was lost, or it was restarted while the motors turn.
+        So either its reply to the move was lost, or the server was restarted while the motors
+        turned.
         """
         self._appears(now)
         self._moved_by = None
@@ -135,7 +136,7 @@ class Hearing(Measuring):
         elif word.kind is Kind.START:
             self._halt(now, f"the controller did not answer {word.text}")
         elif word.kind is Kind.MOVE:
-            self._halt(now)  # its reply is lost, or it takes too long; the way is planned again
+            self._halt(now)  # the reply is lost or late; the rest of the goal is planned again
         elif word.kind is Kind.CHECK:
             self.state = State.STILL
             self.imu.missed(now)
@@ -145,6 +146,6 @@ class Hearing(Measuring):
         elif word.kind is Kind.CHANGE:
             self.loop.missed()
             if self.odometry.left_over_right is not None and self.loop.part > BLIND_PART:
-                self._halt(now)  # its turn would be unknown; the motion is started again
+                self._halt(now)  # the turn would be unknown; the motion is started again
         else:
             self._polls.press(word)

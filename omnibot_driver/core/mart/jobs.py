@@ -25,7 +25,7 @@ TIMES: Final = 3
 """Largest number of attempts at a job in REPEATED."""
 
 CHECK: Final = "check controller and network"
-EXIT_LOST: Final = "if it has ended, start it again; if it still answers, call again"
+EXIT_LOST: Final = "if the server has ended, start it again; if it still answers, call again"
 COPY: Final = (
     "the server has ended: copy the file from the controller, before ~/start_log deletes it"
 )
@@ -136,7 +136,7 @@ class Jobs:
         self._until_s = now + WITHIN_S.get(job, USUAL_S)
 
     def next(self, now: float, *, stands: bool) -> Request | None:
-        """Return the job's request if it is to be sent now, else None.
+        """Return the job's request if it must be sent now, else None.
 
         ``stands``: whether measurements have shown that the robot is at rest.
         """
@@ -165,7 +165,7 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """Repeat or end the job if this word was its request: the reply did not come in time."""
+        """Repeat or end the job if the reply to its request, ``word``, did not come in time."""
         if not self._waiting or self._request is None or word is not self._request.word:
             return
         if self.job in REPEATED and self._tries < TIMES:

@@ -22,7 +22,7 @@ STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 """Time in s for which a robot may roll out after a stop, and after a controlled move.
 
-The server reports a controlled move that has failed at once, without awaiting the standstill.
+If a controlled move fails, the server reports it at once, before the robot is at rest.
 """
 
 
@@ -67,7 +67,7 @@ class Measuring(Starts):
     def _counted(self, count: int, when: Moment, now: float) -> None:
         spun = self.state is State.STILL and self.odometry.motion is Motion.SPIN
         if spun and when.doubtful and now < self._rested_s + self._delay_s:
-            return  # maybe the angle with which the server answers the stop
+            return  # maybe it is the angle in the reply to the stop
         wheel = self.odometry.wheel
         before = None if wheel.may_begin_anew else wheel.last
         reading = self.odometry.counted(count, when)
@@ -123,14 +123,14 @@ class Measuring(Starts):
             return
         if not self.conversation.doubles(now):
             self.health.strays(now)
-        # since a start that failed, or a restart of the server, the robot has not been at rest
+        # the robot has not been at rest since the last start, or since a restart of the server
         unknown = self._stood_s < max(self.appeared_s, self._started_s)
         if unknown and self._negative_sweep and now - self._swept_s < 2.0:
             self._stray_s = now
             self._rescue = True
             self._notice(
                 "robot moves, but the server knows of no motion; the driver starts a turn by 1"
-                " degree, at whose end the server switches the motors off",
+                " degree; at its end the server switches the motors off",
                 halt=True,
             )
             return

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""Time uncertainty in s from which on a reply is regarded as uncertain."""
+"""Smallest time uncertainty in s with which a reply is regarded as uncertain."""
 
 
 @dataclass(frozen=True, slots=True)

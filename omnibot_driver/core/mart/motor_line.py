@@ -74,7 +74,7 @@ class MotorLine:
         return self._learned and self.speed(units) > SURE * math.hypot(math.sqrt(variance), noise)
 
     def rescale(self, factor: float) -> None:
-        """Multiply the learned speeds by ``factor``, as nominal units are measured otherwise."""
+        """Multiply the learned speeds by ``factor``, as the nominal units have changed."""
         if self._learned and factor != 1.0:
             self._ss, self._so, self._oo = (
                 each * factor * factor for each in (self._ss, self._so, self._oo)

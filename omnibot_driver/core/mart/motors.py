@@ -20,7 +20,7 @@ UNEQUAL: Final = 0.04
 MOST_UNEQUAL: Final = 2 * UNEQUAL
 """Largest relative difference of the two motors' gains that is used for predictions."""
 BALANCE_UNITS: Final = 20
-"""Fewest units at which the motors are compared; with less, a line's error has too much effect."""
+"""Fewest units at which the motors are compared; below, a line's error has too much effect."""
 
 
 class Motors:

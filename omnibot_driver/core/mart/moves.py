@@ -58,7 +58,8 @@ class Moves(Asking):
                 discarded = (
                     "; the goal of cmd_pose is discarded: remove the cause, then send it again"
                 )
-            self._notice(f"controlled move failed: {reply.reason or 'fail'}{discarded}", halt=True)
+            reason = reply.reason or "the server gives no reason"
+            self._notice(f"controlled move failed: {reason}{discarded}", halt=True)
             if reply.reason == words.IMU_LOST:
                 self.imu.lost()
 

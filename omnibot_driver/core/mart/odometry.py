@@ -21,7 +21,7 @@ SLOWING_S: Final = 0.12
 ACCELERATION_MPS2: Final = 1.0
 """Standard deviation of the acceleration since the last count, in m/s²."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
-"""Standard deviations of the error of speeds from the last counts, in m/s and rad/s."""
+"""Standard deviations of the errors of measured speeds, in m/s and rad/s."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
 """Standard deviations of speed and turn rate before they are measured after a start."""
 BLIND_RADPS: Final = 1.5

@@ -3,8 +3,8 @@
 """The choice of the next command to send to the server.
 
 In this order: stop a motion that must not continue, else carry out the wanted command, else send a
-query. This module knows states, commands and measurements; it does not know who commands. Time is
-an argument.
+query. This module knows states, commands and measurements; it does not know where the commands
+come from. Time is an argument.
 """
 
 import math
@@ -40,9 +40,12 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 It is shorter than STARTS_UP_S, so that the first motion uses the measured voltage.
 """
 VOLTS_S: Final = 10.0
-"""Longest time in s for which VOLTS waits for a network that loses nothing."""
+"""Longest time in s for which unanswered requests hold VOLTS back."""
 SILENT_S, GREET_AGAIN_S = 0.15, 0.1
-"""Times in s: without a reply, plus two exchange durations, to the first HELLO; between two."""
+"""Times in s: from the last reply to the first HELLO, and from each HELLO to the next.
+
+Two exchange durations are added to the first time.
+"""
 COPY_S: Final = 0.25
 """If ENC is unanswered for this time in s after a controlled move, a duplicate may be running."""
 
@@ -194,12 +197,12 @@ class Pilot(Hearing):
             return math.inf
         apart_s = self._halted_s + self._delay_s
         silent_s = COPY_S
-        if self.odometry.wheel.told_s >= self._rested_s:  # maybe by a late reply
+        if self.odometry.wheel.told_s >= self._rested_s:  # maybe this count is a late reply
             silent_s += 2 * self._delay_s
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def _may_ask_volts(self, now: float) -> bool:
-        """Return whether the server is certainly complete, as VOLTS crashes one that starts up.
+        """Return whether the server has certainly started up; before that, VOLTS crashes it.
 
         The only possible sign of an absence shorter than ABSENT_S is an unanswered request.
         """

@@ -82,7 +82,7 @@ class Polls:
     def wake_at(self, state: State) -> float:
         """Return the time at which the next frequent query is due; infinite if none is.
 
-        The others need no wake-up of their own.
+        The other queries are sent at the wake-ups for these.
         """
         frequent = (word for word in (ENC, RMRA) if word in PERIODS.get(state, {}))
         return min((self._at(word, state) for word in frequent), default=math.inf)

@@ -131,7 +131,7 @@ class Reckoning:
         self.doubt.end()
         way_m, turn_rad = self.maybe
         self.doubt.add(way_m**2, turn_rad**2)
-        if self._begins_in_move:  # which part of the move came before is not known
+        if self._begins_in_move:  # the part of the move before the reset is not known
             self.doubt.add(self.moved_m**2, self.spun_rad**2)
             self._begins_in_move = False
         self.motion = Motion.NONE
@@ -290,7 +290,7 @@ class Reckoning:
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return how long RM has driven without a fresh heading, in s.
+        """Return for how long RM has driven without a fresh heading, in s.
 
         The second value is the standard deviation of the turn within that time, in rad.
         """

@@ -27,7 +27,7 @@ heading is about 1e15 degrees.
 AHEAD_S: Final = 0.3
 """Longest prediction of the heading to the time of a count, in s."""
 ODD_TIMES: Final = 3
-"""Number of implausible headings in a row of which the last is accepted."""
+"""Number of implausible headings in a row after which the last of them is accepted."""
 SPREADS: Final = 4
 """Averaging time of the turn rate, as a multiple of a reply's time uncertainty."""
 
@@ -87,7 +87,7 @@ class RelativeHeading:
         before_rad, before_s, at_s = self._angle_rad, self.told_s, when.at_s
         if before_rad is None:
             old = abs(angle_rad - self._before_rad) < OLD_RAD < abs(self._before_rad)
-            if not old or when.from_s >= stood_s:  # else from before RM, which may be lost
+            if not old or when.from_s >= stood_s:  # else it is from before RM, which may be lost
                 self._take(angle_rad, when)
                 self.from_s = when.from_s
             return False

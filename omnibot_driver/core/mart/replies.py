@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parser of the MART controller's datagrams; no input makes it raise.
+"""The parser of the MART controller's datagrams; no input raises an exception.
 
 This module knows the forms of replies; it does not know the requests.
 """

@@ -32,7 +32,7 @@ def moving_order(wanted: Wanted, now: float) -> Drive | GoTo | None:
 
 
 def required_motion(order: Drive | GoTo | None, track_m: float) -> tuple[Motion, BodyTwist]:
-    """Return the motion that the order requires, and its twist; none for a goal."""
+    """Return the motion that the order requires, and its twist; Motion.NONE for a goal."""
     if not isinstance(order, Drive):
         return Motion.NONE, STANDING
     speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps

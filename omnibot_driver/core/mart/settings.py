@@ -10,12 +10,13 @@ from typing import Literal
 class MartSettings:
     """The settings of one robot with a MART controller.
 
-    ``metres_per_count``: distance in m that the right wheel rolls per encoder count, negative where
-    forward counts down; ``speed_per_unit``: speed of a wheel in m/s for one unit of RM at
-    ``nominal_volts``; ``heading_sign``: 1 where a positive relative angle is to the left, else -1;
-    ``network_delay_s``: longest time that a datagram may be on its way, in s; ``spin_speed``:
-    whether R and L turn at the commanded speed (set by SSP) or at the server's own SLOW speed;
-    ``motor_balance``: speed of the left motor divided by that of the right one, at equal units.
+    ``metres_per_count``: distance in m that the right wheel rolls per encoder count, negative if
+    the encoder counts down when the robot drives forward; ``speed_per_unit``: speed of a wheel in
+    m/s for one unit of RM at ``nominal_volts``; ``heading_sign``: 1 if the relative angle increases
+    when the robot turns left, else -1; ``network_delay_s``: longest time that a datagram may be on
+    its way, in s; ``spin_speed``: whether R and L turn at the commanded speed (set by SSP) or at
+    the server's own SLOW speed; ``motor_balance``: speed of the left motor divided by that of the
+    right one, at equal units.
     """
 
     wheel_radius_m: float = 0.0625

@@ -41,10 +41,10 @@ HOLD_AFTER_S: Final = 1.0
 """Time in s after a change of the turn rate for which the heading error is not summed."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Variances per squared change of units: if it may arrive twice, and if it is not answered.
+"""Variances per squared change of units: if the change may arrive twice; if it is unanswered.
 
 A change may come twice where an exchange takes longer than SLOW_TRIP_S (s). The variances are
-larger than is probable, as a wrong guess stays for the complete motion.
+larger than probable, because a wrong ratio of speeds lasts for the complete motion.
 """
 
 
@@ -111,8 +111,8 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Learn that no motor turns with the present units, or with ``units`` on both sides.
 
-        More units than MOST_DEAD turn each motor that is not blocked, so they teach nothing. Nor do
-        units with which the motor has turned before; but to start, it may need more.
+        More units than MOST_DEAD turn each motor that is not blocked, so they teach nothing. Units
+        with which the motor has turned before teach nothing either, but a start may need more.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -135,7 +135,7 @@ class SpeedLoop(Motors):
     def left_over_right(self) -> float:
         """Ratio of left to right wheel speed, by the units and the learned lines.
 
-        It differs from that of two motors with this ``motor_balance`` by MOST_UNEQUAL at most.
+        At equal units of both sides it is ``balance``.
         """
         right, left = self._right, self._left
         if not right.units:
@@ -145,12 +145,15 @@ class SpeedLoop(Motors):
 
     @property
     def balance(self) -> float:
-        """Ratio of the left to the right motor's speed at equal units of the present motion."""
+        """Ratio of the left to the right motor's speed at equal units of the present motion.
+
+        It differs from ``motor_balance`` by MOST_UNEQUAL at most.
+        """
         return self._balance(self.units)
 
     @property
     def measured_balance(self) -> float | None:
-        """The same as measured in a drive, not limited; None before the first one."""
+        """The balance as measured in a drive, without its limit; None before the first drive."""
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
     @property

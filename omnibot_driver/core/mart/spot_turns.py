@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Turns on the spot: the setting of their speed, and what their rate and their stop teach.
+"""Turns on the spot: the setting of their speed, and what is learned from their rate and stop.
 
 The server cannot change the rate of a turn, so another rate needs another turn. This module knows
 rates and motor units; it does not know when a turn begins or ends. Time is an argument.
@@ -21,16 +21,19 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN = 0.05, 0.12
 """Relative errors of the rate from which a turn is begun anew, with other units.
 
-The first holds until a turn has taught how fast the motors turn; later a correction would often
-cost more than the error.
+OFF holds until a turn has shown how fast the motors turn; then OFF_AGAIN holds, because a
+correction would often cost more than the error.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Parts of the commanded rate: below the first a robot whose motors are known is held; and the
-least that one turn teaches, so that the next one has no more than 1.7 times the units."""
+"""Parts of the commanded rate, for turns in which the robot may be held.
+
+A robot whose motors are known is regarded as held below HELD. A rate below LEAST_LESSON is learned
+as LEAST_LESSON, so that the next turn has at most 1.7 times the units.
+"""
 EVEN: Final = 0.15
-"""Largest change of the rate, as a part of its mean, of a turn that shows anything."""
+"""Largest change of the rate, relative to its mean, with which a turn shows the motors' speed."""
 SAME, CORRECTIONS = 0.2, 2
-"""Relative difference up to which two rates count as the same, and how often each is corrected."""
+"""Largest relative difference of rates that are regarded as equal; most corrections of a rate."""
 STEADY: Final = 0.03
 """Relative change of the commanded rate from which it is regarded as a new one."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
@@ -49,8 +52,8 @@ JUST_SET_S: Final = 2.0
 SLOW_UNITS: Final = 20
 """Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 SETTING_REFUSED: Final = (
-    "the server does not set the speed of turns on the spot; they have its own speed SLOW,"
-    " which is faster than most commands, as with `spin_speed`: fixed (reported once)"
+    "the server does not set the speed of turns on the spot; all of them use its speed SLOW,"
+    " which is faster than most commands, as with `spin_speed: fixed` (reported once)"
 )
 
 
@@ -99,7 +102,7 @@ class SpotTurns:
         return words.SSP.request(5, units)
 
     def answered(self, reply: Ok | Fail) -> bool:
-        """Evaluate the reply to SSP; return whether the server has taken the setting."""
+        """Evaluate the reply to SSP; return whether the server has accepted the setting."""
         if isinstance(reply, Ok):
             self._set_units = self.units
         else:
@@ -107,7 +110,7 @@ class SpotTurns:
         return not self._refused
 
     def refused(self) -> None:
-        """Note that the server does not know turns with a speed that was set."""
+        """Note that the server does not support turns with a set speed (CUSTOM)."""
         self._refused = True
 
     def forget_setting(self) -> None:
@@ -142,10 +145,10 @@ class SpotTurns:
         return near and not self._is_off(rate_radps, steady_s, disturbed=disturbed)
 
     def _is_off(self, rate_radps: float, steady_s: float, *, disturbed: bool) -> bool:
-        """Return whether the turn is so far from its rate that it is begun anew.
+        """Return whether the turn's rate is so wrong that the turn must be begun anew.
 
-        Its stop tells how fast the motors turn with their units, so the next turn is better. This
-        is not done while the commanded rate changes.
+        The stop shows how fast the motors turn with their units, so the next turn is better. While
+        the commanded rate changes, the result is False.
         """
         if disturbed or not self._is_seen(steady_s):
             return False
@@ -175,7 +178,7 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the rate to learn from a measured one: the robot may have been held a little."""
+        """Return the rate to learn from a measured one, with a minimum as the robot may be held."""
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:

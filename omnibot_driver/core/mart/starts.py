@@ -41,7 +41,7 @@ STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
 REFERENCE_FAILS: Final = 2
 """Number of bare ``fail`` replies to RM in a row after which RM is not tried again.
 
-A single one also comes from an intact server, after a stop that took long.
+A single bare ``fail`` also comes from an intact server, after a stop that took long.
 """
 
 
@@ -97,7 +97,7 @@ class Starts(Adjusting):
     def _copies_may_come(self, now: float) -> bool:
         """Return whether a late copy of an earlier command could still harm a motion.
 
-        A copy of a move would block the port; a copy of a stop would end what begins.
+        A copy of a move would block the port; a copy of a stop would end the next motion.
         """
         moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
         return moves or now < self._halted_s + self._delay_s
@@ -140,7 +140,7 @@ class Starts(Adjusting):
             return
         self._again_s = self.imu.again_s = now + AGAIN_S
         reason = reply.reason if isinstance(reply, Fail) else ""
-        why = f"the check of the IMU failed: {reason or 'fail'}"
+        why = f"the check of the IMU failed: {reason or 'the server gives no reason'}"
         if reason == words.CONFLICT:
             why += "; look for another program that commands the robot"
             self.motion = Motion.UNKNOWN
@@ -198,14 +198,15 @@ class Starts(Adjusting):
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        self.odometry.started(now, sure=not answer.when.doubtful)  # else maybe it answers RST IMU
+        self.odometry.started(now, sure=not answer.when.doubtful)  # it may answer RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, as it may move nevertheless.
 
-        ``arrived``: whether the reply is certainly that to this start, and no copy of it is likely.
+        ``arrived``: whether the reply certainly belongs to this start, and a copy of the start is
+        unlikely.
         """
         word = self._start
         assert word is not None

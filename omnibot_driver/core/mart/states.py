@@ -2,9 +2,9 @@
 
 """The table of commands that may be sent to the MART controller in each state of motion.
 
-Some commands hang the real server for good in the wrong state, with the motors turning. So each
-command is looked up here before it is sent. This module knows commands and states; it knows no
-times and no measurements.
+If some commands are sent in the wrong state, they hang the real server permanently, with the motors
+turning. So each command is looked up here before it is sent. This module knows commands and states;
+it does not know times or measurements.
 """
 
 from collections.abc import Mapping
@@ -102,7 +102,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
 }
 """The commands that are allowed in each state.
 
-The commands in NEEDS_IMU also require that RESET or CHECK has just shown a living IMU.
+The commands in NEEDS_IMU also require that RESET or CHECK has just shown that the IMU works.
 """
 
 HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
@@ -140,17 +140,17 @@ STARTS: Final[Mapping[Word, Motion]] = {
 """The motion that each start command begins."""
 
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
-"""Commands that need a living IMU.
+"""Commands that need a working IMU.
 
-With a dead IMU they start the motors and never answer, or begin when the IMU is back. MCR and MCL
-notice the dead IMU, but some servers turn the robot for half a second first.
+With a dead IMU they start the motors and never answer, or begin when the IMU works again. MCR and
+MCL notice the dead IMU, but some servers turn the robot for half a second first.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
 """Commands that do harm if a duplicate of them arrives late, when another motion has begun.
 
-So after one of these commands, the driver starts no other motion, and checks no IMU for a start,
-until a duplicate can no longer come.
+So after one of these commands, the driver starts no other motion, and does not check the IMU for a
+start, until a duplicate can no longer come.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {

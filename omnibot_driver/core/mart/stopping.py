@@ -130,7 +130,7 @@ class Stopping:
         return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
 
     def doubt(self, reply: Ok) -> None:
-        """Note a reply that may be that to the stop, but also a late one or a copy."""
+        """Note a reply that may belong to the stop, but may also be late or a copy."""
         if reply.form in ANSWERS.get(self.motion, ()):
             self._doubtful.append(reply)
 
@@ -138,7 +138,7 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The reply to the stop if the network delays and duplicates nothing, or None.
 
-        It is one more than the replies that were still to come when the stop began.
+        A reply exists if more replies came than were missing when the stop began.
         """
         return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 

@@ -42,7 +42,7 @@ HALF_STUCK: Final = (
     " the command ends"
 )
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
-"""Measured speeds in m/s and rad/s, of which one is exceeded by a robot that certainly moves."""
+"""Measured speeds in m/s and rad/s; a robot that exceeds either of them certainly moves."""
 BLOCKED_S: Final = 0.6
 """Time in s for which a wheel must stand in a drive before it is regarded as blocked."""
 LOST_REPEAT_S: Final = 1.0
@@ -67,7 +67,7 @@ class Stops(Ground, ABC):
         return required_motion(self._order(now), self._settings.track_m)
 
     def _agrees(self, now: float) -> bool:
-        """Return whether the present motion fits the present command, or job."""
+        """Return whether the present motion fits the present command or job."""
         motion, twist = self._wish(now)
         if self.motion in (Motion.STRAIGHT, Motion.TURN):
             return self._move is not None or self.jobs.moving or self._rescue
@@ -202,7 +202,7 @@ class Stops(Ground, ABC):
         if isinstance(result, Fail):
             self._failed(motion, result, now)
         elif result is None and motion is not Motion.UNKNOWN and not self._refused:
-            self._appears(now)  # it knows of no motion: maybe it was started again meanwhile
+            self._appears(now)  # the server knows of no motion, so maybe it was restarted
         if motion is Motion.UNKNOWN:
             self._negative_sweep = result is None
             self._swept_s = now
@@ -244,9 +244,9 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply) -> None:
         """Note a reply to a stop on the command port that comes after the stop port was used.
 
-        The server then has not been restarted. Its stop port may await the end of the same motion
-        for good. It would then take the start of the next RM for that end, so that RM is never
-        answered and cannot be stopped.
+        So the server has not been restarted, and its stop port may still wait for the end of the
+        motion. It would mistake the start of the next RM for that end. This RM would then never be
+        answered, and nothing could stop it.
         """
         ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
         if ends and self.motion is not Motion.SPIN:

@@ -14,7 +14,7 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Largest believed error of a count that may answer another query, in m, plus m/s times time."""
+"""Largest accepted error of a count that may answer another query, in m, plus m/s times time."""
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest distance of a wheel between two counts, in m, plus m/s times the time between them.
 
@@ -24,7 +24,7 @@ STRAY_COUNTS: Final = 3
 """Largest change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""Number of counts equal to the last one before a start that show that the start was lost."""
+"""Number of counts that show a lost start, if they equal the last count before the start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class WheelCount:
         if self._confirmed and not self._same and when.from_s >= stood_s and not when.doubtful:
             unsure = False
         if unsure and (not self._confirmed or self._same or driven):
-            # the count from before the start, which may have been lost
+            # maybe the count from before the start, if the start was lost
             self._same += driven and not when.doubtful
             self.maybe = count if self._same < SAME_TIMES else 0
             self._raw, self.told_s, self.from_s = count, when.at_s, when.from_s
@@ -147,7 +147,7 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether the count goes back within this motion, as only a wrong reply does."""
+        """Return whether the count goes back within this motion, which shows a wrong reply."""
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:
             return False
