@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated MART motion controller, after its manual or after its public server.
+"""A simulated MART motion controller that follows its manual or its public server.
 
-Shares no code with the driver, so that a misread manual does not cancel out. ``MartServer`` is
-pure: its interface is ``receive(datagram, port, sender, now)``, ``advance(now)`` and ``copy()``.
-``SimulatedMart`` wraps it for real ports, ``sim://`` and simulated bad networks.
+It shares no code with the driver: otherwise both would contain the same misreading of the manual,
+and tests would not find it. ``MartServer`` uses no sockets or clocks: its interface is
+``receive(datagram, port, sender, now)``, ``advance(now)`` and ``copy()``. ``SimulatedMart`` wraps
+it for real ports, ``sim://`` and simulated bad networks.
 """
 
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart

@@ -2,9 +2,9 @@
 
 """Supervision of a motion in progress, 100 times a second, as the server does it.
 
-Detects that the wheel starts to turn, that it comes to rest, and obstacles; ends controlled moves.
-Without samples of the IMU only the obstacles and the dock of controlled linear moves are detected.
-Knows motions. Must not know commands.
+This module detects that the wheel starts to turn, that it comes to rest, and obstacles; it also
+ends controlled moves. Without samples of the IMU it detects only the obstacles and the dock, in
+controlled linear moves. It knows motions; it does not know commands.
 """
 
 from typing import TYPE_CHECKING
@@ -147,7 +147,7 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, from the calibration and the time alone.
 
-    The share of the ramps is in feet, although the sum is reported in inches.
+    Like the server, it adds the ramps' distance in feet to a sum in inches.
     """
     if motion.kind not in _TIMED:
         return 0.0

@@ -2,7 +2,7 @@
 
 """The simulated controller as a simulated board: two channels of datagrams, and time in ticks.
 
-Knows the server and the common protocol of simulated boards. Must not know commands.
+This module knows the server and the common protocol of simulated boards; it does not know commands.
 """
 
 from collections.abc import Mapping

@@ -2,8 +2,8 @@
 
 """The motor board, its two motors, and the robot that they move.
 
-Knows registers (0 full forward, 128 stop, 255 full backward), volts and metres. Must not know
-commands, nor the reason of a movement.
+This module knows registers (0 full forward, 128 stop, 255 full backward), volts and metres; it does
+not know commands or the reason of a movement.
 """
 
 from math import cos, exp, inf, pi, sin

@@ -3,8 +3,8 @@
 """The commands of the command port: how they are recognised and checked, and their replies.
 
 The server compares the beginning of a request with its commands in a fixed order, so F matches any
-later command that begins with F. Knows command words and numbers. Must not know how a motion
-proceeds.
+later command that begins with F. This module knows command words and numbers; it does not know
+how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ It returns the reply, or None if the reply comes later or never.
 """
 
 NEED_ALL = ("VOLTS", "RM ", "MCF", "MCB", "TF", "PTF", "TB", "R", "L", "MCR", "MCL")
-"""Commands that need what the server creates last, after it opened its ports."""
+"""Commands that need the objects which the server creates last, after it has opened its ports."""
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
 BAD_DISTANCE = "fail bad distance value"

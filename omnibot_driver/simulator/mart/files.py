@@ -2,7 +2,7 @@
 
 """The files in which the server records motions.
 
-Knows their form. Must not know when they are sent.
+This module knows the form of the files; it does not know when they are sent.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class FileNote:
     """The data from which the file of a motion is generated.
 
     head: first lines of the file. rows: number of samples in the file. is_turn: whether the motion
-    was a spin. angle_deg, encoder: totals of the motion.
+    was a spin. angle_deg, encoder: total angle and encoder count of the motion.
     """
 
     name: str

@@ -2,18 +2,18 @@
 
 """The IMU: its gyro, whether it works, and the heading that the server integrates from it.
 
-Knows turn rates and times. Must not know motions or commands.
+This module knows turn rates and times; it does not know motions or commands.
 """
 
 from omnibot_driver.simulator.mart.settings import MartSettings
 
 
 class Imu:
-    """The gyro, and what the server derives from it.
+    """The gyro, and the values that the server derives from it.
 
-    alive: False while the IMU is unplugged; can be set at any time, besides the times in the
-    settings. closed: whether the server has given the IMU up; only RST IMU or SB makes it try
-    again. rate_dps: turn rate of the last sample in deg/s, less the bias that the server knows.
+    alive: False while the IMU is unplugged; it can be set at any time, in addition to the times in
+    the settings. closed: whether the server has stopped using the IMU, until RST IMU or SB.
+    rate_dps: turn rate of the last sample in deg/s, minus the bias that the server knows.
     heading_deg: the relative heading in degrees, left positive.
     """
 
@@ -46,7 +46,7 @@ class Imu:
         return self.alive and not self.closed and not self._dies_s <= now < self._returns_s
 
     def learn(self) -> None:
-        """Set the bias that the server knows, as its measurement at rest does."""
+        """Let the server know the present bias, as after its measurement at rest."""
         self._known_dps = self._bias_dps
 
     def sample(self, rate_dps: float, now: float, *, integrates: bool) -> None:

@@ -2,7 +2,7 @@
 
 """What the server remembers of each kind of motion, with its texts, speeds and times.
 
-Holds values alone. Must not know what changes them.
+This module only holds the values; it does not know what changes them.
 """
 
 from enum import IntEnum
@@ -53,9 +53,9 @@ class Motion:
 
     running: in progress, so that other motions are refused. watching: supervised by the alarm.
     posts: notices of a start or a stop that are not consumed yet. error: failure text of this
-    motion. right, left: register values as the server knows them. encoder: the last reading, which
+    motion. right, left: register values as the server knows them. encoder: the last count, which
     the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
-    turned_s: when the wheel began to turn, and when it last turned. angle_deg: turned since the
+    turned_s: when the wheel began to turn, and when it last turned. angle_deg: angle since the
     start. released: whether the stop port ended it.
     """
 

@@ -2,8 +2,8 @@
 
 """The start of each kind of motion, and its end by a command.
 
-Each step is a function that the server calls later, so that a copy of the server can continue too.
-Knows motions. Must not know the words of commands.
+Each step is a function that the server calls later, so that a copy of the server can also continue
+the motion. This module knows motions; it does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING

@@ -2,7 +2,7 @@
 
 """Command line options of a simulated MART controller, besides its seed and its network.
 
-Knows the names, values and effects of options. Must not know what runs the board.
+This module knows the names, values and effects of options; it does not know what runs the board.
 """
 
 import argparse

@@ -2,9 +2,9 @@
 
 """The server: two ports with a thread each, a timer while something moves, and simulated time.
 
-Pure: datagrams and times in, replies out; the same settings and input give the same output. Time
-advances from event to event, so a robot at rest takes no computing time. Must not know sockets,
-real time or the set of commands.
+The input is datagrams and times, the output is replies; the same settings and input give the same
+output. Time advances from event to event, so a robot at rest takes no computing time. This module
+does not know sockets, real time or the set of commands.
 """
 
 from collections import deque
@@ -20,7 +20,7 @@ from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then
 QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
 QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
-"""Time until a restarted server opens its ports, and from then until all is ready, in s."""
+"""Time until a restarted server opens its ports, and from then until it is complete, in s."""
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
 Sender = object
@@ -44,8 +44,8 @@ class _Later(NamedTuple):
 class MartServer(ServerState):
     """The controller with its robot, driven by ``receive`` and ``advance``.
 
-    ``ServerState`` describes its state. received: the last datagrams at either port, with time and
-    port. executed: the last commands begun, in order.
+    ``ServerState`` describes its state. received: the last datagrams at both ports, each with time
+    and port. executed: the last commands that were begun, in order.
     """
 
     def __init__(self, settings: MartSettings | None = None) -> None:
@@ -115,7 +115,7 @@ class MartServer(ServerState):
     def restart(self, boot_s: float = BOOT_S) -> None:
         """Start the server program again; the motors keep their last command.
 
-        Datagrams of the next ``boot_s`` seconds are lost. START_UP_S later all is ready.
+        Datagrams of the next ``boot_s`` seconds are lost. START_UP_S later the server is complete.
         """
         self.begin()
         self.imu.restart()
@@ -162,7 +162,7 @@ class MartServer(ServerState):
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` at the next notice of this motion's start or end, or now if a notice is
-        pending."""
+        already there."""
         motion = self.motions[kind]
         if motion.posts:
             motion.posts -= 1

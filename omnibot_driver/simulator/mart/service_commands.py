@@ -2,7 +2,7 @@
 
 """The commands that do not start a motion: queries, clock, log, files, direct motor control.
 
-Knows their replies and delays. Must not know how commands are recognised.
+This module knows their replies and delays; it does not know how commands are recognised.
 """
 
 import calendar
@@ -29,7 +29,7 @@ Handler = Callable[["MartServer", str], str | None]
 
 
 def missing(server: "MartServer", what: str) -> str | None:
-    """Refuse a command that lacks numbers, or crash for the reason ``what`` as the server does."""
+    """Refuse a command that lacks numbers; with the quirk, end the server for the reason ``what``."""
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
     server.end(what)
@@ -67,7 +67,7 @@ def heading(server: "MartServer", text: str) -> str | None:
 
 
 def last_measured(server: "MartServer", text: str) -> str | None:
-    """Answer 0, because what MCD and MD ask for is not simulated."""
+    """Answer 0, because the distances of MCD and MD are not simulated."""
     return "ok 0"
 
 
@@ -125,7 +125,7 @@ def record_sonar(server: "MartServer", text: str) -> str | None:
 def take_bias(server: "MartServer", text: str) -> str | None:
     """Measure the gyro bias (SB).
 
-    An IMU that was given up is opened again first, and the command fails if that is impossible.
+    A closed IMU is opened again first; the command fails if this is impossible.
     """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):

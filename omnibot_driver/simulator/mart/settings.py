@@ -2,8 +2,8 @@
 
 """Settings of a simulated MART controller and its robot: sizes, planted faults, firmware.
 
-``Quirks`` are the deviations of the public server from its manual, one switch each, so that a
-driver can be tested against both, or against a single deviation.
+``Quirks`` are the deviations of the public server from its manual, one switch each. So a driver
+can be tested against the manual, the public server, or a single deviation.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -15,23 +15,25 @@ from typing import Literal
 class Quirks:
     """Deviations of the public server from its manual: none by default.
 
-    stop_port_keeps_motion: SL stops F, B and RM, but the motion stays in progress: every later
-        motion is refused with a conflict, and SM or SRM hangs the command port for good.
+    stop_port_keeps_motion: SL stops F, B and RM, but the server regards the motion as still in
+        progress: it refuses every later motion with a conflict, and SM or SRM hangs the command
+        port permanently.
     spin_stop_ends_drives: SS acts on F, B and RM as SL does.
     early_stop_is_ignored: a stop on the stop port has no effect before the reply to F, B, R, L or
         RM.
     left_spin_in_reference_move: L during RM is accepted, and hangs the command port.
     moves_wait_for_imu: F, B, TF, TB and SB wait until a dead IMU works again, and then continue.
-    drives_trust_imu: RM, R and L start without a working IMU, and every uncontrolled motion
-        continues without one, blind to obstacles. Its start and its stop are detected by samples of
-        the IMU only.
+    drives_trust_imu: RM, R and L start without a working IMU. Every uncontrolled motion continues
+        without one, and then does not detect obstacles. The server detects the start and the stop
+        of such a motion by samples of the IMU only.
     reference_speed_wraps: RM with a speed below 1 or above 127 writes a register value that wraps
         around, which RMCS then clamps.
-    reference_start_counts_on: RM does not reset its count of samples until the wheel turns, but
-        continues from the count of its last stop. After a stop of 0.56 to 0.6 s it fails at once;
-        after a longer one it waits for a stuck motor for good. The reason in its reply is that of
-        the last F or B.
-    speed_word_first: a speed word has effect in front of the number only. Behind it, it is ignored.
+    reference_start_counts_on: RM counts samples until the wheel turns. It does not reset this
+        count, but continues from the count of its last stop. After a stop of 0.56 to 0.6 s RM fails
+        at once; after a longer stop it waits for a stuck motor without end. The reason in its reply
+        is that of the last F or B.
+    speed_word_first: a speed word has an effect only before the number; after the number it is
+        ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB with 0 inches, or with a word instead of a
         number, drive until stopped.
     echoes_distance: TF and TB reply with the distance computed from time, not the distance driven.
@@ -42,8 +44,8 @@ class Quirks:
     log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, which then fail.
     unknown_reset_repeats: RST with an unknown word is answered by the last reply.
     clock_moves_heading: TIME during a motion integrates the turn rate over the jump of the clock.
-    undocumented_commands: commands that the manual lacks are accepted; without, of these only ENC
-        is.
+    undocumented_commands: commands that are not in the manual are accepted. Without this quirk, ENC
+        is the only one of these that is accepted.
     heading_in_reference_moves_only: the heading of RMRA changes during RM only, according to the
         public source. The server that was run updates it at any time.
     probe_turns: MCR by 0 runs the motors until the wheel moves, or for 0.5 s if the IMU is dead,
@@ -100,16 +102,16 @@ class MartSettings:
     """Settings of the controller, its robot and its surroundings.
 
     speed_mps_per_unit: wheel speed per register unit at nominal_volts; it grows with the voltage.
-    dead_zone_units: effort that is needed before a motor turns; only the rest gives speed.
+    dead_zone_units: effort that is needed before a motor turns; only effort beyond it gives speed.
     motor_inequality: how much faster the left motor is than the right one, as a fraction of the
     speed. encoder_sign: -1 if the count decreases forward. gyro_bias_dps: bias that the server does
-    not know until it measures it. gyro_noise_dps: standard deviation of a sample while a wheel
+    not know before it has measured it. gyro_noise_dps: standard deviation of a sample while a wheel
     turns. imu_dies_s, imu_returns_s: times since construction when the IMU fails and when it works
-    again. stuck: wheels that do not turn. motor_board_silent: its serial line is cut. motor_status:
-    bits of MCSTAT, besides those of the voltage; a tripped or short-circuited motor stops. front_m,
-    rear_m: distances from the start to walls across the x axis. dock_m: distance forward from the
-    start to the dock. reference_start_fails: a build that answers ``fail`` to RM, although the
-    robot moves. clock_s: initial wall clock in Unix time.
+    again. stuck: wheels that do not turn. motor_board_silent: whether the motor board's serial line
+    is cut. motor_status: bits of MCSTAT, except those of the voltage; a tripped or short-circuited
+    motor stops. front_m, rear_m: distances from the start to walls across the x axis. dock_m:
+    distance forward from the start to the dock. reference_start_fails: whether the server answers
+    ``fail`` to RM although the robot moves. clock_s: initial wall clock in Unix time.
     """
 
     quirks: Quirks = FIRMWARE

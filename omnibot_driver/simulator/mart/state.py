@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""State of a simulated server and its robot: true values, and what the server believes.
+"""State of a simulated server and its robot: true values, and the values that the server assumes.
 
-Holds values and what follows from them. Must not know how time passes, nor commands.
+This module holds values, and computes others from them; it does not know how time passes, or
+commands.
 """
 
 import time
@@ -21,7 +22,7 @@ NEAR_READINGS_S = 0.15
 """Duration of the three readings that confirm a near obstacle, in s."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""What a negative time becomes in the server, which counts unsigned milliseconds."""
+"""Time in s that the server adds to a negative one, because it counts unsigned milliseconds."""
 FILES = 100
 
 Then = Callable[..., None]
@@ -40,7 +41,7 @@ class ServerState:
     """The state of the server, its robot and its surroundings.
 
     now_s: simulated time since construction. crashed: why the server ended; empty while it runs.
-    busy: a command is in progress. motions: what the server knows of each kind; alarm: the kind
+    busy: whether a command is in progress. motions: state of each kind of motion; alarm: the kind
     that is supervised; starting: the kind whose command is not answered yet. custom: parameters set
     by SLMP and SSP. sampling_since_s: since when a motion uses a sonar, or -1. front_m, rear_m,
     dock_m and the attributes of the chassis and the IMU can be changed at any time.
@@ -76,14 +77,14 @@ class ServerState:
 
     @property
     def hung(self) -> bool:
-        """Whether the command port is silent for good, although the server runs."""
+        """Whether the command port is permanently silent, although the server runs."""
         return any(
             waiter.port == COMMAND and waiter.kind is not self.alarm for waiter in self.waiters
         )
 
     @property
     def stop_port_hung(self) -> bool:
-        """Whether the stop port is silent for good, although the server runs."""
+        """Whether the stop port is permanently silent, although the server runs."""
         return any(waiter.port == STOP and waiter.kind is not self.alarm for waiter in self.waiters)
 
     @property

@@ -2,7 +2,7 @@
 
 """The stop port: stop commands that work while the command port is busy, without a reply.
 
-Knows its three commands. Must not know those of the command port.
+This module knows the three commands of the stop port; it does not know those of the command port.
 """
 
 from typing import TYPE_CHECKING

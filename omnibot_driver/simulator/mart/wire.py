@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Codec of the datagrams as the server reads and writes them, written from the manual alone.
+"""Codec of the datagrams as the server reads and writes them; its only source is the manual.
 
 A request is one line of text without a terminator. Numbers are parsed as C's ``atoi`` parses them.
-Must not know the meaning of a command.
+This module does not know the meaning of a command.
 """
 
 import re
