@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Topics and services that only the MART controller has. They only connect ROS to the session."""
+"""Topics and services that only the MART controller has; they connect ROS to the session."""
 
 import threading
 import time
@@ -43,7 +43,7 @@ NOT_AT_REST: Final = (
 
 
 class MartTopics:
-    """The board's own topics and services; ``publish`` maps types of readings to publishers."""
+    """The board's own topics and services; ``publish`` maps types of readings to functions."""
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -157,7 +157,7 @@ class MartTopics:
         return done
 
     async def _save(self, done: JobDone) -> tuple[bool, str]:
-        """Write the file on a thread of its own, since a disk may be slow.
+        """Write the file in a separate thread, since a disk may be slow.
 
         Returns whether it succeeded, and the message for the caller.
         """

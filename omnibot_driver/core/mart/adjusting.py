@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The adjustment of the motors' units while the robot drives, and the learning from drives.
+"""The adjustment of the motors' units in a drive, and what the drive shows about the motors.
 
 This module knows the present motion and its measured speed; it does not know how a motion begins or
 ends. Time is an argument.

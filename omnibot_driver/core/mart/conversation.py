@@ -7,8 +7,7 @@ matched by its form, its failure text and the least time that its command takes.
 not match is regarded as late and discarded. After an unanswered query, no query with the same form
 of reply is sent until the missing reply can no longer come. The queries that are needed for driving
 cannot wait: the replies to them are marked as doubtful, and their recipient compares them with the
-expected values.
-Time is an argument.
+expected values. Time is an argument.
 """
 
 import math
@@ -41,7 +40,7 @@ LOSS, LOSS_S = 1.5, 0.02
 The query may have been given up too soon, so the next one is awaited longer.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""An exchange longer than SLOW_S (s) shows a disturbed network for the next DISTURBED_S (s).
+"""After an exchange longer than SLOW_S (s), the network counts as disturbed for DISTURBED_S (s).
 
 A network that delays, loses or duplicates a datagram may do so again. While it is disturbed, each
 reply may belong to an earlier query.
@@ -90,7 +89,7 @@ class Conversation:
     """The exchange of requests and replies with one server.
 
     ``delay_s``: longest time that a datagram may be on its way, in s; ``discarded``: number of late
-    replies so far; ``trip_s``: average duration of a query in s, longer after unanswered ones;
+    replies so far; ``trip_s``: average duration of a query in s, raised by unanswered ones;
     ``answered_trip_s``: average duration of the answered queries in s; ``missed_s``: time at which
     the driver last stopped waiting for a reply.
     """
@@ -112,15 +111,15 @@ class Conversation:
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now.
 
-        That is so if no request is pending, and no late reply can be mistaken for the reply to a
-        query ``word``. The queries in PRESSING are sent in spite of late replies.
+        It must wait while a request is pending. A query must also wait while a late reply can be
+        mistaken for its reply, except the queries in PRESSING.
         """
         if self.pending is not None:
             return False
         return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
 
     def heard(self, form: Form, now: float) -> None:
-        """Note that a reply of this form came, whose duplicate may come within ``delay_s``."""
+        """Note that a reply of this form came; its duplicate may come within ``delay_s``."""
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
@@ -194,7 +193,7 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """Return the reply with its request, or None if the reply is late, duplicate or foreign.
 
-        The server's name is not passed here, as HELLO may be sent while a request is pending.
+        Replies to HELLO do not pass here, as HELLO may be sent while a request is pending.
         """
         pending = self.pending
         if isinstance(reply, Ok):

@@ -2,8 +2,8 @@
 
 """The uncertainty of a MART robot's odometry, and its sources.
 
-The sources are: a wheel that slips or has another size, a gyro that drifts, motors that differ
-where the heading is unknown, the beginning and end of each motion, and replies whose time is known
+The sources are: a wheel that slips or has another size, a gyro that drifts, unequal motors
+while the heading is unknown, the beginning and end of each motion, and replies whose time is known
 only within the network's delay. This module knows metres, rad and seconds; it does not know how
 they are measured.
 """
@@ -15,7 +15,7 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.odometry.covariance import Covariance
 
 WAY_STDDEV: Final = 0.004
-"""Standard deviation in m of the distance after 1 m; it grows with its square root."""
+"""Standard deviation in m of a distance of 1 m; it grows with the square root of the distance."""
 GYRO_WALK: Final = 0.002
 """Standard deviation in rad of the heading after 1 s of motion: random walk of the gyro.
 
@@ -112,7 +112,7 @@ class Doubt:
     def heading_told(self) -> None:
         """Remove the heading error of a turn known from commands alone.
 
-        To be called when the server reports the heading. The resulting position error remains.
+        Call this when the server reports the heading. The resulting position error remains.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad

@@ -38,7 +38,7 @@ MOST_MOVES: Final = 9
 
 
 LEAST_LIKE: Final = 0.35
-"""Largest difference of a move that ran once from its request, relative to the request."""
+"""Largest relative difference of a move from its request, if the move ran only once."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move: a constant in s, plus s per degree or inch (doubled if SLOW)."""
 LONGER: Final = 1.4

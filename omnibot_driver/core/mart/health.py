@@ -129,7 +129,7 @@ class Health:
     def _status(self, bits: int) -> None:
         """Note the motor board's status, but a nonzero status only when it comes twice in a row.
 
-        A late reply to ENC looks like a status.
+        A late reply to ENC can look like a status.
         """
         if not 0 <= bits <= NO_READ:
             return

@@ -26,7 +26,7 @@ A larger unanswered change stops the robot.
 
 
 class Hearing(Measuring):
-    """The part of the pilot that hears the server."""
+    """The part of the pilot that evaluates the server's replies."""
 
     def hear(self, data: bytes, now: float) -> None:
         """Evaluate a datagram from the command port."""
@@ -130,7 +130,7 @@ class Hearing(Measuring):
             self.state = State.SERVING if self.jobs.collecting else State.STILL
 
     def _missed(self, word: Word, now: float) -> None:
-        """React to a reply that did not come in time."""
+        """React to the reply to ``word`` that did not come in time."""
         if self.state is State.ASKING:
             self._unanswered(word)
         elif word.kind is Kind.START:

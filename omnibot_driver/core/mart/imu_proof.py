@@ -89,5 +89,5 @@ class ImuProof:
         return True
 
     def retries(self, now: float) -> bool:
-        """Return whether to check a dead IMU again now; only by RST IMU, as it moves nothing."""
+        """Return whether to check a dead IMU again now, which is done by RST IMU only."""
         return self.dead and self.word is RESET and now >= self.again_s

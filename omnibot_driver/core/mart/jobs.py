@@ -128,8 +128,8 @@ class Jobs:
             )
         if job is Job.LOG_FILE and self.log_may_be_lost:
             raise RequestRefused(
-                "the server may have been restarted, and a restarted one would end and send no"
-                " file: copy the file from the controller, or begin a new log by ~/start_log"
+                "the server may have been restarted; it would then end and send no file: copy"
+                " the file from the controller, or begin a new log by ~/start_log"
             )
         self.job, self._token = job, token
         self._request = WORD_OF[job].request(*arguments)
@@ -165,7 +165,7 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """Repeat or end the job if the reply to its request, ``word``, did not come in time."""
+        """If ``word`` was the job's request, repeat or end the job, as no reply came in time."""
         if not self._waiting or self._request is None or word is not self._request.word:
             return
         if self.job in REPEATED and self._tries < TIMES:

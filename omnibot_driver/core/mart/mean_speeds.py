@@ -13,7 +13,7 @@ from omnibot_driver.core.mart.doubt import CLOCK_S
 WINDOW_S, SPREADS = 0.35, 4
 """Averaging time of speeds: the larger of WINDOW_S (s) and SPREADS times ``spread_s``."""
 LEAST_S: Final = 0.05
-"""Shortest time in s between two counts that gives a speed."""
+"""Shortest time in s between two counts from which a speed is computed."""
 
 
 class MeanSpeeds:

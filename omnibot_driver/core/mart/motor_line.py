@@ -36,7 +36,7 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Correct the line by a measured speed; ``doubt`` multiplies its standard deviation."""
+        """Correct the line by a measured speed; ``doubt`` multiplies the speed's deviation."""
         self._learned = True
         if self._ss < SLOPE_SD**2:
             self._ss += SLOPE_DRIFT**2
@@ -63,7 +63,7 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Change the line by these differences, by which the other motor's line has changed."""
+        """Change slope and offset by as much as those of the other motor's line have changed."""
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
 

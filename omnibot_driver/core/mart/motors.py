@@ -57,7 +57,7 @@ class Motors:
         return _units(self._lines, self._spin_speed(rate_radps))
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
-        """Return the units for a turn at ``rate_radps`` if ``units`` turn with ``seen_radps``."""
+        """Return the units for a turn at ``rate_radps``, as ``units`` have given ``seen_radps``."""
         lines = copy.copy(self._right_line), copy.copy(self._left_line)
         _learn_spin(lines, units, self._spin_speed(seen_radps))
         return _units(lines, self._spin_speed(rate_radps))

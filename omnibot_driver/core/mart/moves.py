@@ -51,7 +51,7 @@ class Moves(Asking):
         self.proof.stopped(now)
         self._rest(now)
         if isinstance(reply, Fail):
-            self._moved_by = None  # it was cut short
+            self._moved_by = None  # the move was cut short
             discarded = ""
             if self._move is not None:
                 self._move.given_up = True

@@ -38,7 +38,7 @@ ACCELERATION_RADPS2: Final = 3.0
 FRESH_S: Final = 0.2
 """Age in s up to which the last heading shows the present turn rate."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations of the end of a motion during which the connection was lost, in m and rad."""
+"""Standard deviations of a motion's end that was missed in a lost connection, in m and rad."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 

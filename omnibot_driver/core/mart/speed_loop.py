@@ -2,8 +2,8 @@
 
 """The conversion of speed and turn rate to command units of two motors, with feedback.
 
-The controller takes changes of its units and applies them without a regulator, so the effect of a
-unit depends on voltage, motor and floor. Each side has a line (``MotorLine``) that is learned from
+The server applies changes of the units without controlling the speed, so the effect of a unit
+depends on voltage, motor and floor. Each side has a line (``MotorLine``) that is learned from
 windows of steady driving and from turns on the spot. The heading is held by the integral of the
 turn rate error. This module knows units, m/s and rad; it knows no commands. Time is an argument.
 """
@@ -32,7 +32,7 @@ The window grows by LEARN_TRIPS durations. The standard deviation of its speeds 
 SLOWEST_MPS: Final = 0.015
 """Slowest speed of a wheel that certainly turns, in m/s."""
 SLOWEST_START_MPS: Final = 0.03
-"""Slowest speed of a wheel for which a motion begins, in m/s, as the server awaits a movement."""
+"""Slowest wheel speed in m/s with which a motion starts, as the server waits for a movement."""
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the units of a start grow after a start that moved nothing."""

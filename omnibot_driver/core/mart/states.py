@@ -165,7 +165,7 @@ WHILE: Final[Mapping[Motion, State]] = {
 
 
 def may_say(state: State, word: Word, motion: Motion) -> bool:
-    """Return whether the server can take the command now.
+    """Return whether the command may be sent now.
 
     ``motion``: the motion that is, or may be, in progress.
     """

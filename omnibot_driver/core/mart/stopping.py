@@ -4,11 +4,11 @@
 
 The stop command is sent at once, even if another request is pending, and repeated until it is
 answered. The stop may overtake a start that is still on its way. So a reply is accepted only if it
-must answer a stop that was sent when no duplicate of the start could come any more. A bare ``ok``
-is accepted only if it cannot be the reply to the start; else the stop is repeated. The stop port is
-the last resort. It is not used right after SM or SRM, because both commands would run at the same
-time and could hang a port. This module knows commands, replies and times; it does not know why the
-robot is stopped.
+certainly answers a stop that was sent when no duplicate of the start could come any more. A bare
+``ok`` is accepted only if it cannot be the reply to the start; else the stop is repeated. The stop
+port is the last resort. It is not used right after SM or SRM, because both commands would run at
+the same time and could hang a port. This module knows commands, replies and times; it does not know
+why the robot is stopped.
 """
 
 import math
@@ -28,7 +28,7 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""The forms of the reply ``ok`` of a server that has stopped each motion."""
+"""The forms of the reply ``ok`` with which the server reports that it has stopped each motion."""
 ASK_NAME_S: Final = 0.9
 """Time in s after the first stop of a controlled move by which the move should have ended."""
 
@@ -138,7 +138,7 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The reply to the stop if the network delays and duplicates nothing, or None.
 
-        A reply exists if more replies came than were missing when the stop began.
+        It is known if more replies came than were missing when the stop began.
         """
         return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 

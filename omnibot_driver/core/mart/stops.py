@@ -177,7 +177,7 @@ class Stops(Ground, ABC):
     def _stopped(self, now: float) -> None:
         """End the stop, as the server has answered it, and evaluate its result."""
         stopping, self._stopping = self._stopping, None
-        self._moved_by = None  # it was cut short
+        self._moved_by = None  # the move was cut short
         self.conversation.settle(now)
         assert stopping is not None
         if Form.INTEGER in ANSWERS.get(stopping.motion, ()):
@@ -261,7 +261,7 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:
-        """Begin to find out what moves, after the stop port was used for an unknown motion."""
+        """Begin to find out which motion is in progress, after the stop port was used."""
 
     def _obstacle(self, reply: Fail, motion: Motion) -> str:
         """Return why a motion failed, as text; refuse its direction if an obstacle is the cause."""

@@ -2,9 +2,10 @@
 
 """The distance rolled by the right wheel, from an encoder count that restarts with each motion.
 
-A reply may answer an earlier query, or be another number than the count. So an implausible count is
-discarded. An implausible count that comes several times is accepted; an impossibly large step then
-adds no distance. This module knows counts and times; time and metres per count are arguments.
+A reply may answer an earlier query, or contain another number than the count. So an implausible
+count is discarded. An implausible count that comes several times is accepted; an impossibly large
+step then adds no distance. This module knows counts and times; time and metres per count are
+arguments.
 """
 
 import math

@@ -82,8 +82,8 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
     """Take a sample of the gyro bias, and schedule the next one until ``left`` are taken.
 
-    Then start the motion ``kind``, or answer SB if it is None. ``missed``: consecutive samples that
-    did not arrive.
+    Then start the motion ``kind``, or answer SB if ``kind`` is None. ``missed``: consecutive
+    samples that did not arrive.
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0
@@ -149,7 +149,7 @@ def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
     """Start a spin by an angle (MCR, MCL).
 
-    By 0 degrees or less it only tests the IMU, unless ``probe_turns``.
+    With 0 degrees or less it only tests the IMU, unless ``probe_turns`` is set.
     """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word

@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=get_args(Firmware),
         default="firmware",
         help="behaviour of the server: as in the manual (documented), as observed on the public"
-        " server (firmware, the default), or also with what only its source shows (source)",
+        " server (firmware, the default), or as its source shows (source)",
     )
     for name, number, metavar, effect in _NUMBERS:
         default = getattr(_DEFAULT, name)
@@ -53,7 +53,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--reference-start-fails",
         action="store_true",
-        help="the server answers fail to RM, and the robot moves nevertheless",
+        help="the server answers fail to RM although the robot moves",
     )
 
 
@@ -112,7 +112,12 @@ _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
         "UNITS",
         "motor speed below which a motor does not turn",
     ),
-    ("motor_inequality", _within(-1.0, 1.0), "PART", "how much faster the left motor is"),
+    (
+        "motor_inequality",
+        _within(-1.0, 1.0),
+        "PART",
+        "how much faster the left motor is, as a fraction",
+    ),
     (
         "gyro_bias_dps",
         _within(-50.0, 50.0),

@@ -29,7 +29,7 @@ Handler = Callable[["MartServer", str], str | None]
 
 
 def missing(server: "MartServer", what: str) -> str | None:
-    """Refuse a command that lacks numbers; with the quirk, end the server for the reason ``what``."""
+    """Refuse a command that lacks numbers, or end the server for the reason ``what`` (a quirk)."""
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
     server.end(what)

@@ -22,7 +22,7 @@ NEAR_READINGS_S = 0.15
 """Duration of the three readings that confirm a near obstacle, in s."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Time in s that the server adds to a negative one, because it counts unsigned milliseconds."""
+"""Time in s that the server adds to a negative duration, as it counts unsigned milliseconds."""
 FILES = 100
 
 Then = Callable[..., None]

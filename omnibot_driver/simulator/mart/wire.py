@@ -31,7 +31,7 @@ def integer(text: str) -> int:
 
 
 def fields(text: str) -> list[str]:
-    """Return, for each blank in the text, everything behind this blank."""
+    """Return, for each blank in the text, everything after this blank."""
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 
 
