@@ -139,7 +139,7 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """The time since which a controlled move is under way, or None."""
+        """The start time of the present controlled move, or None."""
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         return self._started_s if moves and self.state is not State.LOST else None
 

@@ -35,7 +35,7 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: time since which a controlled move is under way, or None.
+        ``blind_since_s``: start time of the present controlled move, or None.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

@@ -131,7 +131,7 @@ class SpotTurns:
     def fits(self, rate_radps: float, now: float, *, turned_s: float, disturbed: bool) -> bool:
         """Return whether the present turn may continue under the command of this rate.
 
-        ``turned_s``: time since the turn has begun; ``disturbed``: whether measurements may be
+        ``turned_s``: time since the turn began; ``disturbed``: whether measurements may be
         missing.
         """
         if abs(rate_radps - self._wanted_radps) > STEADY * abs(rate_radps):
@@ -201,8 +201,8 @@ class SpotTurns:
     ) -> None:
         """Evaluate the angle that the stop has reported, in degrees.
 
-        ``uncounted_s``: time from the last count to the stop; ``turned_s``: time since the turn has
-        begun; ``disturbed``: whether a reply to the setting may have been that to another command.
+        ``uncounted_s``: time from the last count to the stop; ``turned_s``: time since the turn
+        began; ``disturbed``: whether the reply to SSP may have belonged to another command.
         """
         odometry = self._odometry
         spun_rad = odometry.spun_rad
