@@ -76,13 +76,14 @@ class ReadingClock(Protocol):
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the stamps of all readings of one ``Board.receive`` or ``elapse``, in their order.
+        """Return one stamp for each reading from a call of ``Board.receive`` or ``elapse``.
 
-        ``now`` is when the readings arrived; ``edge`` is ``Board.edge`` after that call.
+        The stamps are in the order of the readings. ``now`` is when the readings arrived; ``edge``
+        is ``Board.edge`` after that call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of a reading that arrived alone, faster than ``stamps`` does.
+        """Return the stamp of a reading that arrived alone; this takes less time than ``stamps``.
 
         Return None, and change nothing, if the stamp is uncertain; the caller then calls ``stamps``
         instead.
@@ -92,9 +93,9 @@ class ReadingClock(Protocol):
 class Board(Protocol):
     """One kind of board: the translator between its bytes and the rest of the driver.
 
-    Implement every method that has only a docstring here. The others are optional: their defaults
-    suit a board that does not need them. Requests raise RequestRefused where the present mode
-    forbids them.
+    Implement every method that has only a docstring here. The other methods are optional: their
+    defaults suit a board that does not need them. A request raises RequestRefused if the present
+    mode forbids it.
     """
 
     traits: Traits
@@ -104,7 +105,7 @@ class Board(Protocol):
     """Settings of this board that its data does not reveal; may be replaced at any time."""
 
     clock: ReadingClock | None = None
-    """Clock for readings that carry the board's time, or None to stamp by IMU tick or arrival."""
+    """Clock for readings that carry the board's time; None: stamp by IMU tick or by arrival."""
 
     @property
     def mode(self) -> Mode:
@@ -137,7 +138,7 @@ class Board(Protocol):
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Return advice on the settings if ``gravity_mps2`` differs from gravity; otherwise empty.
+        """Return advice on the settings if ``gravity_mps2`` is not gravity; empty if it is.
 
         ``gravity_mps2``: specific force measured at rest, in m/s².
         """
@@ -174,15 +175,14 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the packets that are due besides commands: subscriptions, polls, relayed values.
+        """Return the packets that are due, except commands: subscriptions, polls, relayed values.
 
-        The caller writes these packets, so regard them as written. Called when ``wake_at`` has
-        come.
+        The caller writes these packets, so regard them as written. Called at ``wake_at``.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that follow from elapsed time; called when ``wake_at`` has come.
+        """Return the readings that follow from elapsed time; called at ``wake_at``.
 
         If all returned readings are OdometryReadings or NoticeReadings, the board may still be
         silent. Any other reading shows that the board is alive.
@@ -243,11 +243,11 @@ class Board(Protocol):
         """Return the packets that stop the robot; they may depend on the robot's motion."""
 
     def emergency_stop(self) -> Packets:
-        """Return the board's own emergency stop alone, without Stop; empty if it has none."""
+        """Return the board's own emergency stop, without Stop; empty if the board has none."""
         return NO_PACKETS
 
     def switch_off(self) -> Packets:
-        """Return the last packets, after Stop and ``on_exit``; they switch other devices off."""
+        """Return the packets that switch other devices off; sent after Stop and ``on_exit``."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The exceptions of the driver, all of them, in one tree.
+"""All exceptions of the driver, in one class tree.
 
 Bytes from a board never raise an exception; invalid ones are counted. An exception means that the
 driver or its user asked for something impossible. Each message says what is wrong and what to do
@@ -13,7 +13,7 @@ class OmniBotError(Exception):
 
 
 class FrameError(OmniBotError):
-    """Bytes that are not exactly one frame of the expected kind, or values that do not fit one."""
+    """Bytes that are not one frame of the expected kind, or a value that does not fit its field."""
 
 
 class RequestRefused(OmniBotError):

@@ -26,7 +26,7 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Extra:
-    """A measurement that only one kind of board makes, of a type that its profile can publish.
+    """A measurement that only one kind of board makes; that board's profile publishes its type.
 
     ``stamp_s``: time of measurement, in s of the host's steady clock.
     """

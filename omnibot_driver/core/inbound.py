@@ -45,10 +45,10 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes, and return the estimates to publish at once; call ``process`` afterwards.
 
-        A command that arrives between both calls is handled as if it came before the bytes. That
-        would be wrong if the bytes change the mode. This method then calls ``process`` itself and
-        returns an empty list; the caller's ``process`` then returns True. Requests other than
-        commands call ``process`` first.
+        A command that arrives between the two calls is handled as if it came before the bytes. That
+        would be wrong if the bytes change the mode. In this case this method calls ``process``
+        itself and returns an empty list, and the caller's ``process`` returns True. Requests other
+        than commands call ``process`` first.
         """
         self._liveness.came_at = now
         before = self._board.mode

@@ -2,8 +2,8 @@
 
 """Liveness of the board: when it last sent data, and whether its silence is too long.
 
-Knows two times and two limits; not what the data means, nor what a silence leads to. Time is an
-argument.
+This module knows two times and two limits. It does not know what the data means, or what follows
+from a silence. Time is an argument.
 """
 
 import math
@@ -12,7 +12,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class Liveness:
-    """The times of the last data of a board, with the limits that turn silence into a fault.
+    """The arrival times of a board's last data, and the limits above which silence is a fault.
 
     ``heard_at``: arrival of the last reading, in s; ``came_at``: arrival of the last bytes, valid
     or not. ``unheard_s`` and ``silence_s`` are those of ``Traits``.

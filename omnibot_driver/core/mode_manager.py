@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests for a mode of the board: start, pause and reset, repeated until its data confirms them.
+"""Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
 The single-letter commands (S, P, R) may be lost, P toggles, and a board that boots drops what it
-receives first. So each request is a short exchange. Send the command, wait for later data that
-shows the result, send it again after a while, and fail with a sentence at a deadline. One request
-is in progress at a time. This module knows no bytes and reads no clock.
+receives first. So each request is a short exchange. The driver sends the command, waits for data
+that shows the result, and repeats the command after a while. At a deadline the request fails, with
+the reason as a sentence. One request is in progress at a time. This module does not know bytes and
+reads no clock.
 """
 
 import math
@@ -23,12 +24,12 @@ PAUSE_RETRY_S: Final = 1.5
 sends a notice every second, so data without a notice for this time shows that the command was
 lost."""
 FLOWING_S: Final = 0.1
-"""Longest pause between two receptions, in s, that is added to the time for which data has flowed;
-a running board sends every 10 ms."""
+"""Largest contribution, in s, of one gap between two receptions to the time for which data has
+flowed; a longer gap adds only this much. A running board sends every 10 ms."""
 IN_FLIGHT_S: Final = 0.1
-"""Time, in s, for which a command or a notice may still be in flight. A notice that arrives sooner
-after a command may have been sent before the board obeyed. A notice that is followed by data within
-this time does not show that the board is paused."""
+"""Longest time, in s, that a command, or the notice of a paused board, takes to arrive. A notice
+that arrives sooner than this after a command may have been sent before the board obeyed. If data
+follows a notice within this time, the notice does not show that the board is paused."""
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, since one may be lost."""
 ANSWER_WITHIN_S: Final = 4.5
@@ -100,7 +101,7 @@ class ModeManager:
         return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
-        """Begin with an open port; the board may be in any state, even amid a command."""
+        """Begin with an open port; the board may be in any state, even halfway into a command."""
         self.output = NO_PACKETS
         self._begin(now)
 
@@ -110,9 +111,10 @@ class ModeManager:
         self._answer(False, why)
 
     def request(self, request: Request, token: object, now: float) -> None:
-        """Begin a request; its answer appears in ``answers``. Raises RequestRefused at once.
+        """Begin a request; its answer appears in ``answers``.
 
-        ``token`` identifies the request in the answer.
+        Raises RequestRefused at once if the request cannot begin. ``token`` identifies the request
+        in the answer.
         """
         if self.phase is Phase.CLOSED:
             raise RequestRefused("the port is not open; connect the board, then call again")
@@ -159,7 +161,7 @@ class ModeManager:
             if self._wanted is not Wanted.RUNNING:
                 self._settle("the board has restarted and is paused, as it was before")
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
-            self._begin(now)  # it has restarted, and may have missed all commands so far
+            self._begin(now)  # the board has restarted, and may have missed earlier commands
 
     def heard_reset(self, now: float, remark: str = "") -> None:
         """Note that the board has obeyed a reset.

@@ -17,7 +17,7 @@ Vector3 = tuple[float, float, float]
 class ImuReading:
     """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
 
-    ``lost``: number of ImuReadings that seem to be missing before this one, judged by the
+    ``lost``: number of ImuReadings that seem to be missing before this one, estimated from the
     readings received.
     """
 
@@ -58,8 +58,8 @@ class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
     ``lost``: number of lost displacements whose motion this pose includes; the next displacement
-    does not report them again. ``restarted``: the counter of the poses starts again with this pose;
-    the counter of the displacements has done so some time before.
+    does not count these losses again. ``restarted``: the counter of the poses starts again with
+    this pose; the counter of the displacements has restarted earlier.
     """
 
     x_m: float
@@ -73,7 +73,7 @@ class PoseReading:
 class PausedReading:
     """The board reports that it is paused (or still initialising).
 
-    ``continues``: the previous report was the same, so the board has not restarted in between.
+    ``continues``: the board was paused at the previous report too, and has not restarted since.
     """
 
     continues: bool = False

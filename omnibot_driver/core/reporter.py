@@ -27,7 +27,7 @@ from omnibot_driver.core.reporting.notices import (
 )
 
 NEWS_EVERY_S: Final = 0.1
-"""Shortest time between two searches for news, in s; every read would be too often."""
+"""Shortest time between two searches for news, in s; a search at every read would be too slow."""
 DISCONNECTED: Final = "disconnected"
 
 
@@ -37,7 +37,7 @@ class Reporter:
     * ``events``: events since the last ``take``.
     * ``news_at``: time of the next ``look_for_news``, in s.
     * ``missing``: which lines are missing, as a sentence; empty if none.
-    * ``overruns``: how often the ports of all connections have lost bytes.
+    * ``overruns``: how often a port has lost bytes, counted over all connections.
     * ``shown``: public state and e-stop as of the last ``take``; a state that lasts only during one
       input is never shown.
     """
@@ -61,7 +61,7 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """The values that ``shown`` is computed from, because comparing them is faster."""
+        """The values from which ``shown`` was computed; comparing these is faster."""
 
     @property
     def state(self) -> str:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests to a board besides motion, and the answer to them: values without behaviour."""
+"""Requests to a board other than motion commands, and their answers: values without behaviour."""
 
 from dataclasses import dataclass
 from enum import Enum

@@ -3,10 +3,10 @@
 """Safety stops: what stops the robot at once, whatever the source of its commands.
 
 A stop follows from the e-stop, from a board that restarts, is paused or falls silent, and from a
-stall of this process. This module connects measurements, commands and requests where one must
-follow from another. It must not know bytes, nor who commands. Two other stops are elsewhere: the
-command policy stops the robot when a command expires, the motion monitor stops a robot
-that does not move as commanded.
+stall of this process. This module applies measurements to commands and requests where safety
+demands it. It must not know bytes, or who commands. Two other stops are elsewhere: the command
+policy stops the robot when a command expires, and the motion monitor stops a robot that does not
+move as commanded.
 """
 
 from typing import Final
@@ -127,7 +127,7 @@ class SafetyStops:
         self._policy.halt(now)
 
     def tick(self, now: float) -> None:
-        """End the command after a short silence of the board; after a long one forget its mode."""
+        """End the command after a short silence of the board; forget the mode after a long one."""
         if self._policy.current and self._liveness.unheard(now):
             self._policy.halt(now)
         if not self._liveness.fell_silent(now):

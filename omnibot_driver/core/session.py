@@ -8,7 +8,7 @@ not log: everything that a user should know is an event.
 
 This module puts the parts together and holds no state of its own. ``inbound`` handles what the
 board sends, ``safety`` stops the robot, ``interlocks`` refuses commands, ``reporter`` collects the
-events, ``shutdown`` ends the connection. Must not know bytes or threads.
+events, ``shutdown`` ends the connection. This module must not know bytes or threads.
 """
 
 import math
@@ -160,14 +160,14 @@ class Session:
         """End the connection, as the port is lost or closed."""
         self.inbound.end(now)
         self.interlocks.missing = self._reporter.missing = ""
-        why = self.interlocks.why_not_request()  # at the driver's end
+        why = self.interlocks.why_not_request()  # empty unless the driver shuts down
         why = why or "the port was lost meanwhile; call again once it is back"
         for given_up in (self._mode_manager.closed, self._calibration.give_up, self._task.give_up):
             given_up(why)
         self._commands.discard(now)
 
     def overran(self, count: int) -> None:
-        """Note how often the ports of all connections have lost bytes."""
+        """Note that a port has lost bytes ``count`` times, counted over all connections."""
         self._reporter.overruns = count
 
     def tick(self, now: float) -> None:

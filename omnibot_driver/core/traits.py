@@ -19,12 +19,12 @@ class Traits:
       clock. None for a board without an IMU, whose readings are stamped by their arrival.
     * ``authorities``: the topics that may command motion.
     * ``requests``: the requests that the board supports.
-    * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in its order.
+    * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in the order of its values.
     * ``unheard_s``: after this time without data the robot is stopped.
     * ``silence_s``: after this time without data the mode of the board is unknown.
     * ``own_odometry``: OdometryReadings give the robot's pose, and displacements only show whether
-      it obeys. Otherwise the driver integrates the displacements.
-    * ``stands_after_s``: a robot whose displacements show no motion for this time stands still.
+      the robot obeys. Otherwise the driver integrates the displacements.
+    * ``stands_after_s``: if displacements show no motion for this time, the robot stands still.
     * ``unproved_s``: longest time for which Stop is repeated while the standstill is not shown.
     * ``baudrate``: whether the line has a baud rate to set.
     * ``calibrates_gyro``: the board subtracts the gyro's bias itself, so its profile offers

@@ -25,7 +25,7 @@ LARGEST_SKEW_PPM: Final = 115.0
 SKEW_KNOWN_S: Final = 75.0
 """Time in s for which the arrival time of a reading affects the estimated clock skew.
 
-A skew that lasts less may be due to a busy computer, so it is not reported.
+A skew that lasts for a shorter time may be due to a busy computer, so it is not reported.
 """
 
 BUSY_SHARE: Final = 0.1
@@ -55,7 +55,7 @@ class Diagnosis:
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
     ) -> list[Status]:
-        """Return the diagnostic statuses; one board's always have the same names and order."""
+        """Return the diagnostic statuses; for one board, their names and order never change."""
         self._recent.remember(session, now)
         statuses = [
             self._link(link, now),
@@ -108,7 +108,7 @@ class Diagnosis:
             level, message = Level.STALE, "unknown while one of its lines is missing"
         if self._recent.grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
-            message = "the board has restarted: unless you reset it, check its power supply"
+            message = "the board has restarted; if you did not reset it, check its power supply"
         if session.board.trouble and session.state in RUNNING:
             level, message = Level.ERROR, session.board.trouble
         values = {"Mode": session.state, "Restarts": str(restarts), **session.board.own}
@@ -233,11 +233,11 @@ class Diagnosis:
             level, message = Level.WARN, f"lately: {refusals.last}"
         elif too_large:
             level = Level.WARN
-            message = "speeds do not fit into a command; lower the scales or the speed limits"
+            message = "speeds exceed the range of a command; lower the scales or the speed limits"
         elif commands.source is None:
             message = "idle"
         elif limited:
-            message = f"{commands.source} is limited: it exceeds the limits max_…"
+            message = f"{commands.source} is reduced to the limits max_…"
         else:
             message = f"{commands.source} is in control"
         values = {

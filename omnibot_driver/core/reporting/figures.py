@@ -42,9 +42,9 @@ class CommandFigures:
     """The figures of the commands.
 
     ``source``: the topic in control, or None; ``age_s``: age of its last command; ``monitored``:
-    whether the motion monitor stops a robot that does not move as commanded; ``trips``:
-    how often the motion monitor has stopped the robot; ``interlock``: the condition until which
-    motion is refused, in a sentence; empty while motion is allowed.
+    whether the motion monitor stops a robot that does not move as commanded; ``trips``: how often
+    the motion monitor has stopped the robot; ``interlock``: why motion is refused, in a sentence
+    with a remedy; empty while motion is allowed.
     """
 
     source: str | None = None
@@ -74,8 +74,8 @@ class ImuFigures:
 class SessionFigures:
     """The figures of the board, its readings and its commands.
 
-    ``skew_ppm``: how much faster the board's clock runs than the host's; ``task``: a long
-    task of the board and its start, as text; empty without such a task.
+    ``skew_ppm``: how much faster the board's clock runs than the host's; ``task``: name, elapsed
+    time and limit of the board's long task, as text; empty without such a task.
     """
 
     state: str

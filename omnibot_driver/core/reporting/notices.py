@@ -62,7 +62,7 @@ class ThrottledNotice:
 
 
 class Notices:
-    """The choice of notices to give, by what was given before."""
+    """Decides which notices to give, and remembers which were given before."""
 
     def __init__(self) -> None:
         self._lost, self._refused = ThrottledNotice(), ThrottledNotice()
@@ -72,7 +72,7 @@ class Notices:
         self._standing = ""
 
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
-        """Return notices of the losses and rejections since the last notices of them.
+        """Return the notices of losses and rejections that were not reported before.
 
         ``lost``: lost odometry frames so far; ``overruns``: overruns of the serial port so far.
         """
@@ -83,7 +83,7 @@ class Notices:
             news.append(
                 f"odometry frames lost in this computer: {more}; the serial port overran: reduce"
                 " the load, or use another adapter"
-                if now - self._overran_at < NEWS_S  # an earlier one is not the cause
+                if now - self._overran_at < NEWS_S  # an earlier overrun is not the cause
                 else f"odometry frames lost on the line: {more}; check cable and hub"
             )
         total = refused.imu + refused.displacements + refused.poses
@@ -103,9 +103,9 @@ class Notices:
         return [sentence]
 
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
-        """Return the notice that no standstill was measured although Stop was repeated long enough.
+        """Return the notice that Stop was repeated for its full time without a measured standstill.
 
-        ``measured``: whether displacements came meanwhile; ``blind``: whether the board does not
+        ``measured``: whether displacements arrived meanwhile; ``blind``: whether the board does not
         measure its wheels after such a command.
         """
         if mode is Mode.IMU_ONLY:
@@ -126,15 +126,15 @@ class Notices:
 
 
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
-    """Return a sentence that no valid data came for ``silence_s``, with what to check.
+    """Return a sentence: no valid data arrived for ``silence_s``, and what to check.
 
-    ``bytes_came``: whether invalid bytes came; ``baudrate``: whether the port has a baud rate.
+    ``bytes_came``: whether invalid bytes arrived; ``baudrate``: whether the port has a baud rate.
     """
     if bytes_came:
         return (
             f"no valid data for {silence_s:g} s; check"
-            f"{' the parameter `baudrate`,' if baudrate else ''} the cable, and that it is this"
-            " type of board"
+            f"{' the parameter `baudrate`,' if baudrate else ''} the cable, and the type of the"
+            " board"
         )
     return (
         f"no data from the board for {silence_s:g} s; check its power, its cable and the parameter"

@@ -53,7 +53,8 @@ class RecentFigures:
         return self._window[-1][0] - self._window[0][0]
 
     def rates_hz(self) -> dict[RateName, float] | None:
-        """Return the recent rate of each kind of reading in Hz, or None in a new state."""
+        """Return the recent rate of each kind of reading in Hz; None just after a change of
+        state."""
         if not self.span_s:
             return None
         old, new = self._window[0][1].tally, self._window[-1][1].tally
@@ -65,7 +66,7 @@ class RecentFigures:
         return {name: count / self.span_s for name, count in counts.items()}
 
     def delay_s(self) -> tuple[float, float] | None:
-        """Return mean and standard deviation of the reads' delay above the smallest delay, in s.
+        """Return mean and standard deviation, in s, of the reads' delay above the smallest delay.
 
         Returns None without recent reads.
         """

@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.readings import ImuReading, Reading, SampleBoundary
 
 SMALLEST_STEP_S: Final = 1e-6
-"""Step in s between the stamps of two readings that one read brought."""
+"""Step in s between the stamps of two readings that arrived in the same read."""
 
 
 class ArrivalClock:

@@ -1,25 +1,25 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The time of each tick: a straight line over the ticks, fitted to times between which they came.
+"""The time of each tick: a straight line over the ticks, fitted to bounds of their times.
 
 The bytes of a tick come late, never early: arrivals are on or above the line, whose slope is the
-true period. Bytes that a read did not bring were sent after it, so the line cannot be much lower
-either. Of every block of ticks two points are kept:
+true period. Bytes that a read did not bring were sent after that read, so the line cannot be much
+lower either. Two points are kept of every block of ticks:
 
 *Latest*, the least delayed arrival, is an upper bound. It always holds; bursts, stalls and losses
 only make it loose.
 
-*Earliest*, from what a read did not bring, is a lower bound. A read that was late itself gives one
-that is too high, so the greatest tenth is left out. A bound far below the arrivals is of little
-use, and is not kept.
+*Earliest*, from what a read did not bring, is a lower bound. A read that was late gives a bound
+that is too high, so the highest tenth of the bounds is left out. A bound far below the arrivals is
+of little use, and is not kept.
 
-With earliest points, every pair of a latest and an earliest one bounds the slope, and the line runs
-in the middle of all bounds. A timer that keeps the reads from cutting a sample for seconds then
-causes an error of at most half of what it hides. Without earliest points, or if the bounds
-contradict each other (then reads were late), the line is laid under the latest points as close as
-possible: on an edge of their lower convex hull. If there are points of cut samples, only these are
-used, because cut samples have not waited. The line is laid in the same way if every block has such
-a point.
+With earliest points, every pair of a latest and an earliest point bounds the slope, and the line
+runs in the middle of all bounds. If an adapter's timer hides the true arrival times for seconds,
+the error is at most half of the time that it hides. Without earliest points, or if the bounds
+contradict each other (which shows that reads were late), the line is laid under the latest points
+as close as possible: on an edge of their lower convex hull. A read that ends within a sample cuts
+it; a cut sample has not waited. So if any latest points are of cut samples, only these are used. If
+every block has one, the line is always laid under them, without the earliest points.
 
 This module knows ticks and times, in s of the host's steady clock; it does not know what is
 sampled, nor how ticks are counted.
@@ -35,7 +35,7 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept.
 
-If an adapter's timer and the board's tick differ by 100 ppm, their phases recur every 20 s.
+If an adapter's timer and the board's tick differ by 100 ppm, their phases repeat every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest relative deviation of the board's crystal from the host's: 100 ppm, with a margin."""
@@ -52,8 +52,8 @@ LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest distance of an earliest point below a latest one, as a fraction of a period.
 
-Points that are farther apart are not used together. Seen from the tick, the reads of an adapter
-with a 16 ms timer are 2 ms apart.
+An earliest point that is farther below is not kept. With a 16 ms timer in the adapter, reads occur
+at phases of the 10 ms tick that are 2 ms apart.
 """
 
 Point = tuple[int, float]

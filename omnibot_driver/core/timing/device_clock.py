@@ -1,17 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Sampling times from arrival times: the board's clock, as it is seen from the host's.
+"""Sampling times from arrival times: the board's clock, as seen by the host's clock.
 
 The board samples once a tick, by a crystal of its own. Its bytes arrive with a delay that is
 unknown and always changes, but never before they were sent. Two questions follow.
 
 *Which tick is it?* IMU readings are counted, together with those that are reported as lost. Losses
-without a trace are counted exactly by the displacements' counter. Until the next displacement, or
-without any, arrival times show them: a read takes all bytes that have come, so the newest tick in
-it is hardly older than one period, and never from the future.
+without a trace are counted exactly by the displacements' counter. Until the next displacement
+arrives, or if none ever does, arrival times show such losses: a read takes all bytes that have
+arrived, so its newest tick is hardly older than one period, and never from the future.
 
 *When was it?* ``ClockFit`` lays a line under the arrivals. The error that remains in the stamps is
-the least delay that ever occurs: one constant.
+the least delay that ever occurs, which is a constant.
 
 This module knows readings and times. It reads no clock and does not know any board's bytes.
 """
@@ -36,9 +36,9 @@ LARGEST_LOSS_TICKS: Final = 25
 If more are missing, everything known about the clock is forgotten.
 """
 BEAT_READS: Final = 12
-"""Number of reads in a row of which at least one has little delay.
+"""Number of consecutive reads of which at least one has little delay.
 
-With an adapter that delivers every 16 ms, the place in the stream where reads end recurs after five
+If an adapter delivers every 16 ms, the phase of the tick at which reads occur repeats after five
 reads.
 """
 CALM: Final = 0.45
@@ -47,9 +47,9 @@ CALM: Final = 0.45
 Two reads in a row must be this near. The limit must be less than half a period.
 """
 LARGEST_RISE: Final = 0.02
-"""Largest fraction of a period by which a stamp rises per tick, after the line moved later."""
+"""Largest fraction of a period that the stamps gain per tick, after the line moved later."""
 SMALLEST_STEP_S: Final = 1e-6
-"""Smallest step in s between two stamps, used if even their arrivals leave no room."""
+"""Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
 WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 """Boundary of a read that ended with a complete sample."""
@@ -87,12 +87,12 @@ class DeviceClock:
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
-        Ticks that are seen soon after a late tick had waited together with it.
+        Ticks that are seen soon after a late tick had waited together with that tick.
         """
         self._awaited: Point | None = None
-        """The tick after the newest, and a time in s by which no read had brought it."""
+        """The tick after the newest one, and a time in s until which no read had brought it."""
         self._cut_off: Point | None = None
-        """Lower bound for a tick whose sample the last read cut; None otherwise.
+        """Lower bound for the tick whose sample the last read cut; None if no sample was cut.
 
         The bound holds if the rest of the sample arrives, and was not lost.
         """
@@ -142,10 +142,10 @@ class DeviceClock:
         return stamps
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp in s of one reading that came alone and when due, else None.
+        """Return the stamp in s of one reading that came alone and on time, else None.
 
         If the result is None, nothing has changed, and ``stamps`` must be called. Most reads of a
-        board with an IMU bring one reading when due; this method is faster for them.
+        board with an IMU bring one reading on time; this method is faster for them.
         """
         if reading.lost:
             return None
@@ -157,7 +157,7 @@ class DeviceClock:
     def _due(
         self, tick: int, now: float, edge: SampleBoundary | None, readings: int
     ) -> float | None:
-        """Return the stamp in s of one new tick that came complete and when due, else None."""
+        """Return the stamp in s of one new tick that came complete and on time, else None."""
         line = self._calm
         if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
             return None
@@ -173,7 +173,7 @@ class DeviceClock:
         return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """Return the tick of each reading by known losses; the displacements' counter decides."""
+        """Return each reading's tick by known losses; the displacements' counter overrides them."""
         ticks: list[int] = []
         for reading in readings:
             if isinstance(reading, ImuReading):
@@ -201,7 +201,7 @@ class DeviceClock:
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
-            return 0  # its beginning was seen before, and showed more
+            return 0  # an earlier read saw its first bytes, which show more
         lag_s = arrival - line.at(tick)
         period_s, lags_s = self._period_s, self._lags_s
         short = 0
@@ -217,7 +217,7 @@ class DeviceClock:
                 and now - self._seen_at > period_s / 2
                 and (0.95 < at_once_s / period_s < 1.05 or 0.95 < later_s / period_s < 1.5)
             ):
-                short = 1  # more than one at once were rather delayed than lost
+                short = 1  # a larger jump is more likely a delay than a loss
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
                 lags_s.clear()
@@ -244,7 +244,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Note a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
 
-        A tick right after another one replaces the other's delay: both had waited to be read.
+        If another tick was read just before, the new delay replaces that of the other tick, because
+        both had waited to be read.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
