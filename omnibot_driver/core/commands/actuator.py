@@ -3,8 +3,9 @@
 """The interface between the command policy and a board's encoding of motion.
 
 The policy decides what the robot should do and for how long. An actuator makes the packets for it:
-set-points that are repeated (`set_point_stream.py`), or an exchange specific to the board. It
-reports what it sends to the stop proof. It reads no clock and never refuses what the policy wants.
+set-points that are repeated (`set_point_stream.py`), or an exchange specific to the board. The
+actuator reports each stop and motion that it sends to the stop proof. It reads no clock and never
+refuses an order of the policy.
 """
 
 from typing import Protocol
@@ -38,19 +39,19 @@ class Actuator(Protocol):
         """Time at which ``due`` must be called again, in s; infinity if nothing is due."""
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the board stands still under this order.
+        """Return whether the robot stands still under this order.
 
         Raises CommandRefused if the order cannot be encoded.
         """
 
     def connect(self) -> None:
-        """Begin a new connection, on which nothing has been sent and nothing is wanted."""
+        """Begin a new connection, on which nothing was sent and no order is in effect."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
         """Send ``wanted`` from now on, in place of the previous order."""
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Note that the packets of a request, which is not a motion order, were sent."""
+        """Note that packets of a request, such as start, were sent: they are not a motion order."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now, possibly none, and regard them as written."""

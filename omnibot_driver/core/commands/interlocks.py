@@ -18,8 +18,8 @@ from omnibot_driver.core.requests import Request
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    ``leaving``: the driver is shutting down, and refuses everything. ``missing``: which of several
-    lines are not open, as a sentence.
+    ``leaving``: the driver is shutting down, and refuses everything. ``missing``: which of the
+    board's lines are not open, as a sentence; empty if all are open.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Interlocks:
         return "the driver is shutting down" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Note that a motion command was refused, by this module or before it arrived here."""
+        """Note that a motion command was refused, by this module or by an earlier check."""
         self._interlock.be_active(now)
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:

@@ -2,7 +2,7 @@
 
 """Speed limits for commands; every limit keeps the direction of motion.
 
-Pure arithmetic on finite numbers; ``require_finite`` rejects all others.
+This module does pure arithmetic on finite numbers; ``require_finite`` rejects NaN and infinity.
 """
 
 import math
@@ -53,7 +53,7 @@ class SpeedLimits:
         return BodyTwist(vx, vy, yaw_rate)
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
-        """Return the velocity after ``duration_s`` of the limited acceleration from ``now``.
+        """Return the velocity that limited acceleration from ``now`` reaches in ``duration_s``.
 
         ``now`` is the present twist. The velocity changes along a straight line to ``wanted``.
         """
@@ -95,8 +95,8 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
     else:
         wrong = f"its stamp is {-age_s:.2f} s in the future"
     raise CommandRefused(
-        f"{what} refused: {wrong}: check the network and that both clocks agree (NTP,"
-        " use_sim_time), or set the stamp to zero"
+        f"{what} refused: {wrong}: check the network and that the clocks of both"
+        " computers agree (NTP, use_sim_time), or set the stamp to zero"
     )
 
 

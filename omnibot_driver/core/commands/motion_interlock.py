@@ -19,9 +19,9 @@ class Until(Enum):
 
     NOTHING = "Motion is allowed"
     RELEASE = "Motion is refused until a zero command, or a pause of `cmd_vel_timeout`"
-    START = "Motion is refused until ~/start, as this is the second time within 60 s"
+    START = "Motion is refused until ~/start is called, as this is the second stop within 60 s"
     ESTOP = (
-        "Motion is refused until the e-stop is latched and released, as this is the second time"
+        "Motion is refused until the e-stop is latched and released, as this is the second stop"
         " within 60 s"
     )
 
@@ -51,20 +51,20 @@ class MotionInterlock:
         self.until, self._tripped_at = Until.NOTHING, -math.inf
 
     def release(self) -> None:
-        """Note the release of the e-stop, which replaces ~/start on a board without it."""
+        """Note the release of the e-stop, which ends the refusal on a board without ~/start."""
         if self.until is Until.ESTOP:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Note that a sender may be active, so that the pause that ends a refusal begins anew.
+        """Restart the pause that ends a refusal, because a sender may be active.
 
-        A refused command shows that its sender is still active, whatever the reason. While the
-        process stalls, nothing shows whether a sender pauses.
+        A refused command shows that its sender is active, whatever the reason for the refusal.
+        While this process stalls, the driver cannot see whether a sender pauses.
         """
         self._commanded_at = now
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
-        """Note a command, and return the reason why it is refused; empty if not.
+        """Note a command, and return the reason why it is refused; empty if it is allowed.
 
         ``stands``: whether it is a command to stand still, which is always allowed. The pause of
         ``timeout_s`` that ends a refusal begins after the last motion command or ``be_active``.

@@ -19,7 +19,7 @@ class Stop:
 
 @value(frozen=True, slots=True)
 class EmergencyStop:
-    """The order to stand still, by the board's emergency stop too if the board has one."""
+    """The order to stand still, with the board's own emergency stop as well, if it has one."""
 
 
 @value(frozen=True, slots=True)

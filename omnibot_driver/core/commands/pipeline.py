@@ -3,7 +3,7 @@
 """The command pipeline: from a motion command to its set-point, expiry and supervision.
 
 This module connects shaping, policy, the actuator and the motion monitor with its interlock. It
-knows no modes and no requests: ``interlocks.py`` decides whether a robot may be driven now.
+does not know modes or requests: ``interlocks.py`` decides whether a robot may be driven now.
 """
 
 import math
@@ -159,11 +159,12 @@ class CommandPipeline:
         return self.shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Note that the packets of a request, which is not a motion command, were sent."""
+        """Note that packets of a request, such as start, were sent: they are not a motion
+        command."""
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Note that the current set-point was sent: the robot is expected to follow it."""
+        """Note that the current set-point was sent, so the robot is expected to follow it."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -185,7 +186,7 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Return the fault in the newest estimate, or without an estimate in the displacement."""
+        """Return the fault shown by the newest estimate or, without estimates, the displacement."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()

@@ -19,7 +19,7 @@ from omnibot_driver.core.packets import Packets
 STOPPING_S: Final = 1.0
 """Shortest time for which Stop is repeated, in s."""
 UNPROVED_S: Final = 5.0
-"""Longest time for which Stop is repeated while nothing shows that the robot stands, in s."""
+"""Longest time, in s, for which Stop is repeated while nothing shows that the robot stands."""
 ROUNDING_S: Final = 1e-6
 """Margin added to a wake-up time, in s, so that rounding cannot make it too early."""
 
@@ -39,7 +39,7 @@ class CommandSettings:
 class CommandPolicy:
     """The command in effect: what the robot should do now.
 
-    ``proof``: proof that the robot stands still, fed with displacements and with what the actuator
+    ``proof``: proof that the robot stands still, from displacements and from what the actuator
     sends.
     """
 
@@ -59,9 +59,9 @@ class CommandPolicy:
         """Command in effect, or None."""
         self.commanded_at = -math.inf
         self.quiet = False
-        """Whether ``fall_silent`` was called, without a ``halt`` since."""
+        """Whether ``fall_silent`` was called, and ``halt`` has not been called since."""
         self.unconfirmed = False
-        """Whether Stop was repeated for ``unproved_s`` without proof that a driven robot stands."""
+        """Whether Stop was repeated for ``unproved_s`` without proof that the robot has stopped."""
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
 
@@ -80,7 +80,7 @@ class CommandPolicy:
         self._actuator.apply(setpoint, now)
 
     def discard(self, now: float) -> None:
-        """Drop the current command and send nothing more; a latched e-stop stays."""
+        """Drop the current command and send nothing more; a latched e-stop stays latched."""
         self.current = self._stopping_since = None
         if not self.latched:
             self._actuator.apply(None, now)
@@ -94,7 +94,7 @@ class CommandPolicy:
             self._actuator.apply(EMERGENCY_STOP, now)
 
     def halt(self, now: float) -> None:
-        """Drop the current command, and repeat Stop until the robot is seen to stand.
+        """Drop the current command, and repeat Stop until the robot is shown to stand still.
 
         While the e-stop is latched, the emergency stop is repeated instead.
         """

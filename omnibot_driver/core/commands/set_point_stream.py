@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An actuator for boards that follow set-points: when to send which frame, and repetition.
+"""An actuator for boards that follow set-points: decides when to send or repeat which frame.
 
 Boards do not acknowledge these frames, so each is repeated. This module does not know what is in a
 frame; time is an argument.
@@ -18,10 +18,10 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 PACE_S: Final = 0.01
-"""Shortest time between frames, in s; closer ones would only fill the board's buffer."""
+"""Shortest time between frames, in s; more frequent ones would only fill the board's buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Shortest time between two set-points, in s. More of them would raise the share of time that a
-lost byte can affect (docs/internals/integrity.md); commands at 50 Hz are not slowed."""
+"""Shortest time between two set-points, in s. More set-points would increase the fraction of time
+that a lost byte can affect (docs/internals/integrity.md); commands at 50 Hz are not slowed."""
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
 
@@ -33,7 +33,7 @@ class Encoder(Protocol):
         """Return the packets that make the robot stand still."""
 
     def emergency_stop(self) -> Packets:
-        """Return the board's own emergency stop alone, without Stop."""
+        """Return the board's own emergency stop, without Stop."""
 
     def encode(self, order: Order) -> Packets:
         """Return the packets for this order. Raises CommandRefused if it cannot be encoded."""
@@ -64,7 +64,7 @@ class SetpointStream:
         self.connect()
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the order is encoded as Stop, possibly by rounding."""
+        """Return whether the order is encoded as Stop, possibly because it rounds to zero."""
         return self._encoder.encode(order) == self._encoder.stop()
 
     def connect(self) -> None:
@@ -94,8 +94,8 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Note that a request was written, and adapt what to send next.
 
-        Packets that begin with Stop on every channel count as a Stop. Any others may have completed
-        a damaged motion frame on the line, so the set-point is repeated at once.
+        Packets that begin with Stop on every channel count as a Stop. Any other packets may have
+        completed a damaged motion frame on the line, so the set-point is repeated at once.
         """
         if self._heard is not None:
             self._heard(packets, now)
@@ -127,7 +127,7 @@ class SetpointStream:
 
     @property
     def wake_at(self) -> float:
-        """Time at which the next frame is due, in s; infinity if none is."""
+        """Time at which the next frame is due, in s; infinity if none is due."""
         motion = self._motion
         if self._urgent:
             return -math.inf

@@ -3,8 +3,8 @@
 """Set-points: motion commands that return the order to send at each time.
 
 The actuator asks a ``Setpoint`` for its order whenever a frame is sent, so a set-point under an
-acceleration limit needs no timer of its own. Other modules decide whether it may be commanded, and
-when a frame is sent.
+acceleration limit needs no timer of its own. Other modules decide whether a set-point may be
+commanded, and when a frame is sent.
 """
 
 import math
@@ -23,8 +23,8 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""Limits for the growth of the distance (m) and angle (rad) to a goal. Beyond them the robot drives
-away from the goal, because no controller overshoots that far."""
+"""Largest growth of the distance (m) and the angle (rad) to a goal. No controller overshoots that
+far, so beyond these limits the robot is driving away from the goal."""
 
 
 class Authority(Enum):
@@ -44,7 +44,7 @@ class Setpoint(Protocol):
 
     @property
     def is_zero(self) -> bool:
-        """Whether it commands standstill, which is sent at once and never ramped."""
+        """Whether the command is a standstill, which is sent at once and never ramped."""
 
     @property
     def settled(self) -> bool:

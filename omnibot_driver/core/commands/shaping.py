@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command shaping: from what a caller wants to set-points in the board's axes and frame.
+"""Command shaping: turns a caller's command into a set-point in the board's axes and frame.
 
 Commands are checked and limited here. This module knows the limits and the position of the board's
 control switch; it does not know when anything is sent.

@@ -3,7 +3,8 @@
 """The stop proof: whether displacements show that the robot stands still after the last Stop.
 
 Boards do not acknowledge a stop, but displacements show it. This module knows displacements, and
-when Stop and motion were sent; not what happens while the proof is missing. Time is an argument.
+when Stop and motion were sent. It does not know what happens while the proof is missing. Time is an
+argument.
 """
 
 import math
@@ -21,21 +22,22 @@ SLACK_S: Final = 1e-6
 """Tolerance for rounding, in s: three times 0.2 s are a little less than 0.6 s in floating
 point."""
 AT_LEAST: Final = 2
-"""Fewest displacements of a proof, even if one is long enough: one alone may be damaged, or be from
-before the wheels turned."""
+"""Smallest number of displacements in a proof, even if one lasts long enough: a single displacement
+may be damaged, or may date from before the wheels turned."""
 PROOFS: Final = 2.0
 """Factor by which the duration of standstill is multiplied to get the time to wait for a proof."""
 RAREST_S: Final = 1.0
-"""Longest period of displacements, in s; a longer one spans lost displacements."""
+"""Longest period of displacements, in s; a longer displacement spans lost ones."""
 UNDER_WAY_S: Final = 0.05
-"""Time after Stop in which displacements are ignored, in s: they may have ended before Stop
+"""Time after Stop in which displacements are ignored, in s: their motion may have ended before Stop
 arrived."""
 
 
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: Stop was sent, no motion since, and the robot has stood still for ``still_s``.
+    * ``proved``: Stop was sent, no motion was sent since, and the robot has stood still for
+      ``still_s``.
     * ``owed``: motion was sent, and nothing has proved since then that the robot stands still.
     * ``measured``: a measured displacement has arrived since Stop was sent.
     """

@@ -19,7 +19,7 @@ class Pose:
     yaw_rad: float = 0.0
 
     def __add__(self, other: "Pose") -> "Pose":
-        """Add component by component, as differences in one frame add up."""
+        """Add component by component; valid for differences in one frame."""
         return Pose(self.x_m + other.x_m, self.y_m + other.y_m, self.yaw_rad + other.yaw_rad)
 
     def __sub__(self, other: "Pose") -> "Pose":
@@ -41,7 +41,7 @@ class Pose:
         return all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad)))
 
     def turned(self, angle_rad: float) -> "Pose":
-        """Return the same displacement seen from axes turned by ``-angle_rad``; yaw stays."""
+        """Return this displacement in axes turned by ``-angle_rad``; its yaw does not change."""
         cos, sin = math.cos(angle_rad), math.sin(angle_rad)
         return Pose(cos * self.x_m - sin * self.y_m, sin * self.x_m + cos * self.y_m, self.yaw_rad)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kinematics of a body with two driven wheels on one axle and a steered wheel before it.
+"""Kinematics of a body with two driven wheels on one axle and a steered wheel ahead of it.
 
 All three wheels roll about one instantaneous centre of rotation. It is the point where the line of
 the driven axle meets the line of the steered wheel's axle. The frame of the body has its origin in

@@ -2,10 +2,11 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-A gyro at rest reads its bias and noise. Three sources show whether the robot is at rest: the wheels
-(displacements whose sum is zero), the gyro (readings that hardly vary) and the accelerometer (the
-same test). None of them detects a steady turn without wheels, so the result must also be a bias
-that the sensor may have. The measurement yields the length of gravity as well.
+A gyro at rest measures only its bias and noise. Three sources show whether the robot is at rest:
+the wheels (displacements whose sum is zero), the gyro (readings that hardly vary) and the
+accelerometer (the same test). Without the wheels, a steady turn is not detected, so the result must
+also be a bias that the sensor's specification allows. The measurement yields the magnitude of
+gravity as well.
 
 This module knows readings and times. It does not read a clock, and does not know when to measure.
 """
@@ -23,9 +24,9 @@ BLOCK_S: Final = 1.0
 GAP_S: Final = 0.2
 """Longest pause between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
-"""Time in s within which a request is answered, of the five that a service has.
+"""Time in s within which a request is answered, of the five seconds that a service may take.
 
-The rest is for writing a file."""
+The other second is for writing a file."""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
@@ -34,11 +35,12 @@ STILL_MPS2: Final = 0.3
 A robot that is touched shows more."""
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
-"""Largest displacement at rest, in m and rad: resting wheels may report one count to and fro."""
+"""Largest displacement at rest, in m and rad: resting wheels may report one count back and
+forth."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """MPU-6050 product specification, section 6.1: initial zero-rate output."""
 REFINEMENT: Final = 0.05
-"""Fraction of the bias error that one block of ``BLOCK_S`` corrects: half of it in about 14 s."""
+"""Fraction of the bias error that one block of ``BLOCK_S`` corrects: half of the error in 14 s."""
 
 
 class Look:
@@ -78,7 +80,7 @@ class Look:
 
     @property
     def motion(self) -> str:
-        """The evidence of motion, as text; empty without any."""
+        """The evidence of motion, as text; empty without evidence."""
         shaken_radps, shaken_mps2 = max(deviation(self.rates)), max(deviation(self.forces))
         bias_radps = max(map(abs, mean(self.rates)))
         if self.rolled:
@@ -104,7 +106,7 @@ class GyroCalibration:
         self.refine = refine
         self.answers: list[RequestDone] = []
         self.gravity_mps2: float | None = None
-        """Length of the mean specific force at the last standstill, in m/s²."""
+        """Magnitude of the mean specific force at the last standstill, in m/s²."""
         self.noise: Vector3 | None = None
         """Standard deviation of the gyro's readings at the last standstill, in rad/s."""
         self._look = Look()
@@ -136,7 +138,7 @@ class GyroCalibration:
             )
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """Add an IMU reading, with the gyro's bias and without the accelerometer's, in SI units."""
+        """Add an IMU reading in SI units: ``rate`` includes the bias, ``force`` is corrected."""
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()

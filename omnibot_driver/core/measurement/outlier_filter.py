@@ -1,19 +1,20 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outlier filter: rejects readings that a robot cannot have made, from complete frames too.
+"""The outlier filter: rejects physically impossible readings, though their frames are valid.
 
-Two things are impossible: a displacement faster than the robot can go, and a leap of a single
-reading, away from all before it and back again with the next. A leap that lasts, or is followed by
-more leaps, is a shock, and true. So a reading that leaps waits for the next one of its kind, and is
-released with it unless it is rejected; nothing else ever waits.
+Two things are impossible: a displacement faster than the robot can move, and a spike. A spike is a
+single reading that leaps away from all readings before it, while the next one leaps back. A leap
+that lasts, or that is followed by more leaps, is a real shock. So a reading that leaps waits for
+the next one of its kind, which shows whether to release or to reject it. Poses after a waiting
+displacement wait as well; nothing else ever waits.
 
-A knock may move one axis of an accelerometer for one reading, and then the reading is true. There a
-leap is impossible only if it has the size of a bit: a changed bit moves a word by its full scale, a
-half of it, a quarter, and so on, and by nothing in between.
+A knock may move one axis of an accelerometer for a single reading, and such a reading is real. So a
+spike in one axis of an accelerometer is rejected only if it has the size of a bit: a flipped bit
+changes a word by its full scale, a half of it, a quarter, and so on.
 
-Of a board's own odometry, only readings that are not finite are rejected. A rejected displacement
-is treated like a displacement that was lost on the line. This module knows readings and the robot's
-limits; it does not know bytes or a clock.
+A reading of a board's own odometry is rejected only if it contains NaN or infinity. A rejected
+displacement is treated like a displacement that was lost on the line. This module knows readings
+and the robot's limits; it does not know bytes or a clock.
 """
 
 from collections.abc import Iterator, Sequence
@@ -38,18 +39,18 @@ Stamped = tuple[Reading, float]
 OUT_OF_PROPORTION: Final = 3.0
 """Least ratio of a spike to the largest recent step."""
 CALMING: Final = 0.95
-"""Factor by which each reading reduces the largest recent step: 20 of them leave a third."""
+"""Factor by which each reading reduces the largest recent step; 20 readings leave a third of it."""
 STILL: Final = 0.08
-"""Part of a leap by which the sensor's other values may change during the leap.
+"""Fraction of a leap by which the sensor's other values may change during the leap.
 
-After the leap, all values may differ by the same part from those before the leap.
+After the leap, each value may differ by this fraction of the leap from its value before.
 """
 END_OF_SCALE: Final = 0.99996
-"""Part of full scale that is just below the largest positive word."""
+"""Fraction of full scale that is just below the largest positive word."""
 MOST_HELD: Final = 10
-"""Number of readings, a leaping displacement and poses after it, that are held at most."""
+"""Largest number of readings that are held: a leaping displacement, and the poses after it."""
 BACK: Final = 0.25
-"""Part of a leap of the motion that may remain when the leap is over."""
+"""Fraction of a leap of the motion that may remain when the leap is over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,11 +80,11 @@ class Refused:
 
 
 class OutlierFilter:
-    """Rejects implausible readings, and holds those that leap until the next one decides.
+    """Rejects implausible readings, and holds a reading that leaps until the next one arrives.
 
     ``limits`` may be replaced at any time; ``tick_s``: time between two ImuReadings in s.
-    ``corrected``: displacements are steps of an estimate that leaps when it is corrected; an
-    impossible step is then passed on with ``measured`` False.
+    ``corrected``: whether displacements are steps of the board's own estimate, which leaps when the
+    board corrects it. An impossible step is then passed on with ``measured`` False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -149,7 +150,7 @@ class OutlierFilter:
 
     def _admit_displacement(self, reading: DisplacementReading, stamp_s: float) -> list[Stamped]:
         before_s, self._displaced_at_s = self._displaced_at_s, stamp_s
-        seconds = reading.duration_s or None  # two that arrive at once show no time
+        seconds = reading.duration_s or None  # None for 0 s: two arrived at once
         if seconds is None:
             self._motion_leaps.forget()
             seconds = None if before_s is None else (stamp_s - before_s) or None
@@ -193,7 +194,7 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; a pose gets the count of rejected displacements before it as losses.
+        """Return the reading; to the losses of a pose, add the displacements rejected before it.
 
         The pose includes the motion of these displacements.
         """
@@ -216,10 +217,10 @@ class OutlierFilter:
 
 
 class _Spikes:
-    """Finds single leaps in a series of values, each in units of a step that is always allowed.
+    """Finds spikes in a series of values, which are in units of a step that is always allowed.
 
-    ``left``: part of a leap that may remain when the leap is over; ``knocked``: how many of the
-    values, from the first, a knock may move for one reading. A knock does not move the others.
+    ``left``: fraction of a leap that may remain when the leap is over; ``knocked``: a knock may
+    move the first ``knocked`` values for one reading, but no value after them.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -236,10 +237,10 @@ class _Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Return whether the leap before was a single one, and whether these values leap too.
+        """Return whether the previous values were a spike, and whether these values leap.
 
-        ``periods``: number of periods since the values before; ``topmost_bit``: size of the highest
-        bit of the values that a knock may move.
+        ``periods``: number of periods since the previous values; ``topmost_bit``: size of the
+        highest bit of the values that a knock may move.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False

@@ -87,11 +87,11 @@ class MeasurementPipeline:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """Return the IMU estimates that are certain with these readings, which arrived at ``now``.
+        """Return the IMU estimates that become certain with the readings, which arrived at ``now``.
 
-        Other readings wait for ``flush``, as do IMU readings that came after them, to keep order.
-        Most reads of a board with an IMU bring one IMU reading and nothing else: that is measured
-        without the lists that more readings need.
+        Other readings wait for ``flush``, and IMU readings after them wait too, to keep the order.
+        Most reads of a board with an IMU bring one IMU reading and nothing else. Such a reading is
+        processed without lists, which is faster.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

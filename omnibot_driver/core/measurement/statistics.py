@@ -49,7 +49,7 @@ class StreamStatistics:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
-    """``imu`` plus ``lost_imu`` at the last displacement; None without one to count from."""
+    """``imu`` plus ``lost_imu`` at the last displacement; None without such a displacement."""
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
@@ -73,14 +73,14 @@ class StreamStatistics:
             elif isinstance(reading, PoseReading):
                 self.poses += 1
                 self._miss(reading.lost, reading.restarted)
-                if self._sent_imu is not None:  # the next displacement does not report them again
+                if self._sent_imu is not None:  # the next displacement does not count these
                     self._sent_imu += reading.lost * self._imus_per_displacement
             else:
                 self.same_force = self.same_rate = 0
                 self._sent_imu = None
 
     def _miss_imus(self, reading: DisplacementReading) -> None:
-        """Count the IMU readings that were lost with displacements, as frames do not show them."""
+        """Count IMU readings lost together with displacements; frames do not show these losses."""
         if self.imu_period_s is None:
             return
         if reading.duration_s is None or reading.restarted:

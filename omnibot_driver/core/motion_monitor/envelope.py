@@ -24,13 +24,13 @@ NOISE_RADPS: Final = 0.05
 This covers encoder counts, rounding, and a slope on which a slow controller lets the robot roll.
 """
 SIDEWAYS: Final = 0.1
-"""Part of a speed, or of a yaw rate, that is allowed in any direction.
+"""Fraction of a speed, or of a yaw rate, that is allowed in any direction.
 
 The heading is uncertain, and wheels differ. This error is independent of the noise, so the squares
 of both are added.
 """
 OVERSHOOT: Final = 0.15
-"""Part of a change of set-point by which a robot may overshoot, in any direction.
+"""Fraction of a change of set-point by which a robot may overshoot, in any direction.
 
 This is allowed only if the robot leaves a set-point other than rest.
 """
@@ -53,8 +53,8 @@ def outside(
 ) -> tuple[float, float]:
     """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
 
-    ``explained``: velocities by the set-points, that of the current one first. If the heading is
-    unknown, only the magnitude of the linear velocity is checked.
+    ``explained``: velocities that the set-points explain, that of the current set-point first. If
+    the heading is unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0

@@ -2,9 +2,9 @@
 
 """The following error: how far a robot moves outside its envelope without interruption.
 
-A single displacement does not exceed a limit, as its data may be damaged. A short jerk ends before
-its displacements add up to the limit. This module knows velocities in the board's own axes, and
-times; it does not know which fault an error shows.
+A single displacement never exceeds a limit, because its data may be damaged. A short jerk ends
+before its displacements add up to a limit. This module knows velocities in the board's own axes,
+and times; it does not know which fault an error shows.
 """
 
 from typing import Final
@@ -15,11 +15,11 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s: a robot slower than all set-points of this time is held by something."""
+"""Time in s. A robot that is slower than all set-points of this time is regarded as held."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest part of the limits above that one displacement, or one long displacement, adds.
+"""Largest fraction of these limits that one displacement, or one long displacement, adds.
 
 So a limit is exceeded after three displacements in a row, or two long ones, at the earliest.
 """

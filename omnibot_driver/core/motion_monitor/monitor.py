@@ -114,11 +114,12 @@ class MotionMonitor:
             self._has_stood = False
 
     def release(self) -> None:
-        """Note a release of the e-stop, which may be why the robot does not move afterwards."""
+        """Note a release of the e-stop; the board may still hold its own, so the robot may not
+        move."""
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Return whether to report this fault: once, until the robot has obeyed again."""
+        """Return whether to report this fault: only once, until the robot obeys again."""
         told, self._told = self._told, self._told | {fault}
         return fault not in told
 
@@ -136,7 +137,7 @@ class MotionMonitor:
         return self._blame(Fault.BEYOND_LIMITS, now) if driven else Fault.UNCOMMANDED
 
     def disregard_refused(self, count: int) -> None:
-        """Note the number of rejected displacements, as above, while robots are not monitored."""
+        """Note the number of rejected displacements while the robot is not monitored."""
         self._refused = self._refused_before = count
 
     def check(
@@ -166,7 +167,7 @@ class MotionMonitor:
         return self._blocked(motion, seconds, heading_known=heading_known)
 
     def _blame(self, fault: Fault, now: float) -> Fault:
-        """Return ``fault``, and suspend the checks, as rolling out is not another fault."""
+        """Return ``fault``, and suspend the checks, because the robot may still roll to a halt."""
         self._error.reset()
         self._history.add(None, now)
         return fault
@@ -174,7 +175,8 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault: too fast if a set-point has the measured direction, else wrong way.
 
-        ``explained``: velocities by the set-points. Linear directions may differ by 60°.
+        ``explained``: velocities that the set-points explain. Linear directions that differ by less
+        than 60° count as the same direction.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -187,7 +189,7 @@ class MotionMonitor:
         return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
 
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
-        """Return UNCOMMANDED if a robot moves without a command and Stop is to be sent, else None.
+        """Return UNCOMMANDED if a robot moves without a command and Stop is due, else None.
 
         If the robot was at rest after its last command, a person may be pushing the robot. Then
         the pauses between the Stops become longer.

@@ -18,7 +18,7 @@ CommandedTwist = BodyTwist | None
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]
-"""The values of a BodyTwist; many are made, and a plain tuple is made quickly."""
+"""The values of a BodyTwist; a plain tuple, because many are made and a tuple is made quickly."""
 
 HELD_S: Final = 0.3
 """Time in s for which a replaced set-point explains its full velocity.
@@ -33,13 +33,13 @@ Robots with a time constant of up to 0.35 s stay within the envelope.
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored: 2 % of its velocity are left."""
 UNKNOWN_S: Final = 0.8
-"""Time in s after a first known set-point until motion from unknown commands has ended."""
+"""Time in s after the first known set-point until motion by unknown commands has ended."""
 HISTORY_S: Final = 3.0
-"""Length of the history in s; a computer that reads displacements later has stalled."""
+"""Length of the history in s; a computer that reads displacements later than this has stalled."""
 
 
 class SetpointHistory:
-    """The recent set-points. ``current``: the one that was added last."""
+    """The recent set-points. ``current``: the set-point that was added last."""
 
     def __init__(self) -> None:
         self.clear()
@@ -83,7 +83,7 @@ class SetpointHistory:
         return any(each is not AT_REST for each in self.since(at_s))
 
     def explained(self, at_s: float) -> list[Velocity]:
-        """Return the velocities that the robot may have at ``at_s``, by its set-points.
+        """Return the velocities that the set-points explain at ``at_s``.
 
         The velocity of the current set-point comes first.
         """

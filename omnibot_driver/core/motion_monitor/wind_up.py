@@ -2,10 +2,10 @@
 
 """The wind-up of wheel controllers while a robot is held or pushed, and the motion it explains.
 
-The controllers integrate. A robot loses distance against its set-point while it is held, or is
-moved while its set-point is rest; once released, it makes up for that distance. It then moves
-faster than commanded or backwards, even if the command has changed meanwhile or is a stop. This
-module knows velocities; it does not know what is inside the envelope.
+The wheel controllers integrate their errors. A robot that is held falls behind its set-point; a
+robot whose set-point is rest may be pushed away. Once released, the robot makes up for that
+distance. It then moves faster than commanded or backwards, even if the command has changed
+meanwhile or is a stop. This module knows velocities; it does not know what is inside the envelope.
 """
 
 import math
@@ -30,7 +30,7 @@ FORGOTTEN_AT_REST_S: Final = 20.0
 A robot whose set-point is rest may still be held, and then its wind-up does not decrease.
 """
 HELD_PART: Final = 0.7
-"""Part of its set-points that a robot does not reach while something holds it."""
+"""Fraction of its set-points below which a robot's speed shows that something holds it."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
 """Speeds in m/s and rad/s against the set-point above which a robot is not regarded as held.
@@ -42,7 +42,8 @@ LEVER_M: Final = 0.15
 
 
 class WindUp:
-    """The wind-up of a robot's wheels. ``way_m``: distance at a rim still to make up for, in m."""
+    """The wind-up of a robot's wheels. ``way_m``: distance in m at a rim, still to be made up
+    for."""
 
     def __init__(self) -> None:
         self.way_m = 0.0
@@ -53,10 +54,10 @@ class WindUp:
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract motion outside the envelope from the wind-up; return whether it was larger.
+        """Subtract motion outside the envelope; return whether the wind-up was larger than it.
 
-        If the wind-up was larger, it explains that motion. ``way_mps``, ``turn_radps``: speeds
-        outside the envelope, for ``seconds``.
+        A larger wind-up explains that motion. ``way_mps``, ``turn_radps``: speeds outside the
+        envelope, for ``seconds``.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -77,7 +78,7 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add the distance that a held robot loses; if not held, forget the wind-up gradually.
+        """Add the distance that a held robot loses; if it is not held, slowly forget the wind-up.
 
         ``motion``: motion inside the envelope. ``newest``: the set-points that the robot may not
         have reached yet, the current one first.

@@ -54,7 +54,7 @@ class CorrectionSmoother:
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Move ``pose`` by the part of its correction due in ``seconds``, within the room."""
+        """Move ``pose`` by the correction that is due in ``seconds``, within the room."""
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0
         self._settling_s = max(0.0, self._settling_s - seconds)

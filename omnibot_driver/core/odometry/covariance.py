@@ -2,13 +2,12 @@
 
 """The uncertainty of the odometry: its sources of error, kept separately.
 
-* Errors of the wheels: slip on every metre, a random walk; and a wrong wheel size or constant slip,
-  the same error in every turn of a wheel, which grows with the distance and is undone on the way
-  back.
+* Errors of the wheels. Slip that varies is a random walk. A wrong wheel size, or constant slip, is
+  the same error in every turn of a wheel: it grows with the distance and cancels on the way back.
 * ``gap``: unreported motion, which a later pose of the board reveals.
 * Known errors that are still being corrected; they are added at their full size.
 
-Knows covariances and the wheels' geometry; not times, frames or boards.
+This module knows covariances and the wheels' geometry. It does not know frames or boards.
 """
 
 import math
@@ -74,9 +73,9 @@ class Covariance:
         )
 
     def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
-        """Return the covariance with more independent errors, as (variance, x, y, yaw).
+        """Return the covariance after adding independent errors, each as (variance, x, y, yaw).
 
-        Each error lies along the line (x, y, yaw), with a variance in units of that vector.
+        Each error lies along the vector (x, y, yaw); its variance is in units of that vector.
         """
         xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
         for variance, x, y, yaw in errors:
@@ -127,8 +126,8 @@ class Uncertainty:
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.
 
-        ``heading_rad``: heading before the move. Computed with plain numbers: Pose objects would
-        take a third of the time of an odometry message.
+        ``heading_rad``: heading before the move. Computed with plain numbers, because Pose objects
+        would take a third of the time of an odometry message.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return
@@ -176,7 +175,7 @@ class Uncertainty:
         self.gap = NOTHING
 
     def give_up(self) -> None:
-        """Keep the uncertainty of all gaps for good, as the motion in them stays unknown."""
+        """Keep the uncertainty of all gaps permanently, as the motion in them stays unknown."""
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
@@ -194,7 +193,7 @@ class Uncertainty:
 
 @cache
 def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
-    """Return, for each wheel, the body's motion while only that wheel rolls, by one metre."""
+    """Return, for each wheel, the body's motion if that wheel alone rolls by one metre."""
     count = len(wheels.joints)
     rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
     return tuple(

@@ -3,10 +3,10 @@
 """The odometry estimator: from displacements and the board's own poses to pose, twist, covariance.
 
 The main idea: ``_board`` is the robot's pose in the board's frame. Displacements update it at once,
-and the board's poses correct it. The target of the ``CorrectionSmoother`` is the same place in the
-odometry frame. Both always move by the same tangent in the body's axes, so motion that was lost on
-the line is recovered with the next pose. This module knows SE(2); it knows no bytes, no clock and
-no ROS.
+and the board's poses correct it. The target of the ``CorrectionSmoother`` is the robot's pose in
+the odometry frame. Both always move by the same tangent in the body's axes, so motion that was lost
+on the line is recovered with the next pose. This module knows SE(2). It does not know bytes, clocks
+or ROS.
 """
 
 import math
@@ -24,25 +24,25 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
-"""Board time without any pose after which heading 0 is assumed, in s."""
+"""Board time, in s, without any pose, after which heading 0 is assumed."""
 LONG_GAP_S: Final = 1.0
 """Lost board time, in s, above which the next displacements wait for a pose that shows the lost
 motion."""
 POSE_DUE_S: Final = 0.24
-"""Board time within which a pose arrives, unless it is lost too, in s."""
+"""Board time, in s, within which the next pose arrives unless it is lost as well."""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation in rad, from open gaps, of a heading that counts as known."""
 UNKNOWN_S: Final = 0.5
-"""Time in which a robot rolls to a halt, in s: duration of the motion that may be unreported in a
-gap of unknown length."""
+"""Time in which a robot rolls to a halt, in s. In a gap of unknown length, motion of this duration
+may be unreported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:
     """The settings of the odometry.
 
-    * ``use_board_pose``: whether the board's poses correct the odometry. Without it they only give
-      the initial heading, which displacements in the earth frame need.
+    * ``use_board_pose``: whether the board's poses correct the odometry. If not, the poses only
+      give the initial heading, which displacements in the earth frame need.
     * ``fastest_mps``, ``fastest_radps``: speeds that the robot can never exceed, even if pushed.
     * ``linear_scale``, ``angular_scale``: true distance and turn, divided by those that the board
       reports by the nominal sizes of its wheels.
@@ -194,10 +194,10 @@ class Odometry:
     # The board's frame
 
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
-        """Return whether a pose shows that the board's frame has changed, or is the first one.
+        """Return whether a pose is the first one, or shows that the board's frame has changed.
 
-        After a suspected restart, a single pose decides if it fits the motion since the restart, or
-        the motion since the last pose before it.
+        After a suspected restart, a single pose is enough to decide, if it fits the motion since
+        the restart, or the motion since the last pose before the restart.
         """
         if self._board is None:
             return confirmed
@@ -221,7 +221,7 @@ class Odometry:
         return estimates
 
     def _resume(self, told: Pose) -> list[OdometryEstimate]:
-        """Recover the motion that was lost before the waiting displacements, from a pose."""
+        """Use a pose to recover the motion that was lost before the waiting displacements."""
         assert self._board is not None
         seconds = self._backlog.unstamped_s(self._last_stamp_s)
         way = log_of(self._board.way_to(self._backlog.before(told)))
@@ -235,7 +235,7 @@ class Odometry:
         return estimates
 
     def _assume(self) -> None:
-        """Assume that the last pose is right though unconfirmed, or heading 0 without any pose."""
+        """Assume that the last, unconfirmed pose is right; without any pose, assume heading 0."""
         if self._belief.doubted is not None:
             self._begin_at(self._backlog.before(self._belief.doubted))
         else:
@@ -250,8 +250,9 @@ class Odometry:
     def _judge(self, told: Pose, confirmed: bool) -> None:
         """Accept a pose that is reachable and expected, or that confirms the last unexpected one.
 
-        A confirmed pose that is out of reach changes the place of the frame instead of the
-        odometry. Any other pose waits for the next one to confirm it.
+        A confirmed pose that is out of reach changes the place of the odometry frame in the board's
+        frame; the odometry itself does not change. Any other pose waits for the next one to confirm
+        it.
         """
         assert self._board is not None
         way = self._board.way_to(told)

@@ -16,9 +16,9 @@ from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
-"""Deviations in m and rad above which the next pose must confirm a pose.
+"""Deviations in m and rad above which a pose must be confirmed by the next one.
 
-They are allowed in addition to what open gaps explain.
+The deviation that open gaps explain is allowed in addition.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -30,8 +30,8 @@ class PoseGate:
     """Decides which poses of the board are accepted.
 
     * ``proved``: the last accepted pose; None before the first, and after it has become invalid.
-    * ``doubted``: the last unexpected pose, which the next pose must confirm, moved along with the
-      robot since; None without one.
+    * ``doubted``: the last unexpected pose, which the next pose must confirm; it is moved along
+      with the robot. None if no pose is to be confirmed.
     """
 
     def __init__(self) -> None:

@@ -60,7 +60,8 @@ class PoseTracker:
     def way_to(self, place: Pose) -> Pose:
         """Return the tangent from the robot's pose to ``place``, by the shorter turn.
 
-        ``place`` is in the odometry frame, the tangent in the board's body axes and size.
+        ``place`` is in the odometry frame. The tangent is in the board's body axes, for the wheel
+        sizes that the board assumes.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
@@ -68,7 +69,7 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent that took ``seconds``.
 
-        ``stamped_s``: time that the stamps leave for it, in s, which limits the motion of the
+        ``stamped_s``: time in s that the stamps leave for this motion; it limits the motion of the
         published pose.
         """
         follower, chord = self.follower, roll(self._part(tangent))
