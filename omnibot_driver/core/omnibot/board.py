@@ -113,7 +113,8 @@ class OmniBot:
         )
         self._decoder.statistics = self._statistics
         self._pieces: list[Piece] = []
-        """First bytes of an IMU frame that came by itself, until the rest arrives."""
+        """First bytes of an IMU frame that arrives in several reads, until its last bytes
+        arrive."""
         self._translation.connect()
         self._modes = self._translation.modes
 
@@ -228,7 +229,7 @@ class OmniBot:
         return packed(STOP)
 
     def start_requested(self) -> None:
-        """Do nothing more: ``start`` is the same whether the user or the driver starts."""
+        """Do nothing more: ``start`` is the same, whether the user or the driver requests it."""
 
     def start(self) -> Packets:
         """Return the letter S, which starts the board."""
@@ -266,5 +267,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return what a guard process sends if this one fails: Stop, and E-stop with Stop."""
+        """Return what the guard sends if this process fails: Stop, and emergency stop with Stop."""
         return LAST_WORDS

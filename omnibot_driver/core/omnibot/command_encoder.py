@@ -2,8 +2,8 @@
 
 """The encoder that turns orders into the board's frames; it knows neither modes nor send times.
 
-Velocity and wheel commands are in the firmware's own unit, to which ``linear_scale`` and
-``angular_scale`` convert (70 and 500 are the vendor's values, found by hand). Commanded poses are
+Velocity and wheel commands are in the firmware's own unit. ``linear_scale`` and ``angular_scale``
+convert to this unit (70 and 500 are the vendor's values, found by trial). Commanded poses are
 assumed to have the unit of the poses that the board sends, mm and mrad; this is not verified.
 """
 
@@ -112,7 +112,7 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Encode a goal for positional control. A goal at the origin is not replaced by Stop.
+        """Encode a goal for positional control; a goal at the origin is not sent as Stop.
 
         Raises CommandRefused if a coordinate exceeds 16 bits, or if its high byte is S, P or R: if
         bytes are lost, the board could obey this byte as a letter.

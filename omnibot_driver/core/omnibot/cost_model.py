@@ -2,8 +2,8 @@
 
 """The cost of an interpretation of the bytes: all evidence for and against it in one unit.
 
-A cost is about the negative logarithm of a probability: 1 is a factor of three. This module knows
-what a board is likely to send after what it sent before, and how likely a line damages it; it does
+A cost is about the negative logarithm of a probability: a cost of 1 is a factor of three. This
+module knows what a board is likely to send next, and how likely the line is to damage it. It does
 not know how interpretations are searched (``trellis``) or when one is accepted (``decoder``).
 
 Content is soft evidence: the cost of a frame's content stays below the cost of calling the frame
@@ -36,15 +36,15 @@ HEADER_BYTE: Final = 7.5
 HEADER_IN_PLACE: Final = 4.0
 """Extra cost of a frame that gained bytes, if a header is where the frame should have ended."""
 BAD_RUN: Final = 6.0
-"""Cost of beginning a run of unexplained bytes (a bad run): a burst was lost, or noise."""
+"""Cost of the beginning of a run of unexplained bytes (a bad run), from a lost burst or noise."""
 BAD_TAIL: Final = 2.5
 """Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
 UNKNOWN_START: Final = 1.0
-"""Cost if the first bytes are the rest of a frame: most silences end between frames."""
+"""Cost if the first bytes are the rest of a frame, as most silences end between frames."""
 BAD_BYTE: Final = 0.35
-"""Cost of each byte of a bad run; with ``BAD_RUN``, 14 of them exceed any true IMU frame."""
+"""Cost of each byte of a bad run; ``BAD_RUN`` and 14 bytes cost more than any true IMU frame."""
 BAD_HEADER: Final = 0.5
-"""Cost of a header within a bad run: few arise by chance, some from a gyro at rest."""
+"""Cost of a header within a bad run: few arise by chance, some from readings of a gyro at rest."""
 GAP: Final = 5.0
 """Cost of a pause of the line within a frame; the board sends a frame without a pause."""
 BAD_TEXT: Final = 4.0
@@ -57,7 +57,7 @@ Too high to accept the frame; low enough to allow for a pause that misleads.
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
 ENDS_IN_NOISE: Final = 2.0
-"""Cost of a line that falls silent within a bad run, though it normally does so after a frame."""
+"""Cost of a line that falls silent within a bad run; normally a line does so after a frame."""
 
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
@@ -74,7 +74,7 @@ LOOK_ALIKE: Final = 12.0
 """Cost of an acceleration below 0.5 g, one word of which has the bytes of an IMU header.
 
 A gyro word of -6 has these bytes. In a run of IMU frames, such words are the headers of a second,
-shifted run of false frames, in which gyro words are in the place of accelerations.
+shifted run of false frames, in which gyro words take the place of accelerations.
 """
 JUMP: Final = 2.5
 """Cost of a counter that is not the next one: a frame before this one was lost."""
@@ -87,13 +87,13 @@ With deltas at 25 Hz, four IMU frames per delta and five deltas per pose are exp
 """
 
 CONTRADICTED: Final = 1.5
-"""Cost of a pose whose turn since the last pose differs from the sum of the deltas between."""
+"""Cost of a pose whose turn since the last pose differs from the sum of the deltas in between."""
 
 IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""Largest rounding error of a sum of deltas in 0.1 mrad: a constant, and an addend per delta.
+"""Largest rounding error of a sum of deltas in 0.1 mrad: a constant part, and a part per delta.
 
 Five deltas have an error of 4 at most.
 """
@@ -107,7 +107,7 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missed deltas after which a delta is not expected any more."""
+"""Number of missed deltas after which deltas are no longer expected."""
 
 
 class Context(NamedTuple):
@@ -121,7 +121,7 @@ class Context(NamedTuple):
     deltas: int = 0
     """Number of deltas since the last pose."""
     shaken: bool = False
-    """Whether the last IMU frame differed much from the one before, or its norm was unusual."""
+    """Whether the last IMU frame had an unusual norm, or differed much from the one before."""
     turned: int | None = None
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
@@ -136,7 +136,7 @@ NOTHING_KNOWN: Final = Context()
 class Expectation:
     """Judges the content of a frame by the frames before it.
 
-    Learns from accepted frames how much the words of the IMU scatter.
+    Accepted frames teach this class how much the words of the IMU scatter.
     """
 
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
@@ -155,8 +155,9 @@ class Expectation:
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
         """Limits within which an IMU frame costs nothing, in counts.
 
-        Least and greatest squared norm of the acceleration, largest step of an acceleration word,
-        largest step of a gyro word. They are integers, which Python compares twice as fast.
+        The limits are the least and the greatest squared norm of the acceleration, and the largest
+        steps of an acceleration word and of a gyro word. They are integers, which Python compares
+        twice as fast.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:

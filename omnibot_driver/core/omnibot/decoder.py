@@ -42,7 +42,7 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""Cost of a frame's content from which the frame waits for the bytes that follow it."""
+"""Cost of a frame's content at which the frame waits until the bytes after it arrive."""
 DOUBT_BYTES: Final = 170
 """Number of uncertain bytes that force a decision: 100 ms of the nominal stream."""
 SHORTEST_RUN: Final = DELTA_LENGTH
@@ -68,7 +68,7 @@ class DecoderStatistics:
 
 
 class FrameDecoder:
-    """Finds the frames in the bytes of a line, whatever chunks the bytes arrive in.
+    """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
     ``single_imu`` decodes some frames without this class, and updates the state of this class:
     ``context`` (what the frames so far show), ``expectation`` (which content the next frame may
@@ -150,7 +150,8 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Accept all new bytes if they are calm frames that were due; return whether they were."""
+        """If all new bytes are calm frames that were due, accept them and return True; else
+        False."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
@@ -224,7 +225,7 @@ class FrameDecoder:
         the board may send another frame right after it.
         """
         pauses, calm = self.pauses, self.calm
-        if self._arrived >= length:  # in one read: what is sent at once begins after a pause
+        if self._arrived >= length:  # in one read: a burst begins after a pause
             return not (pauses.sharp or (calm and pauses.collected and not due))
         in_time = pauses.at_pace or (calm and pauses.in_its_tick(start))
         return due or not (pauses.sharp and in_time)

@@ -2,9 +2,9 @@
 
 """The fast path for frames that no evidence speaks against, and for shocks that continue.
 
-It accepts only frames that the decoder's own loop would accept too, by their cost from ``weigh``: a
-test compares the two. All other frames are left to that loop. A single IMU frame in a read has an
-even faster path (``single_imu``).
+It accepts only frames that the decoder's own loop would also accept, by their cost from ``weigh``;
+a test compares both ways. All other frames are left to that loop. A single IMU frame in a read has
+an even faster path (``single_imu``).
 """
 
 import struct
@@ -49,15 +49,15 @@ UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
 )
 
 LEARN_EVERY: Final = 8
-"""The expectation learns from one frame in this number; more would teach it nothing new."""
+"""The expectation learns from one frame in this number of frames; more frames add little."""
 
 
 class Walk:
     """Consecutive frames, from the first byte held on, that no evidence speaks against.
 
-    ``ends``: the end of each frame; ``lessons``: frames from which the expectation is to learn, as
-    the frame's number, the frame and the IMU frame before it; ``known``: the context (as fields of
-    a Context) after some numbers of frames, each with that number.
+    ``ends``: the end of each frame; ``lessons``: frames from which the expectation will learn, as
+    the frame's number, the frame and the IMU frame before it; ``known``: numbers of frames, each
+    with the context (as fields of a Context) after that number of frames.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -115,8 +115,8 @@ def take_run(
 ) -> tuple[int, Context]:
     """Add frames from ``at`` on to ``walk``, while they are as expected; return end and context.
 
-    The context is that after the added frames. The last frame held is left out if its last byte may
-    belong to the next header.
+    The returned context is the context after the added frames. The last frame held is left out if
+    its last byte may belong to the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

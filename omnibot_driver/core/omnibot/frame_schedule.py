@@ -23,8 +23,8 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: position in the sequence after a frame of ``kind``, if it was ``at``
-    before.
+    ``after[kind][at]``: position in the sequence after a frame of ``kind``, if the position before
+    the frame was ``at``.
     """
 
     def __init__(self, *kinds: Kind) -> None:
@@ -62,8 +62,8 @@ class FrameSchedule:
         """Note a received frame of this kind; return how many IMU frames were lost before it.
 
         ``skipped``: number of bytes right before the frame that were not a frame. IMU frames lost
-        before a pose are returned with the frame after the pose. A delta ends a count of IMU
-        frames, because its SEQ reports losses.
+        before a pose are returned with the frame after the pose. A delta resets the count of lost
+        IMU frames, because the SEQ of the delta shows losses.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

@@ -50,8 +50,8 @@ class InterFrameGaps:
     * ``certain``: ``sharp`` and ``between`` were confirmed often enough that one more pause changes
       nothing.
     * ``at_pace``: the bytes of the last read came without a pause before them.
-    * ``collected``: the last read brought the bytes of more than a tick. So it may have ended
-      anywhere in a tick, and hardly right after the first byte of a frame.
+    * ``collected``: the last read brought the bytes of more than a tick. So the read may have ended
+      anywhere in a tick; an end right after the first byte of a frame is unlikely.
 
     ``byte_s``: time in s that the line takes for a byte.
     """
@@ -64,7 +64,7 @@ class InterFrameGaps:
         self.doubt()
 
     def doubt(self) -> None:
-        """Stop trusting pauses as signs of an idle line: those so far may have misled."""
+        """Stop trusting pauses as signs of an idle line, because earlier pauses may have misled."""
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 
@@ -85,7 +85,7 @@ class InterFrameGaps:
         silent = pause_s >= IDLE_S
         sharp, between = self.sharp, self.between
         if pause_s > LATE_S:
-            sharp = sharp or between or silent  # bytes were lost, hardly complete frames
+            sharp = sharp or between or silent  # bytes were lost rather than whole frames
             self._trust(sharp=False, between=False)
         width = 1 if sharp else arrived
         price = cost_model.KNOWN_GAP if between or silent else cost_model.GAP
@@ -97,7 +97,8 @@ class InterFrameGaps:
             self._trust(sharp=True, between=True)
 
     def stands_out(self, pause_s: float, arrived: int) -> bool:
-        """Return whether the line was idle before these bytes for longer than within any frame."""
+        """Return whether the line was idle before these bytes longer than it ever is within a
+        frame."""
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:

@@ -30,15 +30,15 @@ from omnibot_driver.core.omnibot.frames import (
 from omnibot_driver.core.omnibot.schedule import TICK_S
 
 IDLE_S: Final = 0.1
-"""Pause in s that exceeds what any adapter causes (16 ms), and is ten of the board's ticks."""
+"""Pause in s that is longer than any adapter causes (16 ms): ten of the board's ticks."""
 HALF_TICK_S: Final = TICK_S / 2
 """Delay in s below which a frame still counts as sent in its own tick."""
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Largest deviation in s from whole ticks of a delay that lost bytes may have caused."""
+"""Largest deviation in s from whole ticks at which lost bytes may have caused a delay."""
 INTO_TICK_S: Final = 1e-3
-"""Approximate delay in s of a delta or pose in its tick, because an IMU frame precedes it."""
+"""Approximate delay in s of a delta or pose within its tick: an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
 """Largest difference in s between the delays of two punctual reads, even with a USB adapter."""
 PACE_S: Final = 2e-4

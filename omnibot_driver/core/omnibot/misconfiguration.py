@@ -3,8 +3,9 @@
 """Checks for settings that the board's data contradicts. The user is advised to change them.
 
 The checks find poses that are plausible only in the other byte order, deltas whose sum leads to the
-next pose only in the other frame (earth or body), and deltas at another rate than set. This module
-knows what the data means under each setting; it does not know how the user is informed.
+next pose only in the other frame (earth or body), and deltas at a rate that differs from the
+setting. This module knows what the data means under each setting; it does not know how the user is
+informed.
 """
 
 import math
@@ -18,7 +19,7 @@ from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL,
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
-"""Number of poses that prove a setting wrong: they contradict it, and none confirms it.
+"""Number of poses that prove a setting wrong if they contradict it and none confirms it.
 
 The board sends this number of poses in 2 s.
 """
@@ -41,7 +42,7 @@ limits the ratio of this distance to the distance in the other frame.
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Least number, and least duration in s, of deltas in a row that prove another rate than set."""
+"""Least number, and least duration in s, of consecutive deltas that prove the set rate wrong."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}

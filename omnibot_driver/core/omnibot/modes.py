@@ -40,7 +40,7 @@ TRANSITIONS: Final[dict[Happening, dict[Mode, Mode]]] = {
     Happening.SENT_PAUSE: {_N: _N, _I: _I},
     Happening.SENT_RESET: {_U: _U, _P: _U, _N: _U, _I: _U},
 }
-"""Mode after an event, by event and mode before; if an entry is missing, the event is refused."""
+"""Mode after an event, by event and previous mode; an event without an entry is refused."""
 
 
 class ModeTracker:
@@ -60,7 +60,7 @@ class ModeTracker:
             self.mode = TRANSITIONS[happening][self.mode]
         except KeyError:
             raise RequestRefused(
-                f"the board is {self.mode.value}: {happening.value} is not allowed in this mode"
+                f"«{happening.value}» is not allowed while the board is {self.mode.value}"
             ) from None
         self.imus_to_come = self._imus_alone
 

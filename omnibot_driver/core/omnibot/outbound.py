@@ -10,25 +10,26 @@ parser counts seven bytes after ``FF FE``, however long they take. If a frame lo
 parser completes the frame with the next byte that is sent.
 
 1. *Zeros precede everything.* A zero is neither a letter nor a header, and seven of them end any
-   frame that was begun. So a Stop, an emergency stop or a letter that was cut is completed by
-   zeros: it remains a Stop, or becomes a frame in mode 0, which is not a command. A letter is never
-   swallowed by a frame that was begun, and a header never follows an ``FF``. The eighth zero makes
-   up for one that is lost. Before a motion frame four are enough: only a frame that lost five or
-   more bytes of its payload could swallow the header behind them, and that frame commands motion as
-   well.
+   frame that was begun. So zeros complete a Stop or an emergency stop that was cut: the frame
+   remains a stop, or becomes a frame in mode 0, which is not a command. A letter is never swallowed
+   by a frame that was begun, and a header never follows an ``FF``. The eighth zero makes up for one
+   that is lost. Before a motion frame four zeros are enough: only a frame that lost five or more
+   bytes of its payload could swallow the header after the zeros, and such a frame commands motion
+   as well.
 2. *Nothing follows a motion frame.* A motion frame that was cut has no effect until the next
    transmission. Its zeros complete the cut frame, and the next frame replaces that one 12 bytes
-   (1.0 ms at 115200 baud) later. Zeros right behind a motion frame would complete a cut one at
-   once, which would then be in force until the next repetition; even a parser that discards a cut
-   frame after a pause would then accept it.
+   (1.0 ms at 115200 baud) later. Zeros right after a motion frame would complete a cut frame at
+   once, and that frame would then be in force until the next repetition. Even a parser that
+   discards a cut frame after a pause would accept it.
 3. *A payload without its header is harmless.* If the header is lost, a parser looks for letters
    and headers in the payload. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never
    follows ``FF``: each word takes the nearest value for which this holds. That value is one LSB
    away, unless the high byte of the word is a letter.
-4. *What is lost is sent again*: everything here is repeated, or confirmed by the board's data.
+4. *What is lost is sent again*: each of these frames and letters is repeated, or confirmed by the
+   board's data.
 
-What remains: an added or changed byte within a frame can make it another valid frame, until the
-next repetition.
+One risk remains: an added or changed byte can turn a frame into another valid frame, until the next
+repetition.
 """
 
 import re

@@ -16,8 +16,9 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Largest difference in s between the elapsed time and the deltas' count, without a restart and
-without the drift of the board's clock.
+"""Largest difference in s between the elapsed time and the deltas' count, without a restart.
+
+The drift of the board's clock is allowed in addition.
 
 If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, arrival times are wrong by
 0.24 s. The limit is about twice this error.
@@ -25,7 +26,7 @@ If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, arrival 
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, by which a long gap differs from the elapsed time.
 
-After a silence of minutes the count then says little about a restart, and the pose decides.
+After a silence of minutes, the count therefore says little about a restart, and the pose decides.
 """
 EARLY_S: Final = 0.2
 """Time in s by which a count from zero may exceed the time since the last delta.
@@ -36,7 +37,7 @@ The last delta may have been read late. A restart of the board takes longer than
 
 @value(frozen=True, slots=True)
 class Step:
-    """What the counter of a new delta or pose shows, compared with the counter before.
+    """What the counter of a new delta or pose shows, compared with its previous value.
 
     ``lost``: number of missing deltas that were not reported before; ``duration_s``: time in s that
     the delta covers, None if unknown; ``restarted``: the counter seems to have restarted from zero,
@@ -61,7 +62,8 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Whether a pose once followed the expected number of deltas; only then it shows losses."""
+        """Whether a pose once followed the expected number of deltas; until then poses show
+        nothing."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
         """The last delta's count if it was too high for the elapsed time, else None.
@@ -70,7 +72,7 @@ class Sequence:
         flipped, or the frame may be false.
         """
         self._left: tuple[int, float, int] | None = None
-        """Before a supposed restart: the last count and its time in s; then the first new count."""
+        """Before a supposed restart: last count and its time in s; after it: the first count."""
 
     def pause(self) -> None:
         """Note that the board paused: its next count continues the old one, or restarts."""
@@ -140,7 +142,7 @@ class Sequence:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
         if (self._told + missing) * self._period_s > now - self._delta_at + self._period_s:
-            return Step(0)  # too little time has passed for that many
+            return Step(0)  # too little time has passed for these losses
         self._told += missing
         return Step(missing)
 

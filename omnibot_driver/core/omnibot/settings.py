@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The settings of an OmniBot board that only its user knows, as its data does not show them."""
+"""The settings of an OmniBot board that its data does not show; only its user knows them."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -15,9 +15,9 @@ class OmniBotSettings:
 
     ``baudrate``: in bits per second, with ten bits per byte; ``linear_scale``: LSB per m/s;
     ``angular_scale``: LSB per rad/s; ``position_scale`` and ``heading_scale``: LSB per m and rad of
-    a commanded pose; ``delta_frame``: whether deltas are differences of positions in the board's
-    earth frame, motion along its own axes, or (older firmware) encoder counts of the wheels A, B,
-    C; ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``,
+    a commanded pose; ``delta_frame``: what deltas are: differences of positions in the board's
+    earth frame, motion along the board's own axes, or (older firmware) encoder counts of the wheels
+    A, B, C; ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``,
     constant for the life of the ``OmniBot``.
     """
 

@@ -3,7 +3,7 @@
 """The fast path for the most frequent read: exactly one IMU frame, from bytes to reading.
 
 This path replaces the decoder and the translation for such a read. Its readings, and the state
-afterwards, are the same as theirs: a test compares the two paths. An IMU frame is accepted only
+afterwards, are the same as on the normal path: a test compares both. An IMU frame is accepted only
 when one is due, and only if its values are calm: the acceleration is plausible, and all words are
 close to those of the frame before.
 

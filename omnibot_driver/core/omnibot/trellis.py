@@ -9,8 +9,8 @@ interpretation. A frame on it is sure if every path that interprets the first by
 another way costs more by at least ``SURE``. This module knows how a line damages the shapes of
 frames. Work and memory are proportional to the length of the stretch.
 
-The price of content depends on the context: what the frames before show. The context of a node is
-that of the cheapest path to the node.
+The price of content depends on the context: what earlier frames show. The context of a node is the
+context at the end of the cheapest path to that node.
 
 Most edges are on no path that is nearly as cheap as the best. So the search omits edges whose total
 cost would exceed a limit even if the remaining bytes cost as little as possible (``lower_bound``).
