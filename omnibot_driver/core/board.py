@@ -145,13 +145,13 @@ class Board(Protocol):
         return ""
 
     def connect(self) -> None:
-        """Begin a new connection: forget the mode, and all bytes and conclusions of the old one."""
+        """Begin a new connection: forget the mode, and everything from the old connection."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
 
-        ``now`` is when the bytes arrived. A reading may complete with a later call than the one
-        that brings its last byte, if the board has to wait for evidence that it is valid.
+        ``now`` is when the bytes arrived. A reading may be returned by a later call than the one
+        that brings its last byte, because more evidence may be needed that the reading is valid.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -194,7 +194,7 @@ class Board(Protocol):
         return
 
     def reset_odometry(self) -> None:
-        """Begin the frame of the OdometryReadings at the robot's present pose."""
+        """Move the origin of the OdometryReadings' frame to the robot's present pose."""
 
     @property
     def shows_standstill(self) -> bool:
@@ -221,7 +221,7 @@ class Board(Protocol):
         return
 
     def start(self) -> Packets:
-        """Return the packets that make the board run in any mode; they may be sent repeatedly."""
+        """Return the packets that make the board run, whatever its mode; may be sent repeatedly."""
         return NO_PACKETS
 
     def pause(self) -> Packets:
@@ -232,7 +232,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def force_pause(self) -> Packets:
-        """Return the packets that pause the board in any mode, even with commands in flight."""
+        """Return the packets that pause the board, whatever its mode and the commands in flight."""
         return NO_PACKETS
 
     def reset(self) -> Packets:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""All exceptions of the driver, in one class tree.
+"""All exceptions of the driver, in one class hierarchy.
 
 Bytes from a board never raise an exception; invalid ones are counted. An exception means that the
 driver or its user asked for something impossible. Each message says what is wrong and what to do

@@ -86,7 +86,7 @@ class OdometryReading:
     * ``pose``, ``covariance``: in that frame, at ``stamp_s``.
     * ``twist``: in the board's body axes.
     * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s².
-    * ``rolled``: sum of all motion by the wheels, in body axes, since the board object was made.
+    * ``rolled``: sum of all wheel motion, in body axes, since the board object was made.
     * ``rolling``: rate of ``rolled``; None while the board does not report it.
     """
 

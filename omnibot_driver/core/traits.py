@@ -14,9 +14,9 @@ from omnibot_driver.core.requests import Request
 class Traits:
     """The capabilities of a board, constant while the driver runs.
 
-    * ``channels``: names of the lines to the board; a single one needs no name.
-    * ``imu_period_s``: time from one ImuReading to the next, one for each tick of the board's
-      clock. None for a board without an IMU, whose readings are stamped by their arrival.
+    * ``channels``: names of the lines to the board; a single line needs no name.
+    * ``imu_period_s``: time between two ImuReadings, of which the board sends one in each tick of
+      its clock. None for a board without an IMU; its readings are stamped by their arrival.
     * ``authorities``: the topics that may command motion.
     * ``requests``: the requests that the board supports.
     * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in the order of its values.
@@ -29,7 +29,7 @@ class Traits:
     * ``baudrate``: whether the line has a baud rate to set.
     * ``calibrates_gyro``: the board subtracts the gyro's bias itself, so its profile offers
       ``~/calibrate_gyro``.
-    * ``stops_within_s``: longest time that a board which acknowledges a stop takes to obey it.
+    * ``stops_within_s``: longest time until the board obeys a stop, if it acknowledges stops.
     * ``slack_mps``, ``slack_radps``: how far the measured velocity may differ from the commanded
       one, in addition to the motion monitor's tolerance for any robot; for coarse displacements, or
       wheels that lag while they speed up.

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Correction of the IMU's biases, and figures of the sensor measured at standstill."""
+"""Correction of the IMU's biases, and the sensor's figures as measured at standstill."""
 
 from dataclasses import dataclass
 
@@ -57,7 +57,7 @@ class BiasCorrector:
 
     @property
     def advice(self) -> str:
-        """Advice on settings that the measured gravity contradicts; empty if they agree."""
+        """Advice on settings that the measured gravity contradicts; empty if there are none."""
         gravity_mps2 = self.calibration.gravity_mps2
         return "" if gravity_mps2 is None else self._board.gravity_advice(gravity_mps2)
 

@@ -38,7 +38,7 @@ STILL_RAD: Final = 0.002
 """Largest displacement at rest, in m and rad: resting wheels may report one count back and
 forth."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
-"""MPU-6050 product specification, section 6.1: initial zero-rate output."""
+"""Largest bias: the initial zero-rate output in the MPU-6050 product specification, section 6.1."""
 REFINEMENT: Final = 0.05
 """Fraction of the bias error that one block of ``BLOCK_S`` corrects: half of the error in 14 s."""
 

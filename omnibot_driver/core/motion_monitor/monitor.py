@@ -114,8 +114,7 @@ class MotionMonitor:
             self._has_stood = False
 
     def release(self) -> None:
-        """Note a release of the e-stop; the board may still hold its own, so the robot may not
-        move."""
+        """Note a release of the e-stop, after which the board may still hold its own e-stop."""
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:

@@ -51,7 +51,7 @@ class SetpointHistory:
         self._known_from_s = math.inf
 
     def add(self, setpoint: CommandedTwist, at_s: float) -> None:
-        """Add a set-point that holds from ``at_s`` on; rest must be ``AT_REST`` itself."""
+        """Add a set-point that holds from ``at_s`` on; for rest, pass the object ``AT_REST``."""
         before, self.current = self.current, setpoint
         if setpoint is None:
             self._entries.clear()

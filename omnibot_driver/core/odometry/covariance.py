@@ -32,7 +32,7 @@ class OdometryNoise:
     * ``wheel_drift``: standard deviation, in m, of a random walk after 1 m of motion at the rim.
     * ``wheel_scale``: standard deviation of the relative size error of one wheel.
     * ``wheel_slip``: mean fraction of the distance that is lost to slip, equal for all wheels.
-    * ``wheels``: their geometry, at a wheel radius of 1 m.
+    * ``wheels``: geometry of the wheels, at a wheel radius of 1 m.
     * ``unheard_mps2``, ``unheard_radps2``: assumed accelerations of a robot during a gap, in m/s²
       and rad/s².
     """

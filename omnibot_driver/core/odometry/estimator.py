@@ -45,7 +45,7 @@ class OdometrySettings:
       give the initial heading, which displacements in the earth frame need.
     * ``fastest_mps``, ``fastest_radps``: speeds that the robot can never exceed, even if pushed.
     * ``linear_scale``, ``angular_scale``: true distance and turn, divided by those that the board
-      reports by the nominal sizes of its wheels.
+      computes from the nominal sizes of its wheels.
     """
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)

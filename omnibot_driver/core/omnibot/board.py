@@ -113,8 +113,7 @@ class OmniBot:
         )
         self._decoder.statistics = self._statistics
         self._pieces: list[Piece] = []
-        """First bytes of an IMU frame that arrives in several reads, until its last bytes
-        arrive."""
+        """First bytes of an IMU frame that arrives in pieces, kept until the last piece arrives."""
         self._translation.connect()
         self._modes = self._translation.modes
 

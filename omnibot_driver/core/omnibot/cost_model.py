@@ -28,11 +28,11 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 ONE_BYTE: Final = 5.5
 """Cost of a frame that lost or gained one byte, as about one frame in 250 does."""
 TWO_BYTES: Final = 8.5
-"""Cost of a frame that lost or gained two bytes; less than twice one byte, as losses cluster."""
+"""Cost of a frame that lost or gained two bytes; below twice ``ONE_BYTE``, as losses cluster."""
 BROKEN_OFF: Final = 9.0
 """Cost of a frame whose last three or more bytes were lost in a burst."""
 HEADER_BYTE: Final = 7.5
-"""Cost of a frame that lost one of its two header bytes, out of 9 to 15 bytes."""
+"""Cost of a frame (of 9 to 15 bytes) that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
 """Extra cost of a frame that gained bytes, if a header is where the frame should have ended."""
 BAD_RUN: Final = 6.0
@@ -40,11 +40,11 @@ BAD_RUN: Final = 6.0
 BAD_TAIL: Final = 2.5
 """Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
 UNKNOWN_START: Final = 1.0
-"""Cost if the first bytes are the rest of a frame, as most silences end between frames."""
+"""Cost if the first bytes are the rest of a frame: data mostly begins with a complete frame."""
 BAD_BYTE: Final = 0.35
 """Cost of each byte of a bad run; ``BAD_RUN`` and 14 bytes cost more than any true IMU frame."""
 BAD_HEADER: Final = 0.5
-"""Cost of a header within a bad run: few arise by chance, some from readings of a gyro at rest."""
+"""Cost of a header within a bad run; a header may arise by chance, or from a gyro at rest."""
 GAP: Final = 5.0
 """Cost of a pause of the line within a frame; the board sends a frame without a pause."""
 BAD_TEXT: Final = 4.0
@@ -67,7 +67,7 @@ LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 One such word makes a frame odd; a shock moves several.
 """
 AFTERSHOCK: Final = 1.5
-"""Cost of an odd IMU frame after another odd one, because a shock rings."""
+"""Cost of an odd IMU frame after another odd one, because a shock lasts several frames."""
 WEIGHTLESS: Final = 2.5
 """Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0

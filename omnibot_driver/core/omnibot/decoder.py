@@ -150,8 +150,7 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """If all new bytes are calm frames that were due, accept them and return True; else
-        False."""
+        """If all new bytes are calm frames that were due, accept them; return whether they were."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order

@@ -49,7 +49,7 @@ UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
 )
 
 LEARN_EVERY: Final = 8
-"""The expectation learns from one frame in this number of frames; more frames add little."""
+"""The expectation learns from one frame in ``LEARN_EVERY``; more frames would add little."""
 
 
 class Walk:

@@ -36,7 +36,7 @@ HALF_TICK_S: Final = TICK_S / 2
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Largest deviation in s from whole ticks at which lost bytes may have caused a delay."""
+"""Tolerance in s: a delay this close to whole ticks may be due to lost bytes."""
 INTO_TICK_S: Final = 1e-3
 """Approximate delay in s of a delta or pose within its tick: an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
@@ -44,14 +44,14 @@ PUNCTUAL_S: Final = 1e-3
 PACE_S: Final = 2e-4
 """Largest deviation in s from the pace of the line at which bytes still count as on pace."""
 FEW_BYTES: Final = 2
-"""Largest number of bytes that is too small to measure the pace at which they arrive."""
+"""Up to this number of bytes, the pace at which bytes arrive cannot be measured."""
 TICKS_TO_PROVE: Final = 2
 """Number of ticks after a first late one that prove lost bytes.
 
 They must be read one by one, and be as late as the first one.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Number of bytes after a frame with a pause in it by which the cause is decided.
+"""The cause of a pause within a frame is decided this number of bytes after it, at the latest.
 
 Without proof of an idle line by then, the reader is taken to have been late.
 """

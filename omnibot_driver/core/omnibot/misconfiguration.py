@@ -25,24 +25,24 @@ The board sends this number of poses in 2 s.
 """
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""Limits of the size of a coordinate in mm or mrad, unless the coordinate is 0.
+"""Limits of the absolute value of a coordinate in mm or mrad, unless the coordinate is 0.
 
 A value outside the limits was misread from bytes in another order.
 """
 POSE_PERIODS: Final = 2
-"""Longest time between two poses that are compared, in periods of the poses; one may be lost."""
+"""Longest time between two compared poses, in periods of the poses; one in between may be lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""Limits above which a pose contradicts the set frame of the deltas.
+"""Limits above which a pose contradicts the configured frame of the deltas.
 
-The deltas since the last pose are added to that pose, in the set frame and in the other frame.
-``CLEARLY_M`` limits the distance in m between the new pose and the sum in the set frame. ``TIMES``
-limits the ratio of this distance to the distance in the other frame.
+The deltas since the last pose are added to that pose, in the configured frame and in the other
+frame. ``CLEARLY_M`` limits the distance in m between the new pose and the sum in the configured
+frame. ``TIMES`` limits the ratio of this distance to the distance in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Least number, and least duration in s, of consecutive deltas that prove the set rate wrong."""
+"""Least number and duration in s of consecutive deltas that prove the configured rate wrong."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
@@ -105,7 +105,7 @@ class MisconfigurationChecks:
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
         """Check the byte order of the poses, and the frame of the deltas, with a new pose.
 
-        ``order``: the set byte order; ``reading``: the pose as the settings interpret it.
+        ``order``: the configured byte order; ``reading``: the pose as the settings interpret it.
         """
         values = (frame.x, frame.y, frame.theta)
         makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))

@@ -65,7 +65,7 @@ def transmission(*parts: bytes) -> bytes:
 def harmless(counts: tuple[float, float, float]) -> Words:
     """Return the words nearest to ``counts`` whose bytes contain neither a letter nor a header.
 
-    Letters are S, P and R. The words are ``MAX_WORD`` at most, of either sign.
+    Letters are S, P and R. The absolute values of the words are at most ``MAX_WORD``.
     """
     a, b, c = counts
     words = nearest(a, b, c)

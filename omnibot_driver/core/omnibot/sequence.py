@@ -16,7 +16,7 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Largest difference in s between the elapsed time and the deltas' count, without a restart.
+"""Largest difference in s between elapsed time and the time by the count, without a restart.
 
 The drift of the board's clock is allowed in addition.
 
@@ -62,8 +62,8 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Whether a pose once followed the expected number of deltas; until then poses show
-        nothing."""
+        """Whether a pose ever came after the expected number of deltas; else its count is
+        ignored."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
         """The last delta's count if it was too high for the elapsed time, else None.

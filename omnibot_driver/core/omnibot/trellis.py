@@ -90,7 +90,7 @@ class Segment:
 
 
 _Edge = tuple[int, int, float, Frame | None, Context | None]
-"""Start node, end node, price, the complete frame if it is one, and the context after it."""
+"""Start node, end node, price, the complete frame if the edge is one, and the context after it."""
 
 
 def read(

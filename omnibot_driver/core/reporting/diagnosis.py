@@ -105,7 +105,7 @@ class Diagnosis:
             "nominal": (Level.OK, "running"),
         }[session.state]
         if session.state == "connecting" and link.trouble:
-            level, message = Level.STALE, "unknown while one of its lines is missing"
+            level, message = Level.STALE, "unknown while a line of the board is missing"
         if self._recent.grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
             message = "the board has restarted; if you did not reset it, check its power supply"
@@ -230,7 +230,7 @@ class Diagnosis:
             level = Level.WARN
             message = "the motion monitor is off; set `motion_monitor` to true to turn it on"
         elif refused:
-            level, message = Level.WARN, f"lately: {refusals.last}"
+            level, message = Level.WARN, f"last refusal: {refusals.last}"
         elif too_large:
             level = Level.WARN
             message = "speeds exceed the range of a command; lower the scales or the speed limits"

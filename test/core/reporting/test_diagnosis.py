@@ -115,7 +115,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
     (lambda r: r.per_second.update(displacements=20), "Stream", Level.WARN, "too busy"),
     (lambda r: r.per_second.update(poses=3), "Stream", Level.WARN, "too busy"),
     (lambda r: setattr(r, "delay_s", 0.02), "Time", Level.WARN, "latency_timer"),
-    (lambda r: r.refuse("why"), "Commands", Level.WARN, "lately: why"),
+    (lambda r: r.refuse("why"), "Commands", Level.WARN, "last refusal: why"),
     (lambda r: r.board(saturated=1), "Commands", Level.WARN, "lower the scales"),
     (lambda r: r.command(trips=1), "Commands", Level.WARN, "the motion monitor has stopped"),
     (lambda r: r.command(monitored=False), "Commands", Level.WARN, "the motion monitor is off"),
@@ -147,7 +147,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
     robot.seconds(1)
     assert robot.troubles["Link"] is Level.ERROR
     assert robot.statuses["Board"].level is Level.STALE
-    assert "one of its lines is missing" in robot.statuses["Board"].message
+    assert "a line of the board is missing" in robot.statuses["Board"].message
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
