@@ -101,7 +101,7 @@ class ModeManager:
         return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
-        """Begin with an open port; the board may be in any state, even halfway into a command."""
+        """Begin with an open port; the board may be in any state, even within a command."""
         self.output = NO_PACKETS
         self._begin(now)
 
@@ -282,6 +282,6 @@ class ModeManager:
         elif self.phase is Phase.PAUSING:
             reason += (
                 " (the driver repeats the pause until the board is paused, and refuses motion"
-                " until ~/start)"
+                " until ~/start is called)"
             )
         self._answer(False, reason)

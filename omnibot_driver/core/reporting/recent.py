@@ -53,8 +53,7 @@ class RecentFigures:
         return self._window[-1][0] - self._window[0][0]
 
     def rates_hz(self) -> dict[RateName, float] | None:
-        """Return the recent rate of each kind of reading in Hz; None just after a change of
-        state."""
+        """Return the recent rate of each kind of reading in Hz; None after a change of state."""
         if not self.span_s:
             return None
         old, new = self._window[0][1].tally, self._window[-1][1].tally
