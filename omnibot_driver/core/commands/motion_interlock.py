@@ -18,7 +18,7 @@ class Until(Enum):
     """The condition that ends the refusal."""
 
     NOTHING = "Motion is allowed"
-    RELEASE = "Motion is refused until a zero command, or until commands pause for `cmd_vel_timeout`"
+    RELEASE = "Motion is refused until a zero command, or no command for `cmd_vel_timeout`"
     START = "Motion is refused until ~/start is called, as this is the second stop within 60 s"
     ESTOP = (
         "Motion is refused until the e-stop is latched and released, as this is the second stop"

@@ -60,7 +60,7 @@ class ModeTracker:
             self.mode = TRANSITIONS[happening][self.mode]
         except KeyError:
             raise RequestRefused(
-                f"«{happening.value}» is not allowed while the board is {self.mode.value}"
+                f"the board is {self.mode.value}: «{happening.value}» is not allowed in this mode"
             ) from None
         self.imus_to_come = self._imus_alone
 

@@ -99,7 +99,7 @@ class Diagnosis:
             "paused": (Level.WARN, "paused; call ~/start to run it"),
             "imu_only": (
                 Level.WARN,
-                "the board is in IMU-only mode and sends no odometry; set its own mode to nominal"
+                "the board is in IMU-only mode and sends no odometry; set the board to nominal mode"
                 " and reboot it",
             ),
             "nominal": (Level.OK, "running"),
