@@ -95,8 +95,8 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
     else:
         wrong = f"its stamp is {-age_s:.2f} s in the future"
     raise CommandRefused(
-        f"{what} refused: {wrong}: check the network and that the clocks of both"
-        " computers agree (NTP, use_sim_time), or set the stamp to zero"
+        f"{what} refused: {wrong}: check the network and that the computers' clocks agree"
+        " (NTP, use_sim_time), or set the stamp to zero"
     )
 
 

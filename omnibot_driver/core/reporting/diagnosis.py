@@ -230,14 +230,14 @@ class Diagnosis:
             level = Level.WARN
             message = "the motion monitor is off; set `motion_monitor` to true to turn it on"
         elif refused:
-            level, message = Level.WARN, f"last refusal: {refusals.last}"
+            level, message = Level.WARN, f"lately: {refusals.last}"
         elif too_large:
             level = Level.WARN
             message = "speeds exceed the range of a command; lower the scales or the speed limits"
         elif commands.source is None:
             message = "idle"
         elif limited:
-            message = f"{commands.source} is reduced to the limits max_…"
+            message = f"{commands.source} exceeds the limits max_… and is reduced to them"
         else:
             message = f"{commands.source} is in control"
         values = {

@@ -115,7 +115,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
     (lambda r: r.per_second.update(displacements=20), "Stream", Level.WARN, "too busy"),
     (lambda r: r.per_second.update(poses=3), "Stream", Level.WARN, "too busy"),
     (lambda r: setattr(r, "delay_s", 0.02), "Time", Level.WARN, "latency_timer"),
-    (lambda r: r.refuse("why"), "Commands", Level.WARN, "last refusal: why"),
+    (lambda r: r.refuse("why"), "Commands", Level.WARN, "lately: why"),
     (lambda r: r.board(saturated=1), "Commands", Level.WARN, "lower the scales"),
     (lambda r: r.command(trips=1), "Commands", Level.WARN, "the motion monitor has stopped"),
     (lambda r: r.command(monitored=False), "Commands", Level.WARN, "the motion monitor is off"),
