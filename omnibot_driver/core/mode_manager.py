@@ -47,7 +47,7 @@ class Phase(Enum):
 
 
 class Wanted(Enum):
-    """The mode that the board should be in; kept across ports, boards and failures."""
+    """The mode that the board should be in; a reconnect or a failed request does not change it."""
 
     ANY = "as it is"
     RUNNING = "running"

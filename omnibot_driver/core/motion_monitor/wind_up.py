@@ -33,7 +33,7 @@ HELD_PART: Final = 0.7
 """Fraction of its set-points below which a robot's speed shows that something holds it."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""Speeds in m/s and rad/s against the set-point above which a robot is not regarded as held.
+"""Speeds, in m/s and rad/s, opposite to the set-point; above them a robot is not held.
 
 Such motion does not add to the wind-up.
 """
@@ -48,7 +48,8 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m lost in a first long displacement, until the next displacement; else 0.
+        """Distance in m lost in a first long displacement, if the next has not confirmed it; else
+        0.
 
         None: the robot was not held in the last displacement.
         """

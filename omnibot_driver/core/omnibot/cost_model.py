@@ -40,7 +40,7 @@ BAD_RUN: Final = 6.0
 BAD_TAIL: Final = 2.5
 """Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
 UNKNOWN_START: Final = 1.0
-"""Cost if the first bytes are the rest of a frame: data mostly begins with a complete frame."""
+"""Cost if the first bytes are the rest of a frame: after a silence, a whole one is likelier."""
 BAD_BYTE: Final = 0.35
 """Cost of each byte of a bad run; ``BAD_RUN`` and 14 bytes cost more than any true IMU frame."""
 BAD_HEADER: Final = 0.5

@@ -51,7 +51,7 @@ TICKS_TO_PROVE: Final = 2
 They must be read one by one, and be as late as the first one.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""The cause of a pause within a frame is decided this number of bytes after it, at the latest.
+"""Number of bytes after a frame, within which the cause of a pause in the frame is decided.
 
 Without proof of an idle line by then, the reader is taken to have been late.
 """

@@ -39,9 +39,9 @@ SURE: Final = 3.5
 STEP: Final = 5.5
 """First margin of the cost limit above the lower bound; increased until a path is found."""
 BEYOND: Final = 0.025
-"""Half the grid of the prices, added to the cost limit.
+"""Half the step of the prices (0.05), added to the cost limit.
 
-So a sum of prices never equals the limit, and rounding errors decide nothing.
+A sum of prices therefore never equals the limit, and rounding errors have no effect.
 """
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
@@ -68,7 +68,7 @@ _HEADLESS: Final = {
     0xFF: ((13, cost_model.HEADER_BYTE), (8, cost_model.HEADER_BYTE), (14, cost_model.HEADER_BYTE)),
     **{kind: ((length - 1, cost_model.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
 }
-"""Shapes of a frame that lost half of its header, by the byte of the header that is left."""
+"""Shapes of a frame that lost one byte of its header, by the header byte that is left."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
 _BEGINNINGS: Final = (_HEADER, _TEXT)

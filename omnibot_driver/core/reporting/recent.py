@@ -38,7 +38,7 @@ class RecentFigures:
         return now - at < RECENT_S
 
     def waiting_share(self, link: LinkFigures, now: float) -> float:
-        """Return the share of the recent time in which the reader was ready to run but did not."""
+        """Return the share of the recent time in which the reader was ready but did not run."""
         if link.waited_s is None:
             return 0.0
         self._waits.append((now, link.waited_s))
