@@ -3,8 +3,8 @@
 """The set-point stream for both boards, which repeats the motion lines.
 
 While the encoder limits the drive board's speed, each new angle of the front wheel may allow more
-speed. So the lines are then sent again with each angle, not only at the repetition rate. The module
-decides when a line is due, not what the line contains.
+speed. So, during this time, the stream sends the lines again with each new angle, not only at the
+repetition rate. The module decides when a line is due, not what the line contains.
 """
 
 import math
@@ -18,10 +18,10 @@ from omnibot_driver.core.fejemis.encoder import Encoder
 
 
 class Listener(Protocol):
-    """An object that is notified when an emergency stop begins or ends."""
+    """An object that is notified of each new order."""
 
     def wanted(self, *, estop: bool) -> None:
-        """Note whether the order in force from now on is an emergency stop."""
+        """Take note of a new order; ``estop``: whether the order is an emergency stop."""
 
 
 class PairStream(SetpointStream):
@@ -47,7 +47,10 @@ class PairStream(SetpointStream):
         super().apply(wanted, now)
 
     def angle_told(self, angle_rad: float, now: float) -> bool:
-        """Take the front angle, in rad; return whether the wheel newly fails to follow."""
+        """Take the front angle, in rad; return True if a new fault of the front wheel is found.
+
+        The fault is that the wheel does not follow its commanded angle.
+        """
         if self.driving and self._pair.restless:
             self._said_at = -math.inf
         return self._pair.follower.look(angle_rad, now)

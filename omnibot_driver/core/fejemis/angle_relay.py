@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The front wheel's angle as a line for the drive board, in digits chosen against damage.
+"""The front wheel's angle as a line for the drive board, in digits that make damage detectable.
 
-Two lost characters whose codes add up to 99 do not change the sum, wherever they are. So an angle
-is sent in digits without such a pair, and rounded for that by half a degree at most. The rounding
-error is added to the next angles, so the mean is right. Some angles to the right contain a ``6``
-that rounding cannot avoid: their minus sign and that ``6`` can be lost undetected, which leaves an
-angle of less than 10° to the left.
+If two characters whose codes add up to 99 are lost, the sum (checksum) of a line does not change.
+So the driver sends an angle in digits without such a pair, and for this rounds it by half a degree
+at most. The rounding error is added to the next angles, so the mean is right. Some angles to the
+right contain a ``6`` that rounding cannot avoid. If the minus sign and this ``6`` are both lost,
+the sum does not change, and the board receives an angle of less than 10° to the left.
 
-Without sums, the loss of any character is undetected. So whole degrees are sent: any loss then
-leaves a smaller number, never one beyond 90°, for which the board would compute an inner wheel
-faster than the outer one.
+Without sums, the board does not detect any loss. So the driver sends whole degrees: a loss then
+never makes the number larger, so it never exceeds 90°. Beyond 90°, the board would compute an inner
+wheel that is faster than the outer one.
 """
 
 import math
@@ -28,7 +28,7 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Limit in degrees: a damaged angle to the right may arrive as less than this to the left."""
+"""Limit in degrees for a damaged angle to the right that arrives as an angle to the left."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
@@ -48,7 +48,7 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """Yield each value that an undetected loss of two characters leaves; 0 if it is unreadable."""
+    """Yield the value of ``text`` after each undetected loss of two characters; 0 if unreadable."""
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
             found = _NUMBER.match(text[:i] + text[i + 1 : j] + text[j + 1 :])

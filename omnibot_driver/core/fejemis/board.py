@@ -6,7 +6,7 @@ This module composes the parts and encodes requests. ``ports.py`` finds which bo
 which port, ``inbound.py`` handles messages, ``translation.py`` converts them to readings,
 ``encoder.py`` encodes orders, ``watch.py`` stops the robot on timeouts, ``obedience.py`` checks
 whether the drive board obeys, ``upkeep.py`` keeps both boards sending and configured, and
-``services.py`` serves all other requests of the user.
+``services.py`` handles the user's requests other than motion, such as brush and lift.
 """
 
 import math
@@ -83,7 +83,7 @@ class FejemisBoard(Board):
 
     @property
     def geometry(self) -> Geometry:
-        """Track and wheelbase in m as the drive board uses them; the settings while unknown."""
+        """Track and wheelbase in m, as used by the drive board; until known, from the settings."""
         return self._upkeep.geometry
 
     @property
@@ -104,7 +104,7 @@ class FejemisBoard(Board):
 
     @property
     def refusal(self) -> str:
-        """The reason why the robot must not be driven; empty if it may be."""
+        """The reason why the robot must not be driven; empty if driving is allowed."""
         if self._upkeep.jobs.powering_off:
             return POWER_ENDS
         if job := self._upkeep.jobs.at_rest:
@@ -143,7 +143,7 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines, and return the running job's failure: the ports are closed."""
+        """Discard incomplete lines, as the ports are closed; return a running job's failure."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -161,9 +161,9 @@ class FejemisBoard(Board):
         self._upkeep.machine.off()
 
     def stalled(self) -> None:
-        """Switch brush and lift off after a stall, as the guard process may have done so.
+        """Switch brush and lift off after a stall of the driver, as the guard may have done so.
 
-        Do not regard the boards as silent during the stall.
+        A stall of the driver does not make the boards appear silent.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:
@@ -201,7 +201,10 @@ class FejemisBoard(Board):
         self._told.remark(text)
 
     def reset_odometry(self) -> None:
-        """Do nothing: the driver keeps the origin itself, as ``enc0`` would look like a restart."""
+        """Do nothing, because the driver keeps the origin of the odometry itself.
+
+        The board's own command ``enc0`` would look like a restart of the board.
+        """
 
     # Outbound
 
@@ -211,7 +214,7 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Latch the e-stop if ``estop`` (the order in force is an e-stop), else release it."""
+        """Take a new order: latch the e-stop if the order is an e-stop, else release it."""
         if not estop:
             self._obedience.release(self._now)
         elif not self._obedience.estopped:
@@ -229,7 +232,7 @@ class FejemisBoard(Board):
         return self._ports.both(STOP)
 
     def emergency_stop(self) -> Packets:
-        """Return ``stop`` for the drive board, and brush and lift off for the front board.
+        """Return ``stop`` for the drive board; for the front board, lines that end brush and lift.
 
         The front board does not have a ``stop`` command.
         """
@@ -244,7 +247,7 @@ class FejemisBoard(Board):
         return self._ports.ending("front", *self._upkeep.machine.switch_off())
 
     def wake(self) -> Packets:
-        """Return Stop for both boards, with lift and brush off."""
+        """Return a Stop for both boards, and the lines that switch lift and brush off."""
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
@@ -253,7 +256,7 @@ class FejemisBoard(Board):
         self._upkeep.jobs.keep_power()
 
     def start(self) -> Packets:
-        """Return a Stop and then ``start``; nothing during an emergency stop.
+        """Return a Stop and then ``start``; return no packets during an emergency stop.
 
         The Stop comes first because after ``start`` the board may obey its last command again.
         """
@@ -263,7 +266,7 @@ class FejemisBoard(Board):
         return self.stop() + self._ports.line("drive", b"start")
 
     def pause(self) -> Packets:
-        """Return packets that stop the motion, pause the drive board, and end brush and lift."""
+        """Return the packets that stop the motion and pause the drive board; end brush and lift."""
         self._obedience.pause()
         self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
         self._upkeep.machine.off()
@@ -274,12 +277,15 @@ class FejemisBoard(Board):
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return Stop, and emergency stop, for the guard process; both end brush and lift too."""
+        """Return the packets of a Stop, and those of an emergency stop, for the guard process.
+
+        Both also switch brush and lift off.
+        """
         return self.wake(), self.emergency_stop() + self.stop()
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` or ``elapse`` has work, in s."""
+        """Time in s at which to call ``due`` or ``elapse`` next."""
         if self._inbound.relay_rad is not None or self._told.notices or self._upkeep.jobs.done:
             return -math.inf
         wake_at = min(self._upkeep.wake_at, self._obedience.start_at)

@@ -54,7 +54,7 @@ FIELD: Final[Range] = (-5000.0, 5000.0)
 ANGLE: Final[Range] = (-7.0, 7.0)
 """Range of an attitude angle, in rad; wide enough for any convention of wrapping."""
 HEADING: Final[Range] = (-1e4, 1e4)
-"""Range of a pose's heading, in rad; wide, as the board need not wrap the heading."""
+"""Range of a pose's heading, in rad; wide, because a board may count full turns."""
 VOLTS: Final[Range] = (-1.0, 60.0)
 AMPS: Final[Range] = (-100.0, 100.0)
 NEAR: Final[Range] = (-1.0, 100.0)
@@ -71,7 +71,7 @@ def parse(text: str) -> Message | None:
     """Return the message in this text; None if it is damaged or its keyword is unknown."""
     if text.startswith("#") or text.startswith("--"):
         return Comment(text)
-    words = text.split()  # any white space, as the firmware does
+    words = text.split()  # splits at any white space, as the firmware does
     if not words:
         return None
     keyword, *fields = words
@@ -85,7 +85,7 @@ def is_known(keyword: str) -> bool:
 
 
 def decimals_of(field: str) -> int:
-    """Return the count of characters after the decimal point; -1 if the field has none."""
+    """Return the count of characters after the decimal point; -1 if the field has no point."""
     _, point, after = field.partition(".")
     return len(after) if point else -1
 
@@ -187,7 +187,7 @@ def _status(keyword: str, least: int) -> Parse:
         for field in fields:
             number = numbers([field], ANY)
             if number is None:
-                break  # what follows is text
+                break  # the remaining fields are text
             found += number
         return Status(keyword, tuple(found)) if len(found) >= least else None
 
@@ -217,7 +217,7 @@ STATUS: Final = {
     "cpsteer": 1, "gyroo": 3, "acco": 3, "magw": 3, "mago": 3, "enc": 1, "mot": 1, "svp": 1,
     "svjt": 1, "tof1": 1, "gyroc": 1, "acccal2": 1, "brush": 1,
 }  # fmt: skip
-"""Keywords of status lines and of answers to requests, with the least count of numbers of each."""
+"""Keywords of status lines and of answers to requests, each with its smallest count of numbers."""
 WORDS: Final = ("id", "ver", "log", "confirm")
 _PARSERS: Final[dict[str, Parse]] = {
     "hbt": _heartbeat,

@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The configuration that a board stores: always read, and written where the user has set values.
+"""The configuration stored on a board: the driver reads it, and writes the user's values to it.
 
-Written values are read back, and written again until the board reports them, for ``TRIES`` at most.
-They are written at least once to each new or restarted board and after each change by the user,
-because what is read back may be rounded, which hides a small difference. A number is accepted only
-when two readings in a row agree, because 1 in 99 damaged answers passes its checksum, and the
-driver computes the geometry with these numbers. The module knows which line requests which numbers.
+Written values are read back, and written again until the board reports them, at most ``TRIES``
+times. They are written at least once to each new or restarted board and after each change by the
+user, because the board may report rounded numbers, which hide a small difference. A number is
+accepted only when two readings in a row agree, because 1 in 99 damaged answers passes its checksum,
+and the driver computes the geometry with these numbers. The module knows which line requests which
+numbers.
 """
 
 import math
@@ -50,8 +51,7 @@ class Configuration:
         self._once: dict[str, tuple[float, ...]] = {}
         """The last reported numbers by keyword, confirmed by a second reading or not."""
         self.turned = False
-        """Whether the track is the first number of the board's ``confs``; in the help text it is
-        the last number."""
+        """Whether the board's ``confs`` begins with the track; the help text shows it last."""
         self.written = written
         self.begin()
 
@@ -73,17 +73,17 @@ class Configuration:
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` has work, in s."""
+        """Time in s at which to call ``due`` next."""
         return self._next_at
 
     @property
     def failed(self) -> list[Written]:
-        """Settings that could not be read back; empty while they are still being written."""
+        """Settings that the board does not report as written; empty while writing continues."""
         return self._unwritten() if self._next_at == math.inf else []
 
     @property
     def pending(self) -> bool:
-        """Whether a new board may still lack the user's settings and must not be driven."""
+        """Whether the board is new, may lack the user's settings, and must not be driven."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new
@@ -139,8 +139,7 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        These are the user's values if the board reports the same or nothing yet, else the reported
-        values.
+        These are the values that the user has set, unless the board reports other values.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

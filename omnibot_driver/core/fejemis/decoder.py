@@ -2,10 +2,11 @@
 
 """Decoder of one board's bytes: splits lines, checks their checksums (sums), counts damaged lines.
 
-The manual shows lines without sums, but the public host programs send lines with sums. The setting
-``auto`` accepts both until heartbeats show which form the board uses; from then on only that form
-is accepted. The decoder also checks decimals: the boards print each number with a fixed count of
-decimals, so a line whose decimals differ from earlier lines of its kind is damaged (``forms``).
+The manual shows lines without sums, but the public host programs send lines with sums. With the
+setting ``auto`` the decoder accepts both kinds until heartbeats show which kind the board uses;
+from then on it accepts only that kind. The decoder also checks decimals: the boards print each
+number with a fixed count of decimals, so a line whose decimals differ from earlier lines of its
+kind is damaged (``forms.py``).
 
 The decoder does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
 bytes between calls, and looks at each byte a bounded number of times.
@@ -23,7 +24,7 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Longest line in characters, equal to the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""Heartbeats in a row that must have, or lack, a sum; a single one may be damaged."""
+"""Count of heartbeats in a row that prove that sums began or ended; a single one may be damaged."""
 
 
 @dataclass(slots=True)
@@ -39,8 +40,8 @@ class DecoderStatistics:
 class FejemisDecoder:
     """Decoder of one board's lines; ``sums``: whether the lines have sums, None while unknown.
 
-    ``changed``: the lines began or ceased to have sums; the owner resets this flag. ``doubtful``:
-    the last line differed from ``sums``, so lines to the board are sent without a sum.
+    ``changed``: the lines began or ceased to have sums; the caller resets this flag. ``doubtful``:
+    the last line did not agree with ``sums``; lines to the board are then sent without a sum.
     ``contradicted``: the last line contradicts the setting ``line_sums``.
     """
 
@@ -49,13 +50,13 @@ class FejemisDecoder:
         self.changed = self.doubtful = self.contradicted = False
         self._held = b""
         self._cut = False
-        """Whether the incomplete line is too long already."""
+        """Whether the incomplete line is already too long."""
         self._forms = Forms()
         self.line_sums = line_sums
 
     @property
     def line_sums(self) -> LineSums:
-        """The setting whether lines have sums: on, off, or auto, which learns from heartbeats."""
+        """The setting: lines have sums (on), have no sums (off), or heartbeats decide (auto)."""
         return self._line_sums
 
     @line_sums.setter
@@ -65,7 +66,7 @@ class FejemisDecoder:
         self._otherwise = 0
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """Return the messages that these bytes complete, in their order."""
+        """Return the messages that these bytes complete, in order of arrival."""
         *lines, rest = (self._held + data).split(b"\n")
         found = []
         for line in lines:
@@ -112,7 +113,7 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """Learn whether lines have sums from heartbeats, which each board sends unrequested."""
+        """Learn from a heartbeat whether lines have sums; boards send it without a request."""
         if self._line_sums != "auto":
             self.contradicted = with_sum is not self.sums
             return

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Encoder of an order as lines for both boards, given the front wheel's angle.
+"""Converts an order into lines for both boards, given the front wheel's angle.
 
-Call ``meaning`` with the packets that are sent: only then does the encoder note the angle that the
-front wheel must reach, and whether the drive board's speed is limited. The module knows geometry
-and lines, not when the lines are sent.
+The caller passes the packets that it sends to ``meaning``. With this call, the encoder notes the
+angle that the front wheel must reach, and whether the drive board's speed is limited. The module
+knows geometry and lines, not when the lines are sent.
 """
 
 from typing import Protocol
@@ -64,8 +64,9 @@ class Pair(Protocol):
 class Encoder:
     """Encodes orders; ``held``: the speed is limited, as the front wheel is not at its angle yet.
 
-    ``restless``: whether to send the lines again with each front angle. That is so while the speed
-    is limited, and also if lines have no checksums: then a damaged line is obeyed for 15 ms only.
+    ``restless``: whether to send the lines again with each front angle. This is True while the
+    speed is limited. It is also True if lines have no checksums: a damaged line is then replaced
+    after 15 ms.
     """
 
     def __init__(self, pair: Pair, settings: FejemisSettings) -> None:
@@ -75,7 +76,7 @@ class Encoder:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the last order, and regard the robot as not commanded to move."""
+        """Forget the last order; no motion is commanded from now on."""
         self.held = self._turning = False
         self._encoded: tuple[Packets, Steered] | None = None
         self.follower.begin()
@@ -94,7 +95,7 @@ class Encoder:
         return self._pair.emergency_stop()
 
     def encode(self, order: Order) -> Packets:
-        """Return the lines of the order. Raises CommandRefused for what this robot cannot do."""
+        """Return the lines of the order. Raises CommandRefused if the robot cannot obey it."""
         match order:
             case Drive(twist):
                 return self._drive(twist)
@@ -107,7 +108,8 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the body twist that these packets command at the present front angle.
 
-        Note the packets as sent. The twist is zero unless ``encode`` has just made them for motion.
+        Take note that the packets are sent. The twist is zero unless the packets are the last
+        result of ``encode`` for an order to move.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -14,7 +14,7 @@ FOLLOWS_WITHIN_S: Final = 1.0
 """Time in s within which the front wheel must get nearer to its angle; else it does not follow."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
-"""Deviation of the wheel in rad up to which it follows, if the robot is driven meanwhile."""
+"""Deviation in rad up to which the wheel is regarded as following, while the robot drives."""
 MOVED_RAD: Final = math.radians(3.0)
 """Rotation in rad of a stuck wheel after which motion is allowed again."""
 AGAIN_WITHIN_S: Final = 60.0
@@ -48,11 +48,14 @@ class Follower:
         self.refusal, self._fault_at = "", -math.inf
 
     def aim(self, angle_rad: float, within_rad: float = FOLLOWS_RAD) -> None:
-        """Set the angle that the wheel must reach, and how nearly, in rad."""
+        """Set the angle that the wheel must reach, and the allowed deviation, in rad."""
         self._angle_rad, self._within_rad = angle_rad, within_rad
 
     def look(self, angle_rad: float, now: float) -> bool:
-        """Take the measured angle, in rad; return whether the wheel newly fails to follow."""
+        """Take the measured angle, in rad; return True if a new fault of the wheel is found.
+
+        The fault is that the wheel does not follow its commanded angle.
+        """
         if self.refusal == UNTIL_IT_MOVES and abs(angle_rad - self._stuck_rad) > MOVED_RAD:
             self.refusal = ""
         if self._angle_rad is None or self.refusal:

@@ -2,7 +2,7 @@
 
 """The form of each kind of line: how many fields, and how many decimals each number has.
 
-A board prints a kind of line always in the same form, so a line in another form has lost or gained
+A board always prints a kind of line in the same form, so a line in another form has lost or gained
 characters. The form of each kind is learnt from its lines; a new form replaces the learnt one after
 three lines in a row. A kind whose form keeps changing is not checked. The module does not know the
 meaning of a line.
@@ -13,7 +13,7 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Deviating lines, among ``OF`` lines of a kind, after which the kind is not checked any more.
+"""Count of deviating lines, among ``OF`` lines of a kind, after which the kind is not checked.
 
 Lines with a correct sum are rarely damaged, so for them the smaller ``VARIES`` is enough."""
 OF: Final = 24

@@ -11,7 +11,7 @@ from typing import Final
 from omnibot_driver.core.fejemis.messages import FrontAngle
 
 OLDEST_S: Final = 0.06
-"""Age of the last angle in s after which the robot is stopped: four periods of the angle's line."""
+"""Age of the last angle in s after which the robot is stopped: four periods of ``fwl``."""
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all but the frame counter."""
@@ -19,7 +19,7 @@ SICK_LINES: Final = 3
 """Lines in a row that must report a fault of the sensor; fewer may be damaged lines."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""Jump in degrees, beyond what the fastest servo explains, that is still accepted."""
+"""Accepted jump of the angle in degrees, in addition to the motion of the fastest servo."""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -100,7 +100,7 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Return whether the wheel can have reached this angle, or two angles in a row agree."""
+        """Return whether the wheel can have reached the angle, or two angles confirm a jump."""
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (

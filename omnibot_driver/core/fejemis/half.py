@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One of the two Teensy boards (a half), at one port: its identity, its streams, its silence.
+"""One of the two Teensy boards (a half), at one port: identity, streams and silence.
 
-The driver subscribes to the board's streams, and subscribes again when they do not come: a line may
-be lost, and a board that restarts forgets all subscriptions. The module knows lines and times, not
-what a message is used for.
+The driver subscribes to the board's streams, and subscribes again when a stream does not come: a
+line may be lost, and a board that restarts forgets all subscriptions. The module knows lines and
+times, not what a message is used for.
 """
 
 import math
@@ -35,7 +35,8 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """Subscribed streams of each board, with their periods in ms.
 
-``confs`` is subscribed because ``confsi`` without its last letter sets the geometry to zero."""
+``confs`` is subscribed, not requested: a request ``confsi`` that loses its last letter sets the
+geometry to zero."""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """The stream of each board without which the robot must not be driven."""
 TOGETHER: Final = ("gyro", "acc")
@@ -46,7 +47,7 @@ ASK_AGAIN_S: Final = 0.1
 MANY: Final = 30
 """Number of damaged or unknown lines per second up to which the user is not notified.
 
-A board sends some hundred lines per second.
+A board sends a few hundred lines per second.
 """
 SILENT_S: Final = 1.5
 """Silence in s after which a board is regarded as gone."""
@@ -58,8 +59,8 @@ class Half:
 
     ``restarted``: whether the board has restarted; the caller resets this flag.
 
-    If the needed stream pauses, the board may have restarted, even if its start line was lost. The
-    half is then unsure until a heartbeat shows that the board's time has continued.
+    If the needed stream pauses, the board may have restarted; the line that reports the restart may
+    be lost. The half is then unsure until a heartbeat shows that the board's time has continued.
     """
 
     def __init__(self, line_sums: LineSums) -> None:
@@ -71,7 +72,7 @@ class Half:
         """Count of the driver's lines that the board rejected as damaged."""
         self.identity: int | None = None
         self.role: Role | None = None
-        """Role of the board; None while unknown, or if its identity is neither of the two."""
+        """Role of the board; None while unknown, or if the identity belongs to neither role."""
         self.begin(line_sums)
 
     def begin(self, line_sums: LineSums) -> None:
@@ -83,8 +84,7 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the stream arrives without which the robot must not be driven, and the board has
-        not restarted since it was configured."""
+        """Whether the stream in ``NEEDED`` arrives, and the board has not restarted since."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -104,10 +104,11 @@ class Half:
         return bool(self.decoder.sums) and not self.decoder.doubtful
 
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
-        """Yield the messages in these bytes; handle each before the next is requested.
+        """Yield the messages in these bytes; the caller handles each before it requests the next.
 
-        A message may change the state of the board: after a restart, earlier times are forgotten.
-        Those with an implausible board time are left out, and poses before the first heartbeat.
+        A message may change the state of the half: after a restart, earlier times are forgotten.
+        Messages with an implausible board time are left out, and so are poses before the first
+        heartbeat.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):
@@ -124,7 +125,7 @@ class Half:
     def not_understood(self, now: float) -> bool:
         """Return whether many recent lines were damaged or unknown; True at most once a second.
 
-        To be called after each read.
+        Call this after each read.
         """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults
@@ -142,14 +143,14 @@ class Half:
         self._at[keyword] = now
 
     def subscribe_again(self) -> None:
-        """Subscribe all streams again: the board may have forgotten them."""
+        """Subscribe to all streams again, as the board may have forgotten its subscriptions."""
         self._at = {key: at for key, at in self._at.items() if key == "hbt"}
         self._next_at = -math.inf
         self.ready = False
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` has work, in s."""
+        """Time in s at which to call ``due`` next."""
         return self._next_at if self._unsure_at is None else min(self._next_at, self._ask_at)
 
     def due(self, now: float) -> list[bytes]:
@@ -192,7 +193,7 @@ class Half:
             self._identify(message.identity)
         elif isinstance(message, BoardPose) and self.heartbeat is None:
             self.heard_at = now
-            return False  # it may have the time of another board than before
+            return False  # its time may be that of another board
         if isinstance(message, Heartbeat | BoardPose) and not self._see(message.time_s, now):
             return False
         if isinstance(message, Heartbeat):
@@ -200,7 +201,7 @@ class Half:
             self.note("hbt", now)
             if self._unsure_at is not None:
                 sent_at = self.clock.host_s(message.time_s)
-                if sent_at >= self._unsure_at - EARLY_S:  # an older one may be before a restart
+                if sent_at >= self._unsure_at - EARLY_S:  # an older one may precede a restart
                     self._unsure_at = None
         self.heard_at = now
         return True
@@ -244,7 +245,7 @@ class Half:
 
 
 def keyword_of(message: Message) -> str:
-    """Return the keyword of a subscribed stream's message; empty for others and heartbeats."""
+    """Return the stream's keyword of a message; empty for heartbeats and unsubscribed messages."""
     if isinstance(message, Distance):
         return message.keyword
     return _KEYWORDS.get(type(message).__name__, "")

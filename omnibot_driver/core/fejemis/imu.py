@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Converts pairs of gyro and acceleration lines, which carry no time, into samples with a time.
+"""Converts pairs of gyro and acceleration lines, which carry no time, into samples with timestamps.
 
 The board measures both every ``PERIOD_S`` of its own clock, and sends them together. So samples are
-counted, and a sample's time is a phase plus a whole count of periods. Phase and count come from the
-arrivals: a sample does not arrive before its time, and one that comes after a pose in the stream is
-not older than that pose. `imu_pairs.py` finds the pairs.
+counted, and a sample's time is a phase plus a whole number of periods. The phase and this number
+follow from the arrival times: a sample cannot arrive before its time, and a sample that comes after
+a pose in the stream is not older than the pose. `imu_pairs.py` finds the pairs.
 """
 
 import math
@@ -19,12 +19,12 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Shortest interval of arrivals, in periods, at which a late sample proves a loss.
+"""Shortest interval between two arrivals, in periods, at which late samples prove a loss.
 
-If two samples in a row are late by a period, but arrive with such an interval, a sample was lost
-before them. Samples that waited for a stalled host arrive at once instead."""
+If two samples in a row are late by a period, and arrive at least this interval apart, a sample was
+lost before them. If they had waited for a stalled host, both would arrive at once."""
 CYCLE_S: Final = 0.0015
-"""Time in s within which lines may come in any order, as one control cycle sends them."""
+"""Longest time in s in which one control cycle sends its lines, in any order."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 
@@ -85,7 +85,7 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Set the phase to the latest that the last ``PHASE_BLOCKS`` of arrivals allow."""
+        """Set the phase to the latest that the last ``PHASE_BLOCKS`` blocks of arrivals allow."""
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)
         if self._block_s < self._phase_s:

@@ -3,17 +3,20 @@
 """Pairs gyro and acceleration lines, which carry neither time nor number, into samples of the IMU.
 
 The board sends both lines of a sample in one cycle, always in the same order, every ``PERIOD_S``. A
-pair is a first line and the second line that follows it, however late the second one arrives, with
-no other of these lines between them. If the second line of a sample and the first line of the next
-are both lost, the rest looks like a pair. Three things show this:
+pair is a first line and the second line that follows it, even if late, without another gyro or
+acceleration line between them. If the second line of one sample and the first line of the next
+sample are both lost, the two remaining lines look like a pair. Three observations reveal such a
+false pair:
 
-- a line of a kind that never comes within a pair lies within it;
-- the second line comes ``PAIR_WITHIN_S`` or more after the first. Such a pair waits for the next
+- between its two lines comes a line of a kind that never comes within a pair;
+- its second line comes ``PAIR_WITHIN_S`` or more after the first. Such a pair waits for the next
   pose: the times of two poses tell how many samples lie between them;
-- a pose later in the same read. So a pair is given at the end of its read, or at that pose.
+- a pose comes later in the same read. So a pair is returned only at this pose, or at the end of its
+  read.
 
-One case is not decided: the lines come late, less than ``PAIR_WITHIN_S`` apart, and no pose follows
-in the read that completes the pair. Until the order is known, some samples are left out.
+One case remains undetected: the lines come late, but less than ``PAIR_WITHIN_S`` apart, and no pose
+follows in the read that completes the pair. Until the order of the two lines is known, some samples
+are left out.
 """
 
 import itertools
@@ -28,28 +31,28 @@ Kind = Literal["gyro", "acc"]
 
 PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
-"""Delay in s between the two lines of one sample up to which nothing speaks against a pair."""
+"""Delay in s between two lines up to which they are a pair without further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Evidence for an order, in s of pauses between lines: when it is known, and its largest value."""
+"""Evidence for an order, as a sum of pauses in s: when the order is known, and the largest sum."""
 MARKED_S: Final = PERIOD_S
-"""Evidence of another periodic line between two lines: the cycle ended between them."""
+"""Evidence in s that another periodic line between two lines adds: a cycle ended between them."""
 PATIENCE: Final = 60
-"""Count of lines after which the order is decided by whatever evidence there is.
+"""Count of lines after which the order is decided even if the evidence is weak.
 
-The evidence is balanced if the board sends both lines half a period apart."""
+Neither order gains evidence if the board sends both lines half a period apart."""
 MOST: Final = 10
-"""Largest count of lines of a kind outside of pairs, which shows that they belong there."""
+"""Limit for the count of lines of a kind outside of pairs, minus the count within pairs."""
 UNPOSED: Final = 20
-"""Largest count of lines of one kind after a pose while a pair waits for the next pose."""
+"""A pair that waits for the next pose is rejected after more lines of one kind than this."""
 
 
 @dataclass(slots=True)
 class Pair:
     """A gyro and an acceleration line, probably of one sample; ``at``: when the second line came.
 
-    ``pose_s``: the board's time of the pose before it. ``skipped``: count of samples before it of
-    which only a part came. ``doubtful``: whether the pair must wait for a pose.
+    ``pose_s``: the board's time of the last pose before the pair. ``skipped``: count of incomplete
+    samples before the pair. ``doubtful``: whether the pair must wait for a pose.
     """
 
     gyro: Gyro
@@ -61,11 +64,11 @@ class Pair:
 
 
 Oriented = tuple[Attitude, float]
-"""An orientation, and when it came."""
+"""An orientation, and the time in s at which it arrived."""
 
 
 class ImuPairs:
-    """Pairs lines of the IMU; ``take`` returns the pairs, and orientations behind their pairs."""
+    """Pairs the lines of the IMU; ``take`` returns pairs and orientations in order of arrival."""
 
     def __init__(self) -> None:
         self.begin()
@@ -82,7 +85,7 @@ class ImuPairs:
         self._between: set[str] = set()
         """Kinds of other lines since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
-        """For each other kind, how often it came outside of pairs, minus how often within."""
+        """For each other kind: count of lines outside of pairs, minus count within pairs."""
         self._skipped = 0
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
@@ -98,19 +101,19 @@ class ImuPairs:
         self._line("acc", acceleration, now)
 
     def other(self, kind: str) -> None:
-        """Take another line that the board sends every second sample."""
+        """Take a line of another kind, which the board sends with every second sample."""
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
             self._waiting = None
             self._skipped += 1
 
     def attitude(self, attitude: Attitude, now: float) -> None:
-        """Take an orientation; it keeps its place behind the pairs before it."""
+        """Take an orientation; ``take`` returns it after all pairs that came before it."""
         self.other("imupose")
         self._queue.append((attitude, now))
 
     def pose(self, time_s: float) -> None:
-        """Take a pose with the board's time: decide on the pairs since the pose before it."""
+        """Take the board's time of a pose, and decide on the pairs since the previous pose."""
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
         if abs(periods) < 0.5:
@@ -125,7 +128,7 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return what is decided, after a pose or at the end of a read."""
+        """Return the decided items; call this after a pose and at the end of a read."""
         taken: list[Pair | Oriented] = []
         while self._queue:
             item = self._queue[0]
@@ -197,7 +200,7 @@ class ImuPairs:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))
 
     def _learn(self, kind: Kind, pause_s: float, *, marked: bool) -> None:
-        """Learn which line is the first of a sample: the one before which the pauses are longer."""
+        """Learn which line of a sample comes first: the line with the longer pauses before it."""
         evidence_s = min(max(pause_s, 0.0), PERIOD_S) + (MARKED_S if marked else 0.0)
         self._evidence_s += evidence_s if kind == "gyro" else -evidence_s
         self._evidence_s = max(-SUREST_S, min(SUREST_S, self._evidence_s))

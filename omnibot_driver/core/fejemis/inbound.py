@@ -52,7 +52,7 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return and clear the angle to relay to the drive board, in rad; None once relayed."""
+        """Return and clear the angle to relay to the drive board, in rad; None if there is none."""
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 
@@ -79,7 +79,7 @@ class Inbound:
             self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
 
     def look(self, now: float, *, driving: bool) -> None:
-        """Act on elapsed time, and update the mode; ``driving``: a motion is commanded."""
+        """Check the timeouts, and update the mode; ``driving``: a motion is commanded."""
         machine = self._upkeep.machine
         was_unheard, self._front_unheard = self._front_unheard, now >= self.watch.front_unheard_at
         if self.watch.look(now, driving=driving):
@@ -90,7 +90,7 @@ class Inbound:
                 "no data from the front board for 0.25 s; brush and lift switched off", now
             )
         elif was_unheard and not self._front_unheard:
-            machine.off()  # the board may not have received it before
+            machine.off()  # the board may have missed the first switch-off
         if not self._ports.ready:
             self.mode = Mode.UNKNOWN
         else:

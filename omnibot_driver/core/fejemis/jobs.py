@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests to the boards besides motion, one job at a time, and how their success is proved.
+"""Requests to the boards other than motion, one job at a time, and how their success is proved.
 
 The boards do not acknowledge requests. A calibration has succeeded when new offsets were read twice
 with the same result; a single answer is not enough, as 1 in 99 damaged answers passes its checksum.
-A configuration is loaded when it was read after the request. Saving cannot be checked, so it is
-only required that both boards send heartbeats after the request. The module does not read a clock.
+Loading a configuration has succeeded when the configuration was read after the request. Saving
+cannot be checked: the job only waits until both boards have sent heartbeats after the request. The
+module does not read a clock.
 """
 
 import math
@@ -23,7 +24,7 @@ UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose codes add up to 99, so that a sum does not detect the loss of both."""
 WITHIN_S: Final = 8.0
 CALIBRATION_S: Final = 1.2
-"""Duration of a calibration, which averages for about a second, in s."""
+"""Duration of a calibration in s; the board averages its readings for about a second."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
 """How many times a request is sent, except for a calibration."""
@@ -41,7 +42,7 @@ OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
 
 
 def whole_seconds(delay_s: float) -> int:
-    """Return the delay in whole seconds, at least 1; more if its digits had an ``UNSEEN`` pair."""
+    """Return the delay in whole seconds, at least 1, increased until it has no ``UNSEEN`` pair."""
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
         seconds += 1
@@ -51,8 +52,8 @@ def whole_seconds(delay_s: float) -> int:
 class Jobs:
     """The running job; ``done``: results for the caller to take.
 
-    ``powering_off``: power ends soon. ``reload``: the boards may have loaded a configuration; the
-    caller must read the configuration again and reset this flag.
+    ``powering_off``: the power will be cut soon. ``reload``: the boards may have loaded a
+    configuration; the caller must read the configuration again and reset this flag.
     """
 
     def __init__(self) -> None:
@@ -77,7 +78,7 @@ class Jobs:
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` has work, in s."""
+        """Time in s at which to call ``due`` next."""
         return min(self._next_at, self._until, self._on_at)
 
     @property
@@ -119,7 +120,10 @@ class Jobs:
             self.cancel(why)
 
     def restarted(self, role: Role) -> None:
-        """Fail the running job; a power off fails and is forgotten only with the drive board."""
+        """Fail the running job, as the board ``role`` has restarted.
+
+        A power off fails, and is cancelled, only if the drive board has restarted.
+        """
         if role == "front" and self.job is Job.POWER_OFF:
             return
         self.cancel(f"the {role} board has restarted")
@@ -229,7 +233,7 @@ class Jobs:
         self._finish(False, f"{self.job.value} was not confirmed by {which}; {then}")
 
     def _finish(self, success: bool, message: str) -> None:
-        if self.job is Job.LOAD and self._said:  # both boards may have obeyed, even if it failed
+        if self.job is Job.LOAD and self._said:  # the boards may have obeyed even if the job failed
             self.reload = True
         self.done.append(JobDone(self._token, success, message))
         self._clear()

@@ -24,7 +24,7 @@ PACE_S: Final = 0.05
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest part of a wanted voltage that may be sent instead, to make damage detectable."""
+"""Smallest fraction of the wanted voltage that may be sent so that the sum detects damage."""
 LEAST_TIME_S: Final = 0.04
 
 
@@ -53,7 +53,7 @@ class Machine:
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` has work, in s."""
+        """Time in s at which to call ``due`` next."""
         return min(
             self._next_at,
             self._led_at,
@@ -83,7 +83,7 @@ class Machine:
         self._lift_until = self._lift_at + seconds
 
     def set_colour(self, red: int, green: int, blue: int, now: float) -> None:
-        """Set the colour of the LED band, 0..255 each."""
+        """Set the colour of the LED band; each part is in 0..255."""
         self.colour = red, green, blue
         self._led_left = TIMES
         self._led_at = max(now, self._led_again_at)
@@ -148,7 +148,7 @@ class Machine:
 
 
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
-    """Return a ``motv`` line in which the sum detects damage, and the line's run time in s."""
+    """Return a ``motv`` line whose sum detects damage, and how long the lift runs by it, in s."""
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)

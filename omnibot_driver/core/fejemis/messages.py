@@ -15,7 +15,8 @@ from omnibot_driver.core.values import value
 class Heartbeat:
     """``hbt``: the heartbeat, with the board's time, identity, firmware version and voltage.
 
-    ``state``: on the drive board its variable rcSource, -1 while the board ignores motion commands.
+    ``state``: on the drive board, the variable rcSource, which is -1 while the board ignores motion
+    commands.
     """
 
     time_s: float

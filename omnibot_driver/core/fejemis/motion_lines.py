@@ -2,11 +2,12 @@
 
 """``rc`` lines for each board, written so that the loss of any two characters is detected.
 
-Not every number can be written so (`numerals.py`), but a board does not need both numbers of a line
-exactly. The front board takes the angle from the ratio of speed and turn rate. The drive board
-takes the speed of the outer wheel from the root of the sum of their squares, with the sign of the
-speed. Of all lines that are exact enough in that quantity, the nearest to the command is chosen.
-Lines whose sum may hide a lost character of a number are avoided (`outbound.py`).
+Not every number can be written in this way (`numerals.py`), but a board does not need both numbers
+of a line exactly. The front board computes the wheel's angle from the ratio of speed and turn rate.
+The drive board computes the speed of the outer wheel as the root of the sum of the squares of both
+numbers, with the sign of the speed. Among the lines that give this angle or speed exactly enough,
+the module chooses the one nearest to the command. Lines whose sum may hide a lost character of a
+number are avoided (`outbound.py`).
 """
 
 import math
@@ -23,16 +24,16 @@ SLOWEST_MPS: Final = 2e-4
 """Smallest speed in m/s near which there are enough numbers that can be written."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
-"""Relative speed error of a line that is tolerated."""
+"""Tolerated relative error of the speed that a line gives."""
 ANGLE_COST: Final = 1e4
-"""Cost of an angle that is wrong by 1 rad, if numbers that are e times too large have a cost of 1.
+"""Cost of an angle error of 1 rad; numbers that are e (2.718) times too large have a cost of 1.
 """
 SLOWEST: Final = 30.0
 """Largest ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
 SCALES: Final = 4.0
 """Largest factor between a number for the front board and the commanded one."""
 Candidate = tuple[float, str, str]
-"""A possible line: cost, text of the speed in m/s and of the turn rate in degrees/s, no signs."""
+"""A possible line: cost, and texts of the speed (m/s) and turn rate (degrees/s) without signs."""
 
 
 @lru_cache(maxsize=512)
@@ -90,7 +91,7 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the line of least cost among those that are ``robust``; if none is, among all."""
+    """Return the ``robust`` line of least cost; if no line is robust, the line of least cost."""
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)
     return next(filter(robust, lines), _line(signs, *found[0][1:]))

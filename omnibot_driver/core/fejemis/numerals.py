@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Numbers that can be written without two digits whose joint loss a sum does not detect.
+"""Numbers that can be written without any two characters whose joint loss a sum does not detect.
 
 A sum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or ``-``
-and ``6``. Each line contains the source ``2``, so the numbers here do not contain ``1``. They also
-do not contain ``3``, nor ``5``, nor, in a line with a minus sign, ``6``. So there are gaps between
-the numbers; the largest gap, relative to the number, is from 1 to 2.
+and ``6``. Each line contains the number ``2`` (the source of the command), so the numbers here do
+not contain ``1``. They also do not contain ``3`` or ``5``. In a line with a minus sign, they do not
+contain ``6`` either. So there are gaps between the numbers; the largest gap, relative to the
+number, is from 1 to 2.
 """
 
 from bisect import bisect_left, bisect_right
@@ -65,7 +66,7 @@ def between(least: float, most: float, *, negative: bool) -> list[tuple[float, s
 
 
 def _written(mantissa: str, power: int) -> str:
-    """Return the text of the number with these three digits; ``power``: of ten, of the first."""
+    """Return the text of a number from its three digits and the first digit's power of ten."""
     if power >= SIGNIFICANT - 1:
         return mantissa + "0" * (power - SIGNIFICANT + 1)
     if power >= 0:

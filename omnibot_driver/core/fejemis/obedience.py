@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the drive board obeys, by its heartbeat, and why not: a pause, or the driver's e-stop.
+"""Finds from heartbeats whether the drive board obeys, and tells a pause from the driver's e-stop.
 
 The driver sends ``stop`` to the board in both cases. The driver's own e-stop is not regarded as a
 pause: after its release, ``start`` is sent until the heartbeat shows that the board obeys. A pause
-remains until the user calls start. The module knows rcSource (the source of commands that the board
-reports to obey) and times, not lines.
+remains until the user calls start. The module knows times and rcSource (the source of commands that
+the board obeys, by its own report), not lines.
 """
 
 import math
@@ -14,7 +14,7 @@ from typing import Final
 STOPPED: Final = -1.0
 """rcSource of a drive board that ignores all motion commands (manual, start)."""
 RELEASED_S: Final = 1.0
-"""Time in s after the release of an e-stop for which ``start`` is repeated, until it is obeyed."""
+"""Longest time in s for which ``start`` is repeated after the release of an e-stop."""
 START_AGAIN_S: Final = 0.2
 
 
@@ -52,7 +52,7 @@ class Obedience:
         self.start_at = math.inf
 
     def pause(self) -> None:
-        """Note a requested pause, and cancel the ``start`` of a released e-stop."""
+        """Note a requested pause, and cancel a ``start`` that is due after an e-stop."""
         self.pause_said = True
         self.start_at = math.inf
 

@@ -2,14 +2,14 @@
 
 """Odometry from poses and wheel speeds of the drive board: displacements.
 
-A pose is absolute, but has few digits: a millimetre in 20 ms is 0.05 m/s. The wheel speeds show the
-motion more finely. So a displacement is the integral of the speeds between two poses, corrected
-towards the newer pose. If the integral and the difference of the poses differ by more than
-rounding, lines were lost or a wheel was turned quickly; then the displacement is the difference of
-the poses. The displacements add up to the pose.
+A pose is absolute, but has few digits: with steps of 1 mm every 20 ms, a speed has steps of 0.05
+m/s. The wheel speeds show the motion more finely. So a displacement is the integral of the speeds
+between two poses, corrected towards the newer pose. If the integral and the difference of the poses
+differ by more than rounding, lines were lost or a wheel was turned quickly; then the displacement
+is the difference of the poses. The displacements add up to the pose.
 
 A pose that the robot cannot have reached is held back until the next pose comes. If the two agree,
-either the pose before both was wrong, or the board has a new frame (command ``enc0``).
+either the pose before both was wrong, or the board has begun a new frame (command ``enc0``).
 """
 
 import math
@@ -20,12 +20,15 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Part of the difference between pose and speeds that one displacement corrects, if only rounding.
+"""Fraction of the difference between pose and speeds that one displacement corrects.
+
+It applies if rounding alone explains the difference.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference, in units of the last digit sent, that is explained by rounding.
 
-Each of two poses is off by half a unit, and the heading turns the error of one axis into the other.
+Each of two poses is wrong by up to half a unit, and the rotation by the heading mixes the errors of
+both axes.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
@@ -44,7 +47,7 @@ NEW_FRAME: Final = 4
 
 
 class PoseOdometry:
-    """Turns poses and speeds into displacements; ``track_m``: as the board is configured, in m."""
+    """Turns poses and speeds into displacements; ``track_m``: the board's track, in m."""
 
     def __init__(self, track_m: float) -> None:
         self.track_m = track_m
@@ -67,7 +70,7 @@ class PoseOdometry:
 
     @property
     def moving(self) -> bool:
-        """Whether a wheel turns, by its last speed."""
+        """Whether a wheel turns, according to its last speed."""
         speeds = self._speeds
         return speeds is not None and max(map(abs, (speeds.left_mps, speeds.right_mps))) > STILL_MPS
 
@@ -83,9 +86,9 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
 
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement up to this pose, and every 0.2 s also the sum of all as a pose.
+        """Return the displacement up to this pose, and every 0.2 s the sum of all displacements.
 
-        That pose makes up for displacements that a later check rejects.
+        The sum is a pose. It corrects for displacements that a later check rejects.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

@@ -7,12 +7,13 @@ A sum modulo 99 does not detect two lost characters whose codes add up to 99 or 
 see `motion_lines.py`. Two more kinds of damage are detected or not depending on the value of the
 sum, so the digits of a motion line are chosen to get a suitable sum:
 
-* A lost line end joins two lines. The result passes if the sum of the second line, with its prefix,
-  equals the code of a character that was lost as well. So that sum must not be the code of a
-  character of a number, nor of the ``;`` (without it, the digits of the sum would continue the last
-  number of the first line). Other lines with such a sum follow an empty line, which the boards
-  ignore.
+* A lost line end joins two lines. The joined line passes the check if one more character is lost,
+  whose code equals the sum of the second line with its prefix. So this sum must not be the code of
+  a character in numbers, nor of the ``;`` (without it, the digits of the sum would continue the
+  last number of the first line). If a line has such a sum and its digits cannot be chosen, the
+  driver sends an empty line before it, which the boards ignore.
 * A lost digit of the sum leaves a sum that is correct only if a certain character is lost as well.
+  So this must not be a character in numbers.
 
 Characters are never added to a line itself: a board may compare the complete line with ``stop``.
 """
@@ -55,7 +56,7 @@ def harmless(text: str) -> bool:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether a lost line end or a lost digit of the sum cannot hide a lost character."""
+    """Return whether a lost character is detected even if a line end or sum digit is lost too."""
     total = sum_of(text)
     tens, ones = divmod(total, 10)
     as_second = (ord(";") + 2 * ord("0") + tens + ones + total - 1) % MODULUS

@@ -43,7 +43,7 @@ class Polls:
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` has work, in s."""
+        """Time in s at which to call ``due`` next."""
         return min(self._next_at, self._sonar_at) if self._role == "drive" else self._next_at
 
     def unknown(self, words: Mapping[str, None]) -> None:

@@ -68,7 +68,7 @@ class Ports:
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
-        """Find the order of the ports after a heartbeat; return whether it is known to be new."""
+        """Find the order of the ports after a heartbeat; return whether the order has changed."""
         first, second = (half.role for half in self.halves)
         if first == second:
             return False
@@ -80,7 +80,7 @@ class Ports:
 
     @property
     def trouble(self) -> str:
-        """The reason why the connected boards cannot be one robot, with advice; else empty."""
+        """The reason why the boards cannot be one robot, with advice; empty if they can."""
         for name, half in zip(PARAMETERS, self.halves, strict=True):
             if half.identity is not None and half.role is None:
                 return (
@@ -109,13 +109,13 @@ class Ports:
         return sum((self.at(channel, *texts) for channel in unknown or (0, 1)), NO_PACKETS)
 
     def both(self, text: bytes) -> Packets:
-        """Return a line for each board, behind a line end that closes any incomplete line."""
+        """Return a line for each board, after a line end that ends any incomplete line."""
         return tuple(
             (channel, b"\n" + data.lstrip(b"\n"))
             for channel, data in self.at(0, text) + self.at(1, text)
         )
 
     def at(self, channel: int, *texts: bytes) -> Packets:
-        """Return lines for the board at this channel; nothing without ``texts``."""
+        """Return lines for the board at this channel; no packets if there are no ``texts``."""
         data = outbound.lines(*texts, sums=self.halves[channel].sums)
         return ((channel, data),) if data else NO_PACKETS

@@ -14,7 +14,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """Requests besides motion; each value is the request's name in messages to the user."""
+    """Requests other than motion; each value is the request's name in messages to the user."""
 
     CALIBRATE_GYRO = "gyro calibration"
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"
@@ -64,7 +64,7 @@ class BatteryReading:
 
 @value(frozen=True, slots=True)
 class RangeReading:
-    """Distance by one sensor; ``distance_m``: infinite if the sensor does not detect anything."""
+    """Distance that a sensor measures; ``distance_m``: infinite if nothing is detected."""
 
     name: RangeName
     distance_m: float
@@ -72,7 +72,7 @@ class RangeReading:
 
 @dataclass(frozen=True, slots=True)
 class JobDone:
-    """Result of a job; ``token`` identifies it for its caller."""
+    """Result of a job; ``token``: identifies the job for its caller."""
 
     token: object
     success: bool

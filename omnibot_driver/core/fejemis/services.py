@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests of the user besides motion: brush, lift, LED band, and jobs.
+"""Requests of the user other than motion: brush, lift, LED band, and jobs.
 
 The module knows when each request is allowed, not how the request is sent or confirmed.
 """
@@ -31,7 +31,7 @@ class Robot(Protocol):
 
     @property
     def refusal(self) -> str:
-        """The reason why the robot must not be driven; empty if it may be."""
+        """The reason why the robot must not be driven; empty if driving is allowed."""
 
     @property
     def driving(self) -> bool:
@@ -39,7 +39,7 @@ class Robot(Protocol):
 
     @property
     def settings(self) -> FejemisSettings:
-        """The settings, which include the time of the lift and the delay of a power off."""
+        """The settings, which include the lift's run time and the delay of a power off."""
 
 
 class Services:
@@ -67,7 +67,7 @@ class Services:
         self._upkeep.machine.lift(volts, now, self._robot.settings.command_timeout_s)
 
     def set_led(self, red: int, green: int, blue: int, now: float) -> None:
-        """Set the colour of the LED band, 0..255 each."""
+        """Set the colour of the LED band; each part is in 0..255."""
         red, green, blue = (max(0, min(255, part)) for part in (red, green, blue))
         self._upkeep.machine.set_colour(red, green, blue, now)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of a Fejemis robot, which its two boards do not report."""
+"""Settings of a Fejemis robot that come from the user, not from its two boards."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class Written(Enum):
     ACCELEROMETER = "acccal", 6
     """Three offsets, then three scales."""
     STEERING_GAINS = "cssteer", 0
-    """Parameters as in the firmware's ucontrolbase.cpp; any count of numbers."""
+    """Parameters of the steering controller, as in ucontrolbase.cpp; any count of numbers."""
 
     command: str
     count: int

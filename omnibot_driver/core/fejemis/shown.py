@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Diagnostics that only a Fejemis has, as texts by readable names."""
+"""Diagnostics that only a Fejemis has, as texts under readable names."""
 
 import math
 from typing import Final
@@ -12,7 +12,7 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Number of lines that are shown: the latest of those that a board's firmware does not know."""
+"""Largest count of lines shown among those that a firmware does not know; the latest are shown."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

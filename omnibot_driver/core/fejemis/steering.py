@@ -3,14 +3,14 @@
 """Conversion of a body twist into commands for both boards.
 
 The command ``rc`` carries a speed v and a turn rate w. The drive board does not obey both: it
-drives its outer wheel at the root of v² + w², about the centre given by the *measured* front angle.
-So the driver multiplies v and w by (`|v|` + `|w|`·B/2) / sqrt(v² + w²), which makes that root the
-wanted speed of the outer wheel.
+drives its outer wheel at the speed sqrt(v² + w²), and turns about the centre given by the
+*measured* front angle. So the driver multiplies v and w by (`|v|` + `|w|`·B/2) / sqrt(v² + w²).
+This makes the root equal to the wanted speed of the outer wheel.
 
-While the front wheel moves to its angle, the drive board gets a lower speed, so that the body moves
-and turns hardly faster than commanded. A turn on the spot begins when the front wheel has reached
-its angle; until then the drive board is commanded to stop. The module knows geometry and angles,
-not lines.
+While the front wheel moves to its angle, the drive board gets a lower speed, so that the body does
+not move or turn much faster than commanded. A turn on the spot begins when the front wheel has
+reached its angle; until then the drive board is commanded to stop. The module knows geometry and
+angles, not lines.
 """
 
 import math
@@ -38,7 +38,7 @@ class Steered:
 
     ``speed_mps``, ``turn_radps``: numbers for the front board; the drive board gets both multiplied
     by ``part``. ``angle_rad``: the front wheel's target. ``twist``: the body's motion at the
-    present front angle. ``whole``: whether ``part`` is 1: the speed is not limited.
+    present front angle. ``whole``: whether ``part`` is 1, so the speed is not limited.
     """
 
     speed_mps: float
@@ -58,7 +58,7 @@ class Geometry:
 
     @property
     def kinematics(self) -> SteeredKinematics:
-        """Kinematics for wheels of 1 m radius: wheel rates in rad/s are rim speeds in m/s."""
+        """Kinematics with wheels of 1 m radius, so wheel rates in rad/s equal rim speeds in m/s."""
         return SteeredKinematics(1.0, self.track_m, self.wheelbase_m)
 
 
@@ -116,7 +116,7 @@ def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTw
 def told_twist(
     speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
 ) -> BodyTwist:
-    """Return the twist of a body whose drive board obeys these numbers of ``rc``."""
+    """Return the body's twist if the drive board obeys an ``rc`` line with these numbers."""
     outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
     return body_twist(outer, geometry, angle_rad)
 

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversion of a Teensy's time into the host's time, and stamps for the readings of both boards.
+"""Conversion of a Teensy's time into the host's time, and timestamps for both boards' readings.
 
-A line arrives late, never early. So the clock is the straight line below all arrival times, drawn
-over the Teensy's time (`core/timing/clock_fit.py`). If a Teensy's time is too far from the clock,
-the line was damaged, or the board has restarted.
+A message arrives late, never early. So the clock is the straight line that lies below all arrival
+times, plotted over the Teensy's time (`core/timing/clock_fit.py`). If a Teensy's time is too far
+from the clock, the message was damaged, or the board has restarted.
 """
 
 from collections.abc import Sequence
@@ -84,14 +84,14 @@ class TeensyClock:
         return True
 
     def _is_new_time(self, board_s: float, now: float) -> bool:
-        """Return whether enough implausible times agree; if so, begin the clock again here."""
+        """Return whether enough implausible times agree; if so, begin a new clock."""
         if self._odd is None or abs((board_s - self._odd[0]) - (now - self._odd[1])) >= AGREE_S:
             self._odd, self._odds = (board_s, now), 1
             return False
         self._odds += 1
         if self._odds < AGAIN or now - self._odd[1] < AGAIN_AFTER_S:
             return False
-        self.restarted = board_s < self._last_s  # if it is later, earlier lines had only waited
+        self.restarted = board_s < self._last_s  # not if earlier lines were late
         self._begin_at(board_s, now)
         return True
 
@@ -103,8 +103,8 @@ class TeensyClock:
 class StampedReadings:
     """The readings of one call of the board, with their timestamps; a ``ReadingClock``.
 
-    The timestamps of one kind of reading increase. Those of past samples are limited to the time
-    of the call.
+    The timestamps of one kind of reading increase. A computed timestamp that is later than the call
+    is replaced by the time of the call.
     """
 
     skew_ppm = 0.0
@@ -120,7 +120,7 @@ class StampedReadings:
         self._stamps: list[float] = []
 
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
-        """Add a reading; move ``stamp_s`` if it is after ``now`` or not after the last stamp."""
+        """Add a reading; move ``stamp_s`` if it is after ``now`` or not after the last one."""
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         stamp_s = min(stamp_s, now)
         last_s = self._last.get(kind)
@@ -136,9 +136,9 @@ class StampedReadings:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the timestamps of the added readings; ``now`` for each if their count differs."""
+        """Return the timestamps of the added readings; ``now`` for each if the counts differ."""
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the timestamp of the first added reading; ``now`` before the first."""
+        """Return the timestamp of the first added reading; ``now`` if there is none."""
         return self._stamps[0] if self._stamps else now

@@ -2,7 +2,7 @@
 
 """Notices for the user of this robot: each text is shown at most once in ``TELL_EVERY_S``.
 
-A notice that stops the robot is always added, but with an empty text if it is a repetition.
+A notice that stops the robot is always added, but its text is empty if it repeats a recent text.
 """
 
 import math

@@ -40,7 +40,7 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time between two notices of a low battery, in s."""
 PERIOD_S: Final = 0.03
-"""Time in s since the last IMU sample came, up to which an orientation gets its timestamp."""
+"""Time in s after an IMU sample within which an orientation gets the timestamp of that sample."""
 
 
 class Translation:
@@ -129,7 +129,7 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add the IMU samples that are complete, as a pose came or the read has ended."""
+        """Add the complete IMU samples; call this after a pose and at the end of a read."""
         for item in self._pairs.take():
             if isinstance(item, Pair):
                 self._sample(item, clock)
@@ -184,5 +184,5 @@ def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
 
 
 def _seen(distance_m: float) -> float:
-    """Return the distance in m; infinity if the sensor did not measure a positive one."""
+    """Return the distance in m; infinity if the sensor did not measure a positive distance."""
     return distance_m if distance_m > 0.0 else math.inf

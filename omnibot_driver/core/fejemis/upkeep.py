@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keeps both boards sending and configured, and runs requests besides motion.
+"""Keeps both boards sending and configured, and runs requests other than motion.
 
 The module combines subscriptions, polls, configuration, jobs, brush, lift and lights. It collects
-the lines that these parts have to send; it does not use the answers.
+the lines that these parts have to send; it passes the answers on to them, without using the answers
+itself.
 """
 
 from typing import Final
@@ -35,7 +36,7 @@ class Upkeep:
         self.polls = {role: Polls(role) for role in ROLES}
 
     def configure(self, settings: FejemisSettings) -> None:
-        """Use new settings; those written to the boards are sent while the robot is at rest."""
+        """Use new settings; values for the boards are written while the robot is at rest."""
         self._settings = settings
         for configuration in self.configurations.values():
             configuration.configure(settings.written)
@@ -48,7 +49,7 @@ class Upkeep:
             self._begin(role)
 
     def restarted(self, role: Role) -> None:
-        """Configure a restarted board again, switch brush and lift off, and fail a job."""
+        """Configure a restarted board again, switch brush and lift off, and fail a running job."""
         self._begin(role)
         self.machine.begin()
         self.jobs.restarted(role)
@@ -59,7 +60,7 @@ class Upkeep:
 
     @property
     def geometry(self) -> Geometry:
-        """Track and wheelbase in m as the drive board uses them; the settings while unknown."""
+        """Track and wheelbase in m, as used by the drive board; until known, from the settings."""
         nominal = Geometry(self._settings.track_m, self._settings.wheelbase_m)
         return self.configurations["drive"].geometry or nominal
 
@@ -77,7 +78,7 @@ class Upkeep:
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` has work, in s."""
+        """Time in s at which to call ``due`` next."""
         times = [self.jobs.wake_at, self.machine.wake_at]
         for half in self._ports.halves:
             times.append(half.wake_at)
@@ -109,8 +110,8 @@ class Upkeep:
         for configuration in self.configurations.values():
             if configuration.pending:
                 return (
-                    f"the configuration of the {configuration.role} board is being written; it"
-                    " takes 3 s at most"
+                    f"the configuration of the {configuration.role} board is being written; this"
+                    " takes at most 3 s"
                 )
         return ""
 
@@ -127,9 +128,8 @@ class Upkeep:
         for half in self._ports.halves:
             if half.decoder.contradicted:
                 return (
-                    f"the lines of the {half.role} board contradict `line_sums`"
-                    f" ({self._settings.line_sums}), which says whether they have checksums: set"
-                    " it to auto"
+                    f"the lines of the {half.role} board contradict the parameter `line_sums`"
+                    f" ({self._settings.line_sums}): set `line_sums` to auto"
                 )
             if unknown := half.unknown_streams:
                 return (
@@ -137,7 +137,7 @@ class Upkeep:
                     " so this data is missing; update the firmware"
                 )
         one, other = (self.configurations[role].geometry for role in ROLES)
-        told = Written.STEERING not in self._settings.written  # else `failed` tells it
+        told = Written.STEERING not in self._settings.written  # else `failed` reports it
         if told and one and other and _differ(one, other):
             return (
                 "the boards are configured to different steering geometries (confs): drive has B"

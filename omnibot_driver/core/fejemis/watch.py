@@ -19,7 +19,7 @@ NO_ANGLE_S: Final = 0.25
 """Time in s without a front angle after which brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
-"""Silence in s after opening a port at which its board is reported missing."""
+"""Silence in s after which the board at a newly opened port is reported as missing."""
 SLACK_S: Final = 1e-6
 
 
@@ -87,7 +87,7 @@ class Watch:
         if unheard_s < FLOWS_S:
             if half.unsure:
                 half.ready = False
-            elif unheard_s <= 0.0:  # a heartbeat alone is not the data that ends a start
+            elif unheard_s <= 0.0:  # needs the stream itself, not only a heartbeat
                 half.ready = True
         elif half.ready and unheard_s > SILENT_S and now >= self._patient_until:
             what = "is silent" if silent else f"no longer sends `{NEEDED[role]}`"
@@ -120,7 +120,7 @@ class Watch:
 
     @property
     def refusal(self) -> str:
-        """The reason why the robot must not be driven; empty if it may be."""
+        """The reason why the robot must not be driven; empty if driving is allowed."""
         if trouble := self._ports.trouble or self._front.trouble:
             return trouble
         if self.blind:
