@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Profile of the Fejemis sweeping robot: its parameters, and what is made from their values."""
+"""Profile of the Fejemis sweeping robot: its parameters, and the objects made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -24,7 +24,7 @@ SIMULATOR: Final = "omnibot_driver.simulator.fejemis"
 USB_BAUDRATE: Final = 115200
 """Baud rate that is set for the USB ports; their real speed does not depend on it."""
 WHEEL_RADIUS_M, TRACK_M, WHEELBASE_M = 0.0775, 0.4, 0.42
-"""Sizes that are used where the user gives none; the manual has the track alone."""
+"""Default sizes for values that the user does not set; only the track is in the manual."""
 PARAMETERS: Final = table(
     "fejemis",
     TRAITS,
@@ -39,7 +39,7 @@ PARAMETERS: Final = table(
         "port": {
             "default": "/dev/ttyACM0",
             "description": "Serial device of the drive Teensy. sim:// is a simulated pair of boards"
-            " inside the driver, replay://bag a recorded wire.",
+            " inside the driver, and replay://bag plays a recorded bag.",
         },
     },
     checks=(require_two_ports, require_whole_settings),
@@ -52,7 +52,7 @@ def make(values: Mapping[str, Any]) -> FejemisBoard:
 
 
 def settings(values: Mapping[str, Any]) -> FejemisSettings:
-    """Make the board's settings, which its data does not reveal, from checked values."""
+    """Make the settings that the boards do not report, from checked parameter values."""
     wheels = kinematics(values)
     return FejemisSettings(
         track_m=wheels.track_m,
@@ -76,7 +76,7 @@ def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
 
 
 def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
-    """Return two driving wheels and a steered one, with default sizes where none are given."""
+    """Return the kinematics of the robot's wheels, with default sizes where they are unset."""
     radii_m = values["wheel_radii"] or [WHEEL_RADIUS_M]
     return SteeredKinematics(
         wheel_radius_m=sum(radii_m) / len(radii_m),
@@ -88,8 +88,8 @@ def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
     """Create this board's own topics and services, and return its publishing functions.
 
-    They are the steering joint, orientation, magnetic field, battery, ranges; brush, lift, light;
-    and jobs.
+    They publish the steering joint, orientation, magnetic field, battery and ranges, and accept
+    requests for brush, lift, lights and jobs.
     """
     from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS
 

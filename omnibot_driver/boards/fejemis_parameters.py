@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters that a Fejemis has and other boards need not have. Knows no ROS.
+"""The parameters of a Fejemis that not all boards have. Must not know ROS.
 
-What the two Teensys keep by themselves is unset by default: it is written only if the user gives a
-value (`fejemis_values.py`).
+Values that the two Teensys store are unset by default: the driver writes such a value only if the
+user sets it (`fejemis_values.py`).
 """
 
 import math
@@ -19,8 +19,9 @@ FRONT_PORT: Final = (
         "front_port",
         "/dev/ttyACM1",
         "",
-        "Serial device of the front Teensy; port is that of the drive Teensy. The driver finds out"
-        " by their heartbeats if they are swapped. Not used where port is sim:// or replay://.",
+        "Serial device of the front Teensy; port is that of the drive Teensy. If the two are"
+        " swapped, the driver detects it by the heartbeats. Not used if port is sim:// or"
+        " replay://.",
         fixed=True,
     ),
 )
@@ -30,8 +31,8 @@ WHEELS: Final = (
         "wheel_radii",
         [0.0775, 0.0775],
         "m",
-        "Radius of the left and the right driving wheel, written with gear, encoder_ticks and track"
-        " (confw). Unset: the board keeps its own.",
+        "Radius of the left and the right driving wheel, written to the board together with gear,"
+        " encoder_ticks and track (confw). Unset: the board keeps its own values.",
         low=0.001,
         high=1.0,
         unset=True,
@@ -41,7 +42,7 @@ WHEELS: Final = (
         19.0,
         "",
         "Turns of the motor for one turn of a driving wheel (confw). Unset: the board keeps its"
-        " own.",
+        " own value.",
         low=1.0,
         high=1000.0,
         unset=True,
@@ -50,7 +51,7 @@ WHEELS: Final = (
         "encoder_ticks",
         68,
         "ticks",
-        "Encoder ticks of one turn of the motor (confw). Unset: the board keeps its own.",
+        "Encoder ticks of one turn of the motor (confw). Unset: the board keeps its own value.",
         low=1,
         high=100_000,
         unset=True,
@@ -60,7 +61,7 @@ WHEELS: Final = (
         0.4,
         "m",
         "Distance between the driving wheels, B in the manual (confw, confs). Unset: the boards"
-        " keep their own.",
+        " keep their own values.",
         low=0.01,
         high=10.0,
         unset=True,
@@ -70,7 +71,8 @@ WHEELS: Final = (
         0.42,
         "m",
         "Distance from the axle of the driving wheels to the steered wheel, F and S in the"
-        " manual; written to both boards with track (confs). Unset: the boards keep their own.",
+        " manual; written to both boards together with track (confs). Unset: the boards keep their"
+        " own values.",
         low=0.01,
         high=10.0,
         unset=True,
@@ -79,8 +81,8 @@ WHEELS: Final = (
         "front_wheel_offset",
         0.0,
         "rad",
-        "Reading of the angle sensor when the front wheel is straight, written with"
-        " front_wheel_inverted (fwoffset). Unset: the board keeps its own.",
+        "Reading of the angle sensor when the front wheel is straight, written to the board"
+        " together with front_wheel_inverted (fwoffset). Unset: the board keeps its own value.",
         low=-math.pi,
         high=math.pi,
         unset=True,
@@ -90,7 +92,7 @@ WHEELS: Final = (
         False,
         "",
         "Whether the angle sensor is positive to the right (fwoffset). Unset: the board keeps its"
-        " own.",
+        " own value.",
         unset=True,
     ),
     Parameter(
@@ -99,7 +101,7 @@ WHEELS: Final = (
         "",
         "Parameters of the steering controller in the order of cpsteer (cssteer): use, Kp, useI,"
         " taui, ilimit, 1, useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp, useULim, Ulim."
-        " Unset: the board keeps its own.",
+        " Unset: the board keeps its own values.",
         length=(1, MOST_GAINS),
         low=-1e6,
         high=1e6,
@@ -128,9 +130,10 @@ DRIVING: Final = (
         "power_off_delay",
         10.0,
         "s",
-        "Time from ~/power_off until the board cuts the power, also that of this computer if"
-        " the board supplies it. It is sent in whole seconds; a value in which a lost digit could"
-        " make another one is raised, such as 120 s to 131 s. The answer has the time in use.",
+        "Time from ~/power_off until the board cuts the power. This computer loses power too if"
+        " the board supplies it. The driver sends whole seconds. It increases a value whose digits"
+        " could be lost without detection, such as 120 s to 131 s. The answer of ~/power_off names"
+        " the time in use.",
         low=1.0,
         high=3600.0,
     ),
@@ -158,7 +161,7 @@ SENSORS: Final = (
         [46000.0, 14000.0, 46000.0, 14000.0],
         "",
         "Raw readings of infrared sensor 1 at 13 cm and 50 cm, then of sensor 2 (irc). Unset: the"
-        " board keeps its own.",
+        " board keeps its own values.",
         low=0.0,
         high=1e6,
         unset=True,
@@ -168,7 +171,7 @@ SENSORS: Final = (
         [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         "µT",
         "Offsets of the magnetometer, then a matrix by rows (magcal). Unset: the board keeps its"
-        " own.",
+        " own values.",
         low=-1e4,
         high=1e4,
         unset=True,
@@ -177,7 +180,8 @@ SENSORS: Final = (
         "accel_calibration",
         [0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
         "m/s²",
-        "Offsets of the accelerometer, then scales (acccal). Unset: the board keeps its own.",
+        "Offsets of the accelerometer, then scales (acccal). Unset: the board keeps its own"
+        " values.",
         low=-100.0,
         high=100.0,
         unset=True,
@@ -194,7 +198,7 @@ SENSORS: Final = (
         "magnetic_field_stddev",
         1e-6,
         "T",
-        "Noise of the magnetometer, for the covariance of imu/mag.",
+        "Standard deviation of the magnetometer's noise, for the covariance of imu/mag.",
         low=1e-12,
         high=1.0,
     ),

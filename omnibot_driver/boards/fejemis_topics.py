@@ -37,8 +37,10 @@ from omnibot_driver.qos import DEEP
 NAN: Final = float("nan")
 WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
-"""Shortest time between two published steering angles, in ns. The angle comes 66 times a second;
-joint states are for display."""
+"""Shortest time between two published steering angles, in ns.
+
+The angle arrives 66 times a second; joint states are for display and need fewer.
+"""
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")
 SERVICES: Final = {
@@ -263,7 +265,7 @@ def _why_not_connected(what: str, session: Session) -> str:
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:
-    """Return the node's publisher of this topic, which the driver has on any board."""
+    """Return the node's publisher of this topic, which the driver creates for any board."""
     name = node.resolve_topic_name(topic)
     return next(one for one in node.publishers if one.topic_name == name)
 

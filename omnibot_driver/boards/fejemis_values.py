@@ -2,7 +2,7 @@
 
 """Values of a Fejemis' parameters: what is written to the boards, and which values fit together.
 
-Knows no ROS, and not what a parameter means to the boards.
+Must not know ROS, nor what a parameter means to the boards.
 """
 
 import math
@@ -44,7 +44,7 @@ _WHEELS: Final = ("wheel_radii", "gear", "encoder_ticks")
 
 
 def require_two_ports(values: Mapping[str, Any]) -> None:
-    """Reject one device for both Teensys, since the robot needs both of them."""
+    """Reject the same device for both Teensys, as each Teensy has its own port."""
     port, front = (str(values[name]) for name in ("port", "front_port"))
     if port == front or (port.startswith("/") and _same(port, front)):
         raise ParameterError(

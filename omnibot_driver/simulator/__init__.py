@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motor boards in software, each written from its manual, to run the driver against.
+"""Simulated motor boards for tests of the driver, each written from the manual of the real board.
 
 Each board has its own package; ``common`` holds what the boards share. The simulator shares no
-code with the driver, so that a misread manual does not cancel out.
+code with the driver, so that tests can reveal a misread manual.
 ``python -m omnibot_driver.simulator`` runs one board in real time.
 
 For one release, the names of ``simulator.omnibot`` can also be imported from here.
@@ -47,7 +47,7 @@ def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     warnings.warn(
-        f"import {name} from {__name__}.omnibot; {__name__} will not have it in the next release",
+        f"import {name} from {__name__}.omnibot; the next release removes it from {__name__}",
         DeprecationWarning,
         stacklevel=2,
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command line of the simulated boards: a board in real time, its ports, and a console on stdin.
+"""Command line that runs a simulated board in real time, with its ports and a console on stdin.
 
 Knows arguments, signals and the console. Must not know the byte protocol or the internals of any
 board.
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def boards() -> list[str]:
-    """Return the names of the simulated boards: the packages beside ``common``."""
+    """Return the names of the simulated boards: all packages in this folder except ``common``."""
     return [
         module.name
         for module in pkgutil.iter_modules(simulator.__path__)
@@ -78,7 +78,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         default=options.DEFAULT_BOARD,
         metavar="NAME",
         help=f"the board to simulate: {', '.join(boards())} (default {options.DEFAULT_BOARD});"
-        " --board NAME --help has its options",
+        " --board NAME --help lists the options of a board",
     )
 
 
@@ -96,7 +96,7 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             "--link",
             metavar="PATH",
             action="append",
-            help="make a symbolic link to the pseudo-terminal; if there are several, repeat the"
+            help="make a symbolic link to the pseudo-terminal; if the board has several, repeat the"
             " option, or give it once: each link then ends in a hyphen and the port's name",
         )
     if any(channel.datagrams for channel in module.CHANNELS):
@@ -119,13 +119,13 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
         f"A simulated {module.TITLE} board listens on {', '.join(place for _, place in places)}. "
         "In another terminal:\n"
         f"  ros2 run omnibot_driver driver --ros-args {board}{ports}\n"
-        "Type help for the commands here; ctrl-C ends it."
+        "Type help for the commands here; ctrl-C ends the simulator."
     )
 
 
 @contextmanager
 def _signals_as_readable() -> Iterator[int]:
-    """Yield a descriptor that becomes readable on SIGINT or SIGTERM; they have no other effect."""
+    """Yield a descriptor that SIGINT and SIGTERM make readable; these signals do nothing else."""
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     old_writer = signal.set_wakeup_fd(writer)
@@ -175,7 +175,7 @@ def _answer(command: str, served: ServedBoard[SimulatedBoard]) -> bool:
     elif command == "quit":
         return False
     elif command:
-        print(f"simulator: no command {command!r}; help lists them", file=sys.stderr)
+        print(f"simulator: no command {command!r}; help lists the commands", file=sys.stderr)
     return True
 
 

@@ -2,7 +2,7 @@
 
 """Interfaces between a simulated board and the code that runs, connects or selects it.
 
-Values and protocols only. Knows no particular board.
+Values and protocols only. Must not know any particular board.
 """
 
 import argparse
@@ -19,8 +19,8 @@ class Channel:
     """One connection between a board and the computer.
 
     name: name of the channel on its board; empty if it is the only one.
-    parameter: the driver's parameter that names the port of the channel; empty if the port follows
-        from that of another channel (the next UDP port).
+    parameter: the driver's parameter that names the port of the channel; empty if another channel's
+        port determines this port (the next UDP port).
     datagrams: True for UDP, False for a serial line.
     """
 
@@ -44,7 +44,8 @@ class SimulatedBoard(Protocol):
         """Receive data that was sent to the board.
 
         data: one datagram, or bytes of a serial line, in chunks of any size.
-        now: arrival time in s, by any monotonic clock. The reply comes with the next ``advance``.
+        now: arrival time in s, by any monotonic clock. The next ``advance`` returns the board's
+            reply.
         """
 
     def advance(self) -> list[Packet]:
@@ -57,7 +58,7 @@ class SimulatedBoard(Protocol):
     def facts(self) -> Mapping[str, object]:
         """State of the robot and the board, as values that JSON can represent.
 
-        Always contains ``x_m``, ``y_m`` and ``yaw_rad``: the true pose relative to that at
+        Always contains ``x_m``, ``y_m`` and ``yaw_rad``: the true pose relative to the pose at
         construction, with the yaw unwrapped.
         """
 

@@ -16,8 +16,8 @@ LONGEST_BURST = 200
 class LineFaults:
     """Probability of each fault, per byte.
 
-    lose: the byte is lost. burst: the byte and up to 199 bytes after it are lost. flip: one of its
-    bits changes.
+    lose: the byte is lost. burst: the byte and up to 199 bytes after it are lost. flip: one bit of
+    the byte changes.
     """
 
     lose: float = 0.0
@@ -44,7 +44,7 @@ class FaultyLine:
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of bytes that met each fault, by the name of the fault."""
+        """Number of bytes affected by each fault, by the name of the fault."""
         return Counter(lost=self.lost, flipped=self.flipped)
 
     def carry(self, data: bytes) -> bytes:

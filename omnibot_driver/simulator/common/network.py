@@ -15,8 +15,8 @@ from random import Random
 class NetworkFaults:
     """Faults of a network, per datagram and in both directions.
 
-    lose, duplicate: probabilities. delay_s: longest delay in s; each copy has its own, uniformly
-    distributed, so that later datagrams may overtake it.
+    lose, duplicate: probabilities. delay_s: longest delay in s. The delay of each copy is random
+    and uniformly distributed, so datagrams may arrive out of order.
     """
 
     lose: float = 0.0
@@ -30,7 +30,7 @@ _GOOD = NetworkFaults()
 class NetworkPath:
     """One direction of a network. Equal datagrams, times and seeds give equal faults.
 
-    lost, duplicated: numbers of datagrams that met this fault so far.
+    lost, duplicated: numbers of datagrams lost and duplicated so far.
     """
 
     def __init__(self, faults: NetworkFaults, seed: str) -> None:
@@ -71,7 +71,7 @@ class FaultyNetwork:
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of datagrams that met each fault, in both directions, by the name of the fault."""
+        """Number of datagrams affected by each fault, in both directions, by the fault's name."""
         paths = (self.to_board, self.from_board)
         return Counter(
             lost=sum(path.lost for path in paths), duplicated=sum(path.duplicated for path in paths)

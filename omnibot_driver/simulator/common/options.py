@@ -2,8 +2,8 @@
 
 """Options common to all simulated boards, on the command line and in a sim:// URL.
 
-Each option is declared once, for both. Knows the names, values and effects of options. Must not
-know what runs the board, nor any board: the board's own options come from its package.
+Each option is declared once, for both uses. Knows the names, values and effects of options. Must
+not know what runs the board, nor any particular board: a board's own options come from its package.
 """
 
 import argparse
@@ -22,7 +22,7 @@ DEFAULT_BOARD = "omnibot"
 
 
 class OptionError(ValueError):
-    """An unknown option or an invalid value; the text says which."""
+    """An unknown option or an invalid value; the text names it."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -31,7 +31,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def load(module: str) -> SimulatorModule:
-    """Import and return the package of a simulated board, by its full name."""
+    """Import and return the package of a simulated board; ``module``: its full name."""
     return cast(SimulatorModule, import_module(module))
 
 

@@ -22,13 +22,13 @@ UNREAD_LIMIT = 4095
 """Number of unread bytes that a Linux terminal holds; bytes beyond it are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
-"""Longest delay of the thread that is caught up, in s; after a longer one, ticks are skipped."""
+"""Longest delay in s that the thread makes up for; after a longer delay, ticks are skipped."""
 
 _JOIN_S = 5.0
 
 
 class RunningBoard(ABC, Generic[B]):
-    """Runs a board in a thread between ``start`` and ``stop``; its packets pass ``lines``.
+    """Runs a board in a thread from ``start`` to ``stop``; its packets pass through ``lines``.
 
     ``dropped`` counts the bytes that the driver did not read in time. Other threads may access
     ``board`` only while they hold ``lock``. ``stop``, ``check`` and ``wait_for`` raise RuntimeError
@@ -55,7 +55,7 @@ class RunningBoard(ABC, Generic[B]):
 
     @property
     def facts(self) -> dict[str, object]:
-        """The board's facts and the counts of dropped bytes and line faults; needs ``lock``."""
+        """The board's facts, and counts of dropped bytes and line faults; hold ``lock`` to read."""
         met = sum((line.counts for line in self._wired.lines), Counter())
         names = dict.fromkeys(name for line in self._wired.lines for name in line.counts)
         return {
@@ -122,10 +122,10 @@ class RunningBoard(ABC, Generic[B]):
                 self._wired.receive(data, time.monotonic(), channel)
 
     def _due(self, due_s: float) -> tuple[int, float]:
-        """Return the number of ticks that are overdue, and when the next one is due.
+        """Return the number of overdue ticks, and the time in s at which the next tick is due.
 
-        The output of all overdue ticks is sent at once: a serial line, too, continues while the
-        computer that reads it is busy.
+        The output of all overdue ticks is sent at once, because a real serial line also continues
+        while the computer that reads it is busy.
         """
         late_s = time.monotonic() - due_s
         ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)

@@ -44,10 +44,10 @@ class Carrier(Protocol):
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    Each serial channel has a pseudo-terminal. ``links`` are symbolic links to the
-    pseudo-terminals: one for each, or one for all, to which a hyphen and the channel's name are
-    appended. Each datagram channel has a UDP port: the first one is ``udp_port`` (0: any free
-    port), the others follow it.
+    Each serial channel has a pseudo-terminal. ``links`` are paths of symbolic links to the
+    pseudo-terminals: one path for each, or one path for all, to which a hyphen and the channel's
+    name are appended. Each datagram channel has a UDP port: the first one is ``udp_port`` (0: any
+    free port), the others follow it.
 
     Entering raises OSError if a link or a port is unavailable; its text explains why.
     """
@@ -122,7 +122,7 @@ class PtyBoard(ServedBoard[B]):
 
     @property
     def line(self) -> Line:
-        """The faulty line that the board's bytes pass."""
+        """The faulty line that the board's bytes pass through."""
         return self._wired.lines[0]
 
 

@@ -18,12 +18,12 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 class Terminal:
     """A new pseudo-terminal; the driver opens ``address``, the simulator uses ``descriptor``.
 
-    It stays open when a program closes its end. Bytes beyond the limit of unread ones are lost, as
-    on a UART whose kernel buffer is full. ``link`` is the path of a symbolic link to the terminal,
-    made here and removed by ``close``.
+    It stays open when a program closes its end. If more than ``UNREAD_LIMIT`` bytes are unread,
+    further bytes are lost, as on a UART whose kernel buffer is full. ``link`` is the path of a
+    symbolic link to the terminal, made here and removed by ``close``.
 
     Raises FileExistsError if ``link`` exists, unless it is a dead link or a link to a
-    pseudo-terminal, which is replaced.
+    pseudo-terminal; such a link is replaced.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:
@@ -85,7 +85,7 @@ def _make_link(link: Path, target: str) -> None:
     except OSError as error:
         raise type(error)(
             f"cannot make the link {link} ({error.strerror}): "
-            "choose a folder that exists and is yours"
+            "choose a folder that exists and that you may write to"
         ) from error
 
 

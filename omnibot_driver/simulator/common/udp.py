@@ -50,7 +50,7 @@ class UdpSocket:
 
 
 def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
-    """Open ``count`` sockets on consecutive ports from ``port``, or from any free one if it is 0.
+    """Open ``count`` sockets on consecutive ports from ``port`` on; 0 stands for any free port.
 
     Raises OSError.
     """
@@ -67,7 +67,7 @@ def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
             refused = error
     what = f"port {port}" if count == 1 else f"ports {port} to {port + count - 1}"
     raise OSError(
-        f"cannot listen on UDP {what} ({refused.strerror}); choose others by --udp-port"
+        f"cannot listen on UDP {what} ({refused.strerror}); choose others with --udp-port"
     ) from refused
 
 

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board behind its lines, in board time: each packet passes a line, which may be faulty.
+"""A board with its lines, in board time: each packet passes through a line, which may be faulty.
 
-Pure, as the board is. Knows channels and lines. Must not know real time, nor what packets mean.
+Pure, like the board. Knows channels and lines. Must not know real time, nor what packets mean.
 """
 
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ class WiredBoard(Generic[B]):
         self._hand_over(channel, line)
 
     def advance(self) -> list[Packet]:
-        """Advance by one tick; return the packets from the board that arrive in it."""
+        """Advance by one tick; return the packets from the board that arrive in this tick."""
         self._ticks += 1
         for channel, network in self._networks:
             self._hand_over(channel, network)

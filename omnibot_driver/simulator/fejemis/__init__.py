@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two simulated Teensys of the Fejemis sweeping robot, after their manual and public hosts.
+"""The two simulated Teensys of the Fejemis robot, written from the manual and public hosts.
 
-Shares no code with the driver, so that a misread manual does not cancel out. ``SimulatedFejemis``
-is pure.
+Shares no code with the driver, so that tests can reveal a misread manual. ``SimulatedFejemis`` is
+pure.
 """
 
 from omnibot_driver.simulator.fejemis.board import CHANNELS, SimulatedFejemis

@@ -5,8 +5,8 @@
 Pure: bytes in, ticks of ``tick_s``, bytes out; the same settings and input give the same output.
 Knows which half is at which port, and when a fault occurs. Must not know commands.
 
-Assumptions where the manual says nothing: an ``rc`` never expires; a Teensy that restarts lets its
-motors run out and forgets its subscriptions; the front wheel stays where it is until an ``rc``
+Assumptions where the manual says nothing: an ``rc`` never expires; a Teensy that restarts switches
+its motors off and forgets its subscriptions; the front wheel stays where it is until an ``rc``
 comes.
 """
 
@@ -67,8 +67,8 @@ class SimulatedFejemis:
     def befall(self, half: str, what: str) -> None:
         """Apply the fault ``what`` to one Teensy now.
 
-        The fault is in ``FAULTS``, or for ``front`` also in ``SENSOR_FAULTS``. Raises KeyError for
-        an unknown fault.
+        The fault is a name in ``FAULTS`` or, for the front Teensy only, in ``SENSOR_FAULTS``.
+        Raises KeyError for an unknown fault.
         """
         allowed(half)[what](self.half(half))
 

@@ -20,7 +20,8 @@ WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
 class DriveConfig:
     """Configuration of the drive Teensy.
 
-    wheel_base_m: wheelbase for odometry. confs_m: B and F of the turning control.
+    wheel_base_m: distance between the driving wheels, for odometry. confs_m: B and F of the turning
+    control.
     """
 
     number: int

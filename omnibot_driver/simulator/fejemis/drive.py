@@ -125,7 +125,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the function that writes the line of each item that the help lists, by key."""
+        """Return the functions that write the lines of the items in the help text, by key."""
         return super().items() | {
             "hbt": self._heartbeat,
             "adc": lambda: f"adc {self.settings.volts * 100:.0f} 2050 812 790 0",
@@ -209,7 +209,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """Return the function that executes each command that the help lists."""
+        """Return the functions that execute the commands in the help text, by name."""
         return super().commands_table() | {
             "rc": self._remote_control,
             "fwl": self._front_wheel,
@@ -292,5 +292,5 @@ class DriveTeensy(Teensy[DriveConfig]):
 
 
 def _padded(rest: str, count: int) -> list[float]:
-    """Return ``count`` numbers; missing ones are zero, as with ``strtof``."""
+    """Return ``count`` numbers; missing numbers are zero, as with ``strtof``."""
     return (wire.numbers(rest) + [0.0] * count)[:count]

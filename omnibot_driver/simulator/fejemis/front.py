@@ -30,9 +30,9 @@ class FrontTeensy(Teensy[FrontConfig]):
     wanted_deg: target angle of the steered wheel, None before the first ``rc``. leds: RGB of each
     LED.
 
-    Faults of the angle sensor are set from outside. diagnosis: its diagnosis bits without the frame
-    counter; error_flags: its error flags. frozen: it repeats its last angle. absent: it reads zero,
-    and its diagnosis says that the magneto core loops have not finished.
+    The caller may set these faults of the angle sensor. diagnosis: diagnosis bits without the frame
+    counter. error_flags: error flags. frozen: the sensor repeats its last angle. absent: the angle
+    reads zero, and the diagnosis says that the magneto core loops have not finished.
     """
 
     version = 100
@@ -112,7 +112,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the function that writes the line of each item that the help lists, by key."""
+        """Return the functions that write the lines of the items in the help text, by key."""
         return super().items() | {
             "hbt": lambda: (
                 f"hbt {self.clock_text(4)} {self.config.number} {self.version} 0.00 1 0.011"
@@ -170,7 +170,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """Return the function that executes each command that the help lists."""
+        """Return the functions that execute the commands in the help text, by name."""
         return super().commands_table() | {
             "brush": self._set_brush,
             "ledb": self._set_band,
@@ -255,7 +255,7 @@ class FrontTeensy(Teensy[FrontConfig]):
 
 
 def _padded(rest: str, count: int) -> list[float]:
-    """Return ``count`` numbers; missing ones are zero, as with ``strtof``."""
+    """Return ``count`` numbers; missing numbers are zero, as with ``strtof``."""
     return (wire.numbers(rest) + [0.0] * count)[:count]
 
 

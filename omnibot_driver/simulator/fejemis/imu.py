@@ -16,7 +16,7 @@ from omnibot_driver.simulator.fejemis.vehicle import Vehicle
 
 GRAVITY_MPS2 = 9.80665
 EARTH_UT = (17.0, 0.0, -47.0)
-"""Magnetic field of the earth in µT: north is along x, and most of it points down."""
+"""Magnetic field of the earth in µT: north is along x, and most of the field points down."""
 CALIBRATION_S = 1.0
 
 
@@ -41,7 +41,7 @@ class Imu:
         self._kind, self._samples = "", []
 
     def cycle(self, step_s: float, config: DriveConfig) -> None:
-        """Add one step to the yaw, and to a calibration in progress."""
+        """Integrate the yaw over one step, and continue a calibration in progress."""
         truth = self._vehicle.truth
         bias_dps = self._settings.gyro_bias_dps[2] - config.gyro_offset_dps[2]
         roll, pitch, yaw = self.orientation

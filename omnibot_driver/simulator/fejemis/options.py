@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command line options of a simulated Fejemis, besides its seed and the faults of its lines.
+"""Command line options of a simulated Fejemis, except its seed and the faults of its lines.
 
 Knows the names, values and effects of options. Must not know what runs the boards.
 """
@@ -19,8 +19,8 @@ _SWITCHES = (
     ("acceleration-in-g", "acc is in g instead of m/s²"),
     ("tilt", "pose has a fifth number"),
     ("start-resumes", "after start the last rc command applies again"),
-    ("confirms", "a command behind ! is confirmed"),
-    ("single-precision", "times are float32"),
+    ("confirms", "a command after ! is confirmed"),
+    ("single-precision", "times have the precision of float32"),
 )
 
 
@@ -30,14 +30,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--sums",
         choices=("on", "off"),
         default="on",
-        help="whether lines carry ;NN and are checked, as with the public hosts (on, the default),"
-        " or not, as in the manual (off)",
+        help="whether lines carry a checksum, ;NN, that is checked, as with the public hosts (on,"
+        " the default), or have no checksum, as in the manual (off)",
     )
     parser.add_argument(
         "--reverse",
         choices=get_args(Reverse),
         default="mirrored",
-        help="what the steering does with the front wheel's angle in reverse (default mirrored)",
+        help="front wheel's angle at a negative speed: mirrored (the default) takes the angle of"
+        " the same curve, clamped stays at 90 degrees",
     )
     for name, effect in _SWITCHES:
         parser.add_argument(f"--{name}", action="store_true", help=effect)
@@ -68,7 +69,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="SECONDS",
-        help="how long the boards have been running at the start; without it they boot (default 0)",
+        help="time for which the boards have been running at the start; with 0, the default, they"
+        " boot first",
     )
     parser.add_argument(
         "--volts", type=float, default=_DEFAULT.volts, help="battery voltage (default 24.9)"
@@ -94,7 +96,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="SECONDS:HALF:WHAT",
         help="fault of the drive or the front half, SECONDS after the start; may be repeated."
-        f" Of either: {', '.join(FAULTS)}; of front: {', '.join(SENSOR_FAULTS)}",
+        f" WHAT for both: {', '.join(FAULTS)}; for front only: {', '.join(SENSOR_FAULTS)}",
     )
 
 
@@ -129,14 +131,14 @@ def _fault(text: str) -> Fault:
     except ValueError:
         at_s = -1.0
     if at_s < 0.0 or half not in ("drive", "front") or what not in allowed(half):
-        raise argparse.ArgumentTypeError(f"{text!r} is not like 5:front:silent")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a fault such as 5:front:silent")
     return Fault(at_s=at_s, half=half, what=what)
 
 
 def _ids(text: str) -> tuple[int, int]:
     drive, _, front = text.partition(",")
     if not (drive.isdecimal() and front.isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is not like 90,91")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a pair of ids such as 90,91")
     return int(drive), int(front)
 
 

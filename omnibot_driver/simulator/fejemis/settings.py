@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of the simulated pair of Teensys and its robot: sizes, firmware, planted errors.
+"""Settings of the simulated pair of Teensys and its robot: sizes, firmware, deliberate errors.
 
 ``Firmware`` has one switch for each difference between the manual, the public hosts and related
 firmware, and for what the manual leaves open.
@@ -19,16 +19,16 @@ WHEEL_BASE_M = 0.40
 class Firmware:
     """Variant of the firmware, one switch for each difference.
 
-    sums: lines carry the checksum ``;NN`` and are checked, as with the public hosts. Without, as in
-        the manual, a line that begins with ``;`` is an unknown command.
-    reverse: what becomes of a wheel angle beyond 90° at a negative speed. mirrored: the wheel takes
-        the angle of the same curve; clamped: it stays at 90°.
-    timed_velocity: ``vel`` has the time first.
+    sums: lines carry the checksum ``;NN`` and are checked, as with the public hosts. If False, as
+        in the manual, a line that begins with ``;`` is an unknown command.
+    reverse: how the steering handles an angle beyond 90° at a negative speed. mirrored: the wheel
+        takes the angle of the same curve; clamped: it stays at 90°.
+    timed_velocity: ``vel`` begins with the time.
     acceleration_in_g: ``acc`` is in g, not m/s².
     tilt: ``pose`` has a fifth number.
     carriage_return: lines end with ``\\r\\n``.
-    start_resumes: after ``start`` the last ``rc`` is in effect again, also one sent while stopped.
-    confirms: a command behind ``!`` is confirmed, as in newer related firmware.
+    start_resumes: after ``start`` the last ``rc`` is in effect again, even if sent while stopped.
+    confirms: a command after ``!`` is confirmed, as in newer related firmware.
     shows_source: the heartbeat of the drive Teensy has the source of the last ``rc``; otherwise
         only 10 or -1.
     single_precision: times are float32, so after an hour they have steps of 0.2 ms.
@@ -75,11 +75,11 @@ class FejemisSettings:
     controller crosses over at 12 rad/s; servo_lag_s: time constant of that speed. sensor_zero_deg:
     zero offset of the angle sensor, which the factory configuration corrects. angle_noise_deg,
     gyro_noise_dps, accel_noise_mps2: standard deviations. gyro_bias_dps, accel_bias_mps2: biases
-    that a calibration is to find. clock_ppm: errors of the two crystals, drive first. boot_s:
-    duration of a boot. uptime_s: how long the boards have run at construction; beyond boot_s their
-    first boot is over. swapped: the drive Teensy is at the second port. ids: the numbers in their
-    heartbeats, drive first. lose_inbound: probability that a byte to a board is lost. front_m:
-    distance from the start to a wall in front. faults: in any order.
+    that a calibration must find. clock_ppm: errors of the two crystals, drive first. boot_s:
+    duration of a boot. uptime_s: how long the boards have run at construction; if longer than
+    boot_s, they have booted. swapped: the drive Teensy is at the second port. ids: the boards'
+    numbers in heartbeats, drive first. lose_inbound: probability that a byte to a board is lost.
+    front_m: distance from the start to a wall in front. faults: in any order.
     """
 
     firmware: Firmware = field(default_factory=Firmware)

@@ -2,8 +2,8 @@
 
 """The common part of both Teensys: lines, clock, subscriptions, identity, configuration memory.
 
-A control cycle takes a millisecond of the Teensy's own crystal. Knows the software structure of the
-manual. Must not know what either Teensy measures or moves.
+A control cycle takes a millisecond by the Teensy's own crystal. Knows the software structure that
+the manual describes. Must not know what either Teensy measures or moves.
 """
 
 import struct
@@ -44,9 +44,10 @@ class Teensy(Generic[C]):
 
     commands: the lines that it executed, newest last. received: all bytes that reached it.
 
-    Faults are set from outside, at any time. sums: whether lines carry checksums. silent: it obeys,
-    but sends nothing. hung: it neither obeys nor sends, and its last control outputs stay in
-    effect. unplugged: its cable is out, and it keeps running. powered: False once the power is cut.
+    The caller may set these faults at any time. sums: whether lines carry checksums. silent: the
+    Teensy obeys, but sends nothing. hung: the Teensy neither obeys nor sends, and its last control
+    outputs stay in effect. unplugged: the cable is out, but the Teensy keeps running. powered:
+    False once the power is cut.
     """
 
     version = 0
@@ -80,16 +81,16 @@ class Teensy(Generic[C]):
     # What each kind of Teensy extends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the function that writes the line of each item, by the key of its subscription."""
+        """Return the functions that write the items' lines, by the item's subscription key."""
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
             "id": lambda: f"id {self.config.name} {self.config.number}",
         }
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """Return the function that executes each command, by the first word of the line.
+        """Return the functions that execute the commands, by the first word of a line.
 
-        The function is called with the rest of the line.
+        Each function takes the rest of the line.
         """
         return {
             "sub": self._subscribe,
@@ -215,7 +216,7 @@ class Teensy(Generic[C]):
             self.commands.append(Obeyed(self._told_s, body))
             self.say(self._items[word[:-1]]())
             return
-        for name, execute in self._commands.items():  # as by strncmp, the longest name first
+        for name, execute in self._commands.items():  # like strncmp, longest name first
             if body.startswith(name) and not (self._is_exact(name) and body != name):
                 self.commands.append(Obeyed(self._told_s, body))
                 execute(body[len(name) :])

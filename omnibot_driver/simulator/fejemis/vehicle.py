@@ -59,7 +59,7 @@ class Servo:
 
 
 class Lift:
-    """The linear actuator; ``height`` is 0 at its lower end and 1 at its upper end."""
+    """The lift, a linear actuator; ``height`` is 0 at its lower end and 1 at its upper end."""
 
     def __init__(self) -> None:
         self.volts = 0.0
@@ -77,7 +77,7 @@ class Vehicle:
 
     truth: pose and motion. turns: revolutions of the left and the right wheel since construction.
     wanted_radps: target speeds of the two wheel controllers. powered: whether the controllers drive
-    the wheels; without power the wheels run out. held: whether each wheel is kept from turning by
+    the wheels; without power the wheels coast to a stop. held: whether each wheel is blocked by
     hand.
     """
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Codec of text lines as a Teensy reads and writes them, written from the manual and its hosts.
+"""Codec of text lines as a Teensy reads and writes them, from the manual and public hosts.
 
 In firmware with checksums a line begins with ``;NN``: 1 plus the sum, modulo 99, of all later
 characters from the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. Must not
@@ -65,7 +65,7 @@ def numbers(text: str) -> list[float]:
 class LineReader:
     """Splits characters into lines.
 
-    A character that does not fit discards all that the buffer holds.
+    If the buffer is full, the next character clears it first.
     """
 
     def __init__(self) -> None:

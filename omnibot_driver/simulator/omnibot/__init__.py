@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot board in software, written from its manual, to run the driver against.
+"""The simulated OmniBot board for tests of the driver, written from the manual of the real board.
 
-Shares no code with the driver, so that a misread manual does not cancel out. ``SimulatedBoard``
-is pure; ``PtyBoard`` runs it in real time, and ``python -m omnibot_driver.simulator`` does so from
-the command line.
+Shares no code with the driver, so that tests can reveal a misread manual. ``SimulatedBoard`` is
+pure; ``PtyBoard`` runs it in real time, and ``python -m omnibot_driver.simulator`` does so from the
+command line.
 """
 
 from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults

@@ -9,11 +9,11 @@ Assumptions where the manual says nothing, or contradicts itself:
 - The control loop runs from the end of the boot, also while paused (motors off), so the first
   25 Hz difference after a pause includes motion during the pause. The output periods are counted
   from the end of the boot.
-- The list of modes has 10 Hz where the frame table has 25 Hz: a setting says how often differences
-  are sent.
+- For the difference frame, the list of modes has 10 Hz, but the frame table has 25 Hz: the setting
+  ``delta_period_s`` decides.
 - Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
 - The number in the paused text starts from zero each time the board becomes paused.
-- With the switch on positional control (see ``position``) the wheels' targets follow the goal.
+- With the switch on positional control (see ``position``), the goal determines the wheels' targets.
 - A control frame whose mode the manual does not name is consumed and ignored.
 - A setting selects how commands are found among the bytes (see ``receivers``).
 """
@@ -110,7 +110,7 @@ class SimulatedBoard:
             self._run()
 
     def reboot(self) -> None:
-        """Restart the board as a power cycle or R does; the robot keeps its true pose."""
+        """Restart the board as after a power cycle or an R; the robot keeps its true pose."""
         self._power_up(BoardPose())
 
     def _power_up(self, pose: BoardPose) -> None:
@@ -142,7 +142,7 @@ class SimulatedBoard:
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
         """Hold the robot by hand: tilt it by these angles (rad), turn it left at this rate (rad/s).
 
-        Only the IMU senses it; the true pose does not change.
+        Only the IMU senses the tilt and the turn; the true pose does not change.
         """
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
@@ -151,7 +151,7 @@ class SimulatedBoard:
         self._world.force = Force(x_pwm, y_pwm, turning_pwm)
 
     def grip(self, vx_mps: float = 0.0, vy_mps: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Move the robot with this twist, or hold it in place, whatever its motors do."""
+        """Force this twist on the robot against its motors; a zero twist holds it in place."""
         self._world.gripped = Twist(vx_mps, vy_mps, yaw_rate)
 
     def let_go(self) -> None:
@@ -179,7 +179,7 @@ class SimulatedBoard:
 
         at_s: arrival time of the first byte, in s by any monotonic clock (default: the time of the
             last tick). The other bytes follow without a pause. Only a receiver that detects idle
-            gaps uses it.
+            gaps uses this time.
         channel: ignored, because the board has only one.
         """
         self.received += data
@@ -199,7 +199,7 @@ class SimulatedBoard:
             arrives_s += BYTE_S
 
     def step(self) -> bytes:
-        """Advance by one tick of 10 ms; return the bytes sent in it."""
+        """Advance by one tick of 10 ms; return the bytes sent in this tick."""
         self.tick += 1
         self._world.advance(self._pwm)
         if self.mode is BoardMode.BOOTING:

@@ -56,7 +56,7 @@ class Mpu6050:
         return (ax, ay, az), settings.gyro_stuck or (gx, gy, gz)
 
     def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Return a vector in the sensor's axes, given in the body's axes."""
+        """Convert a vector from the body's axes to the sensor's axes."""
         along_x, along_y, along_z = (
             axis[0] * x + axis[1] * y + axis[2] * z for axis in self._sensor_axes
         )

@@ -20,7 +20,7 @@ PWM_LIMIT = 4095.0
 DEAD_ZONE_PWM = 60.0
 """Largest effort that leaves a wheel at rest, in PWM steps."""
 STICKING_SPEED = 0.3
-"""Speed below which the dead zone stops a wheel, so that it never creeps, in counts per tick."""
+"""Speed in counts per tick below which the dead zone stops a wheel, so that it never creeps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +104,7 @@ class WheelController:
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    While u is saturated, the integral term is not added if it would drive u further.
+    While u is saturated, the integral term is not added if it would increase the saturation.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

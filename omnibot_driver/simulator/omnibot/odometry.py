@@ -31,7 +31,7 @@ class Odometry:
         return BoardPose(*(1000 * value for value in self.pose))
 
     def integrate(self, counts: Triple) -> None:
-        """Add what the encoders of wheels A, B, C counted in one control tick."""
+        """Add the encoder counts of wheels A, B, C in one control tick."""
         settings = self._settings
         a_m, b_m, c_m = (n * settings.rim_m_per_count for n in counts)
         moved = body_from_rims((a_m, b_m, c_m), settings.base_radius_m)

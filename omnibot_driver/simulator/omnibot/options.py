@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=_ticks,
         default=0.04,
         metavar="SECONDS",
-        help="period of that frame in s (default 0.04; the manual also says 0.1)",
+        help="period of the 25 Hz frame in s (default 0.04; the manual also says 0.1)",
     )
     parser.add_argument(
         "--control",
@@ -41,8 +41,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=get_args(FramingName),
         default="counting",
         help="how the firmware finds control frames: counting (the default) counts seven bytes"
-        " after FF FE without a timeout; naive is the same, but misses the header in FF FF"
-        " FE; idle_gap is the same as counting, but a pause of 5 ms ends an incomplete"
+        " after FF FE without a timeout; naive is like counting, but misses the header in FF FF"
+        " FE; idle_gap is like counting, but a pause of 5 ms ends an incomplete"
         " frame; window accepts the last 9 bytes whenever they begin with FF FE",
     )
     parser.add_argument(
@@ -54,7 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wakes-while-booting",
         action="store_true",
-        help="count bytes that arrive while the board boots as its three wake-up bytes",
+        help="let bytes that arrive during the boot count as wake-up bytes (three are needed)",
     )
     parser.add_argument(
         "--ignore-estop", action="store_true", help="simulate a firmware without emergency stop"

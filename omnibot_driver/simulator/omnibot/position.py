@@ -2,8 +2,8 @@
 
 """Positional control: driving to a commanded pose.
 
-The manual says no more than that the switch selects this control. Knows the units of a commanded
-pose and how fast the robot drives there. Must not know wheels.
+The manual says only that the switch selects this control; the rest is assumed. Knows the units of a
+commanded pose and how fast the robot drives there. Must not know wheels.
 """
 
 from math import cos, hypot, sin

@@ -1,18 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The firmware's receiver: bytes in, the commands that they complete out.
+"""The firmware's receiver: takes bytes, and returns the commands that they complete.
 
 The manual shows the layout of a command, but not how the firmware finds it among the bytes.
-Therefore several receivers exist, and a driver has to be safe with each. Knows control frames,
-letters and the time of a byte. Must not know modes or motion.
+Therefore several receivers exist, and a driver must be safe with each of them. Knows control
+frames, letters and the time of a byte. Must not know modes or motion.
 
 - A ``Framing`` is a pure function. Its arguments are the bytes held so far, a new byte, and the
   pause before it in s. It returns the bytes held now, the control frame that the byte completes
   (or None), and whether the byte may belong to a frame.
-- State letters act between control frames only, or anywhere. If anywhere, each byte that is a
-  letter acts, and the frame around it continues.
-- After power-up the receiver discards three arbitrary bytes as its wake-up. Bytes that arrive while
-  the board still boots are lost, or are among these three.
+- A setting decides whether state letters act only between control frames, or anywhere. If anywhere,
+  each byte that is a letter acts, and the frame around it continues.
+- After power-up the receiver discards three arbitrary bytes as its wake-up. A setting decides
+  whether bytes that arrive during the boot are lost, or are among these three.
 """
 
 from collections.abc import Callable
@@ -46,7 +46,7 @@ _NOTHING: Final[Step] = (b"", None, False)
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
     """Find frames by counting seven bytes after FF FE, without a timeout.
 
-    FF FF FE also contains a header.
+    The bytes FF FF FE also contain a header.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""

@@ -25,9 +25,9 @@ class BoardPose:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardSettings:
-    """How a simulated board is built, and how its robot deviates from the ideal.
+    """Properties of a simulated board, and deviations of its robot from the ideal.
 
-    seed: of every random number; two boards with equal settings and input send equal bytes.
+    seed: seed of all random numbers; two boards with equal settings and input send equal bytes.
     frame: meaning of the 25 Hz frame. "earth": the difference of two positions in the board's
         earth frame. "body": the sum of each control tick's displacement in the robot's frame.
         "wheel_counts": the encoder counts of wheels A, B, C (manual, Deprecated).
@@ -35,8 +35,8 @@ class BoardSettings:
     imu_only: the board runs in IMU only mode instead of nominal mode.
     linear_scale: LSB per m/s, of Vx and Vy and of the rim speeds in wheel mode.
     angular_scale: LSB per rad/s, of Omega.
-    control: position of the on-board switch: base vector control commands a velocity, or a
-        pose in the board's own earth frame to drive to.
+    control: position of the on-board switch. It decides whether base vector control commands a
+        velocity, or a goal pose in the board's own earth frame.
     position_scale: LSB per m, of X and Y.
     heading_scale: LSB per rad, of theta, which is unwrapped as in the 5 Hz frame.
     receiver: how the firmware finds commands among the bytes.
@@ -54,8 +54,8 @@ class BoardSettings:
         (manual, Vehicle Parameters).
     wheel_radius_scale: true radius of wheels A, B, C divided by ``wheel_radius_m``.
     base_radius_scale: true distance of the wheels from the centre divided by ``base_radius_m``.
-    slip: mean fraction of each wheel's rim motion that is lost on the floor; the momentary fraction
-        varies around it, independently for each wheel.
+    slip: mean fraction of each wheel's rim motion that is lost on the floor; the actual fraction
+        varies around this mean, independently for each wheel.
     slope_pwm: pull of the floor's slope along the x axis of the robot's first pose, as an
         effort at the rim, in PWM steps.
     imu_rpy_rad: mounting of the IMU: the fixed-axis roll, pitch and yaw that turn the body's
@@ -64,8 +64,9 @@ class BoardSettings:
     gyro_walk_dps: rms change of the gyro bias within 1 s, in °/s; grows with the square root of
         time.
     accel_bias_g, accel_noise_g: in the sensor's axes, in g; the noise is rms per reading.
-    gyro_stuck: raw counts that the gyro always reads, whatever the motion.
-    boot_time_s: time from power-up or reset until the board is paused; it is dead meanwhile.
+    gyro_stuck: raw counts that the gyro reads at any motion; None if the gyro works.
+    boot_time_s: time from power-up or reset until the board is paused; until then it sends and
+        obeys nothing.
     initial_pose: the board's own pose at construction, for a board that has already driven.
     running: at construction the board is awake and in its running mode.
     """

@@ -51,8 +51,8 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    It adds to the motor efforts at the rims, distributed over the wheels as a velocity in that
-    direction would be.
+    Both are added to the motor efforts at the rims. The kinematics distributes them over the wheels
+    as it distributes a velocity in the same direction.
     """
 
     x_pwm: float = 0.0
