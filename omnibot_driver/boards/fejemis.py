@@ -47,7 +47,7 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> FejemisBoard:
-    """Return a new object for both Teensys, with these checked parameter values."""
+    """Return a new board object for both Teensys, made from checked parameter values."""
     return FejemisBoard(settings(values))
 
 

@@ -61,7 +61,7 @@ class FejemisBoard(Board):
 
     @property
     def traits(self) -> Traits:  # type: ignore[override]
-        """The board's traits, with the channels named after the boards found at them."""
+        """The board's traits; each channel has the name of the board found at it."""
         return self._ports.traits
 
     @property
@@ -228,7 +228,7 @@ class FejemisBoard(Board):
         return self._ports.line("drive", drive) + self._ports.line("front", front)
 
     def stop(self) -> Packets:
-        """Return ``rc 2 0 0`` to both boards."""
+        """Return ``rc 2 0 0`` for both boards."""
         return self._ports.both(STOP)
 
     def emergency_stop(self) -> Packets:

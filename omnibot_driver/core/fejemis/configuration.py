@@ -49,7 +49,7 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """The last reported numbers by keyword, confirmed by a second reading or not."""
+        """The last reported numbers by keyword, even if a second reading has not confirmed them."""
         self.turned = False
         """Whether the board's ``confs`` begins with the track; the help text shows it last."""
         self.written = written

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Brush, lift and lights of the front board: what is switched on, and the lines for it.
+"""Brush, lift and lights of the front board: their state, and the lines that control them.
 
 Moving parts are switched on only by a call, and never for longer than requested: the lift runs for
 the time that is sent with its voltage. An e-stop, a pause or a lost board switches brush and lift

@@ -21,7 +21,7 @@ LARGEST: Final = 4
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return all such numbers from 0.0001 to 10000 in rising order, and their texts.
+    """Return all numbers of this kind from 0.0001 to 10000 in rising order, and their texts.
 
     ``negative``: the line has a minus sign.
     """

@@ -36,7 +36,7 @@ class Obedience:
         self.pause_said = False
         self._released_at = -math.inf
         self.start_at = math.inf
-        """Time in s at which ``start`` is to be sent; infinity if not at all."""
+        """Time in s at which to send ``start``; infinity if ``start`` is not due."""
 
     def hear(self, source: float) -> None:
         """Take rcSource from a heartbeat of the drive board."""

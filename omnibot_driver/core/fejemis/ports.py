@@ -32,7 +32,7 @@ class Ports:
 
     @property
     def traits(self) -> Traits:
-        """The board's traits, with the channels named after the boards found at them."""
+        """The board's traits; each channel has the name of the board found at it."""
         return SWAPPED if self.swapped else TRAITS
 
     def begin(self, settings: FejemisSettings) -> None:

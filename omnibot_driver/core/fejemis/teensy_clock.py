@@ -101,7 +101,7 @@ class TeensyClock:
 
 
 class StampedReadings:
-    """The readings of one call of the board, with their timestamps; a ``ReadingClock``.
+    """The readings that one call of the board returns, with timestamps; a ``ReadingClock``.
 
     The timestamps of one kind of reading increase. A computed timestamp that is later than the call
     is replaced by the time of the call.

@@ -31,6 +31,6 @@ TRAITS: Final = Traits(
         Fault.TOO_FAST: "check wheel radius, gear and encoder ticks on the drive board",
         Fault.TURNS_TOO_FAST: "check the steering geometry on both boards",
         Fault.BEYOND_LIMITS: "check wheel radius, gear and encoder ticks on the drive board",
-        Fault.BLOCKED: "check motor power, whether the wheels are blocked, and the front wheel",
+        Fault.BLOCKED: "check motor power and the front wheel, and whether the wheels are blocked",
     },
 )

@@ -140,10 +140,10 @@ class Upkeep:
         told = Written.STEERING not in self._settings.written  # else `failed` reports it
         if told and one and other and _differ(one, other):
             return (
-                "the boards are configured to different steering geometries (confs): drive has B"
-                f" {one.track_m:g} m and F {one.wheelbase_m:g} m, front has B {other.track_m:g} m"
-                f" and F {other.wheelbase_m:g} m; set both with the parameters `track` and"
-                " `steering_distance`"
+                "the boards are configured to different steering geometries (confs): drive has"
+                f" track {one.track_m:g} m and steering distance {one.wheelbase_m:g} m, front has track"
+                f" {other.track_m:g} m and steering distance {other.wheelbase_m:g} m; set both with"
+                " the parameters `track` and `steering_distance`"
             )
         return None
 

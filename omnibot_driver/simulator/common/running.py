@@ -109,7 +109,7 @@ class RunningBoard(ABC, Generic[B]):
                 due_s -= remaining_s
             self._collect(max(0.0, remaining_s))
             ticks, due_s = self._due(due_s)
-            if ticks > 1:  # this thread was late: what arrived meanwhile comes before these ticks
+            if ticks > 1:  # this thread was late: earlier input comes before these ticks
                 self._collect(0.0)
             if ticks:
                 with self._ticked:

@@ -27,7 +27,7 @@ class Carrier(Protocol):
     address: str
     """Value for the driver's port parameter."""
     name: str
-    """Symbolic link to the port, or its address if it has no link."""
+    """Symbolic link to the port, or the port's address if there is no link."""
     descriptor: int
     """File descriptor that is readable when data has arrived."""
 

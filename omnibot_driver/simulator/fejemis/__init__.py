@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two simulated Teensys of the Fejemis robot, written from the manual and public hosts.
+"""The two simulated Teensys of the Fejemis, written from the manual and public host programs.
 
 Shares no code with the driver, so that tests can reveal a misread manual. ``SimulatedFejemis`` is
 pure.

@@ -30,8 +30,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--sums",
         choices=("on", "off"),
         default="on",
-        help="whether lines carry a checksum, ;NN, that is checked, as with the public hosts (on,"
-        " the default), or have no checksum, as in the manual (off)",
+        help="on (the default): lines carry a checksum, ;NN, as with the public host programs;"
+        " off: lines have no checksum, as in the manual",
     )
     parser.add_argument(
         "--reverse",

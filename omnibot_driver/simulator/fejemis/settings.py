@@ -2,8 +2,8 @@
 
 """Settings of the simulated pair of Teensys and its robot: sizes, firmware, deliberate errors.
 
-``Firmware`` has one switch for each difference between the manual, the public hosts and related
-firmware, and for what the manual leaves open.
+``Firmware`` has one switch for each difference between the manual, the public host programs and
+related firmware, and for what the manual leaves open.
 """
 
 from dataclasses import dataclass, field
@@ -19,8 +19,8 @@ WHEEL_BASE_M = 0.40
 class Firmware:
     """Variant of the firmware, one switch for each difference.
 
-    sums: lines carry the checksum ``;NN`` and are checked, as with the public hosts. If False, as
-        in the manual, a line that begins with ``;`` is an unknown command.
+    sums: lines carry the checksum ``;NN`` and are checked, as with the public host programs. If
+        False, as in the manual, a line that begins with ``;`` is an unknown command.
     reverse: how the steering handles an angle beyond 90° at a negative speed. mirrored: the wheel
         takes the angle of the same curve; clamped: it stays at 90°.
     timed_velocity: ``vel`` begins with the time.

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Codec of text lines as a Teensy reads and writes them, from the manual and public hosts.
+"""Codec of text lines as a Teensy reads and writes them, by the manual and public programs.
 
 In firmware with checksums a line begins with ``;NN``: 1 plus the sum, modulo 99, of all later
 characters from the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. Must not

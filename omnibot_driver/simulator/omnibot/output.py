@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The output of the board besides the IMU frames: odometry frames, and the text while it is paused.
+"""The board's output other than IMU frames: odometry frames, and the text while it is paused.
 
 Knows periods, sequence numbers and the number in the text. Must not know the board's modes.
 """

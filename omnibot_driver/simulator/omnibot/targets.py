@@ -25,7 +25,7 @@ def from_velocity_words(values: Triple, settings: BoardSettings) -> Wheels:
 
 
 def from_twist(twist: tuple[float, float, float], settings: BoardSettings) -> Wheels:
-    """Return the set points for velocities in m/s and rad/s, ``settings.axis_signs`` applied."""
+    """Return the set points for velocities in m/s and rad/s; apply ``settings.axis_signs``."""
     x, y, yaw = (sign * speed for sign, speed in zip(settings.axis_signs, twist, strict=True))
     return _counts_per_tick(rims_from_body(x, y, yaw, settings.base_radius_m), settings)
 

@@ -86,7 +86,7 @@ class World:
         self._slope_pwm = settings.slope_pwm
         self.held = Held()
         self.force = Force()
-        """Current force on the robot, of a person who pushes or of a bump."""
+        """Current force on the robot, by a person or a bump."""
         self.gripped: Twist | None = None
         """Twist that a person stronger than the motors imposes; None if the robot moves freely."""
         self.acceleration = (0.0, 0.0)
