@@ -141,9 +141,9 @@ class Upkeep:
         if told and one and other and _differ(one, other):
             return (
                 "the boards are configured to different steering geometries (confs): drive has"
-                f" track {one.track_m:g} m and steering distance {one.wheelbase_m:g} m, front has track"
-                f" {other.track_m:g} m and steering distance {other.wheelbase_m:g} m; set both with"
-                " the parameters `track` and `steering_distance`"
+                f" track {one.track_m:g} m and steering distance {one.wheelbase_m:g} m, front has"
+                f" track {other.track_m:g} m and steering distance {other.wheelbase_m:g} m; set"
+                " both with the parameters `track` and `steering_distance`"
             )
         return None
 
