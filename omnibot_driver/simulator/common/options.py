@@ -121,17 +121,18 @@ def _line(arguments: argparse.Namespace, channel: Channel, number: int) -> Line:
 
 def _add_rate(parser: argparse.ArgumentParser, name: str, effect: str) -> None:
     parser.add_argument(
-        f"--{name}", type=_chance, default=0.0, metavar="RATE", help=f"{effect} (default 0)"
+        f"--{name}", type=chance, default=0.0, metavar="RATE", help=f"{effect} (default 0)"
     )
 
 
-def _chance(text: str) -> float:
-    chance = _number(text)
-    if not 0.0 <= chance <= 1.0:
+def chance(text: str) -> float:
+    """Return the probability in an argument; raise ArgumentTypeError for anything else."""
+    value = _number(text)
+    if not 0.0 <= value <= 1.0:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a probability; give a number from 0 to 1"
         )
-    return chance
+    return value
 
 
 def _delay(text: str) -> float:

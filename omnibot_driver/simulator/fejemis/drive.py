@@ -229,7 +229,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         }
 
     def _remote_control(self, rest: str) -> None:
-        source, v, turn_dps = _padded(rest, 3)
+        source, v, turn_dps = wire.padded(rest, 3)
         if self.source == STOPPED:
             if self.firmware.start_resumes:
                 self.reference = (v, radians(turn_dps))
@@ -238,10 +238,10 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.reference = (v, radians(turn_dps))
 
     def _front_wheel(self, rest: str) -> None:
-        (self.told_angle_deg,) = _padded(rest, 1)
+        (self.told_angle_deg,) = wire.padded(rest, 1)
 
     def _set_steering(self, rest: str) -> None:
-        base_m, steer_m = _padded(rest, 2)
+        base_m, steer_m = wire.padded(rest, 2)
         self.config = replace(self.config, confs_m=(base_m, steer_m))
 
     def _stop(self) -> None:
@@ -253,14 +253,14 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.source = FREE
 
     def _off(self, rest: str) -> None:
-        (delay_s,) = _padded(rest, 1)
+        (delay_s,) = wire.padded(rest, 1)
         self.off_at_s = self._told_s + delay_s
 
     def _on(self) -> None:
         self.off_at_s = None
 
     def _set_accelerometer(self, rest: str) -> None:
-        given = _padded(rest, 6)
+        given = wire.padded(rest, 6)
         self.config = replace(
             self.config,
             accel_offset_mps2=(given[0], given[1], given[2]),
@@ -268,7 +268,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         )
 
     def _set_magnetometer(self, rest: str) -> None:
-        given = _padded(rest, 12)
+        given = wire.padded(rest, 12)
         self.config = replace(
             self.config, mag_offset_ut=(given[0], given[1], given[2]), mag_matrix=tuple(given[3:])
         )
@@ -279,7 +279,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.pose = (0.0, 0.0, 0.0)
 
     def _set_wheels(self, rest: str) -> None:
-        left, right, gear, ticks, base_m = _padded(rest, 5)
+        left, right, gear, ticks, base_m = wire.padded(rest, 5)
         if left > 0.0 and right > 0.0 and gear > 0.0 and ticks > 0.0 and base_m > 0.0:
             self.config = replace(
                 self.config, radii_m=(left, right), gear=gear, ticks=ticks, wheel_base_m=base_m
@@ -289,8 +289,3 @@ class DriveTeensy(Teensy[DriveConfig]):
     def turn_dps(self) -> float:
         """Turn rate of the last ``rc``, in deg/s."""
         return degrees(self.reference[1])
-
-
-def _padded(rest: str, count: int) -> list[float]:
-    """Return ``count`` numbers; missing numbers are zero, as with ``strtof``."""
-    return (wire.numbers(rest) + [0.0] * count)[:count]

@@ -198,7 +198,7 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     def _remote_control(self, rest: str) -> None:
         """Set the target angle ``theta = atan2(S w, v)``, limited to ±90°."""
-        _, v, turn_dps = _padded(rest, 3)
+        _, v, turn_dps = wire.padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)
         if v < 0.0 and self.firmware.reverse == "mirrored":
             v, sideways = -v, -sideways
@@ -209,54 +209,49 @@ class FrontTeensy(Teensy[FrontConfig]):
         self.wanted_deg = theta_deg
 
     def _set_brush(self, rest: str) -> None:
-        self.vehicle.brush = _padded(rest, 1)[0] != 0.0
+        self.vehicle.brush = wire.padded(rest, 1)[0] != 0.0
 
     def _set_band(self, rest: str) -> None:
-        self.leds = [_colour(_padded(rest, 3))] * LEDS
+        self.leds = [_colour(wire.padded(rest, 3))] * LEDS
 
     def _default_leds(self) -> None:
         self.leds = [LED_DEFAULT] * LEDS
 
     def _switch_leds(self, rest: str) -> None:
-        self.leds_on = _padded(rest, 1)[0] != 0.0
+        self.leds_on = wire.padded(rest, 1)[0] != 0.0
 
     def _set_led(self, rest: str) -> None:
-        number, *colour = _padded(rest, 4)
+        number, *colour = wire.padded(rest, 4)
         if 0 <= number < LEDS:
             self.leds[int(number)] = _colour(colour)
 
     def _set_motor(self, rest: str) -> None:
-        volts, time_s = _padded(rest, 2)
+        volts, time_s = wire.padded(rest, 2)
         self.vehicle.lift.volts = max(-MOST_VOLTS, min(MOST_VOLTS, volts)) if time_s > 0.0 else 0.0
         self._lift_until_ms = self._cycles + 1e3 * time_s if time_s > 0.0 else 0.0
 
     def _set_pwm(self, rest: str) -> None:
-        self._pwm_hz = int(_padded(rest, 1)[0])
+        self._pwm_hz = int(wire.padded(rest, 1)[0])
 
     def _set_ir(self, rest: str) -> None:
-        a1, b1, a2, b2 = _padded(rest, 4)
+        a1, b1, a2, b2 = wire.padded(rest, 4)
         self.config = replace(self.config, ir=(a1, b1, a2, b2))
 
     def _set_servo(self, rest: str) -> None:
-        self._servo_raw = _padded(rest, 2)[0]
+        self._servo_raw = wire.padded(rest, 2)[0]
 
     def _set_offset(self, rest: str) -> None:
-        offset_deg, inverted = _padded(rest, 2)
+        offset_deg, inverted = wire.padded(rest, 2)
         self.config = replace(
             self.config, angle_offset_deg=offset_deg, angle_inverted=inverted != 0.0
         )
 
     def _set_gains(self, rest: str) -> None:
-        self.config = replace(self.config, steering=tuple(_padded(rest, 17)))
+        self.config = replace(self.config, steering=tuple(wire.padded(rest, 17)))
 
     def _set_base(self, rest: str) -> None:
-        base_m, steer_m = _padded(rest, 2)
+        base_m, steer_m = wire.padded(rest, 2)
         self.config = replace(self.config, confs_m=(base_m, steer_m))
-
-
-def _padded(rest: str, count: int) -> list[float]:
-    """Return ``count`` numbers; missing numbers are zero, as with ``strtof``."""
-    return (wire.numbers(rest) + [0.0] * count)[:count]
 
 
 def _colour(rgb: list[float]) -> tuple[int, int, int]:

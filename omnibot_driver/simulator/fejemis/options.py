@@ -9,6 +9,7 @@ import argparse
 from math import inf
 from typing import get_args
 
+from omnibot_driver.simulator.common.options import chance
 from omnibot_driver.simulator.fejemis.board import SimulatedFejemis
 from omnibot_driver.simulator.fejemis.faults import FAULTS, SENSOR_FAULTS, allowed
 from omnibot_driver.simulator.fejemis.settings import Fault, FejemisSettings, Firmware, Reverse
@@ -84,7 +85,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--lose-inbound",
-        type=_chance,
+        type=chance,
         default=0.0,
         metavar="RATE",
         help="chance that a byte to a board is lost (default 0)",
@@ -150,15 +151,3 @@ def _seconds(text: str) -> float:
     if not 0.0 <= seconds < inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a duration in seconds")
     return seconds
-
-
-def _chance(text: str) -> float:
-    try:
-        chance = float(text)
-    except ValueError:
-        chance = -1.0
-    if not 0.0 <= chance <= 1.0:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a probability: give a number from 0 to 1"
-        )
-    return chance

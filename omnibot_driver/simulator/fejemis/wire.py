@@ -62,6 +62,11 @@ def numbers(text: str) -> list[float]:
     return found
 
 
+def padded(text: str, count: int) -> list[float]:
+    """Return ``count`` numbers; missing numbers are zero, as with ``strtof``."""
+    return (numbers(text) + [0.0] * count)[:count]
+
+
 class LineReader:
     """Splits characters into lines.
 
