@@ -2,9 +2,10 @@
 
 """The LOIS ECU as a ``Board`` of the driver: an adapter around ``LoisConversation``.
 
-This class computes odometry and returns it ``odom_rate_hz`` times a second, predicted from one
-group of ticks to the next. Displacements show whether the robot obeys and whether it is at rest.
-A displacement is marked as not measured where the board does not report the motion.
+``LoisEcuBoard`` computes odometry and returns it ``odom_rate_hz`` times a second; between two
+groups of ticks the odometry is predicted. Displacement readings show whether the robot obeys its
+commands, and whether it is at rest. A displacement is marked as not measured if the board did not
+report the motion.
 """
 
 import math
@@ -43,10 +44,11 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Pause in s before a reset is repeated: longer than stopped wheels roll on, and longer than four
-groups of ticks."""
+"""Pause in s before a reset is repeated. Wheels roll on for less than this time after a stop, and
+four groups of ticks with the usual period take less than this time."""
 STEADY_S: Final = 0.3
-"""Time in s without new counts after which ticks are steady: more than one period of the ticks."""
+"""Time in s without a change of the counts after which the driver treats them as steady: longer
+than the usual period of the ticks."""
 
 
 class LoisEcuBoard(Board):
@@ -63,7 +65,7 @@ class LoisEcuBoard(Board):
 
     def _connect(self) -> None:
         self._odometry_at = -math.inf
-        self._sensor_speaks = False  # in a terminal mode, in place of the ticks
+        self._sensor_speaks = False  # lines instead of ticks, in a terminal mode
         self._reset_proof: ResetProof | None = None
         self._reset_seen: Ticks | None = None
         self._resets_left = 0
@@ -92,12 +94,12 @@ class LoisEcuBoard(Board):
 
     @property
     def advice(self) -> str | None:
-        """Advice on settings that contradict the received data; None if all settings agree."""
+        """Advice on settings that are missing or contradict the received data; otherwise None."""
         return self._ecu.advice
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether ticks of both wheels count now, so that unchanged ticks prove a standstill.
+        """Whether the board counts both wheels' ticks now: unchanged ticks prove a standstill.
 
         The public firmware counts a wheel's ticks only while its RPM target is positive.
         """
@@ -123,11 +125,12 @@ class LoisEcuBoard(Board):
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings from bytes and groups held back so far, as the port closes."""
+        """Return the readings of bytes and groups that were held back; call it when the port
+        closes."""
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
-        """Forget the mode, as the board has been silent for too long."""
+        """Set ``mode`` to unknown, because the board has been silent for too long."""
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
@@ -150,7 +153,7 @@ class LoisEcuBoard(Board):
         return math.inf if silent else self._odometry_at
 
     def reset_odometry(self) -> None:
-        """Begin the odometry frame at the robot's present pose."""
+        """Move the origin of the odometry frame to the robot's present pose."""
         self._ecu.reset_odometry()
 
     def _read(self, found: list[LoisReading]) -> list[Reading]:
@@ -202,14 +205,15 @@ class LoisEcuBoard(Board):
 
     @property
     def wake_at(self) -> float:
-        """Time of the next call of ``due`` or ``elapse``."""
+        """Time at which to call ``due`` and ``elapse`` next."""
         if self._leaving:
             return self._odometry_due_at
         once_at = -math.inf if self._once else math.inf
         return min(self._ecu.wake_at, self._odometry_due_at, once_at, self._reset_at_s)
 
     def leave(self) -> None:
-        """Make ``due`` return nothing from now on, so that Stop is the last line."""
+        """Make ``due`` return nothing from now on, so that Stop remains the last line that is
+        sent."""
         self._leaving = True
 
     def due(self, now: float) -> Packets:
@@ -254,7 +258,8 @@ class LoisEcuBoard(Board):
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Return Stop. Its ``:`` begins a new line, so the board discards a partial line before."""
+        """Return Stop. Its ``:`` begins a new line, so the board discards a partial line before
+        it."""
         return self.stop()
 
     def stop(self) -> Packets:
@@ -285,16 +290,19 @@ class LoisEcuBoard(Board):
         self._resets_left -= 1
         self._reset_at_s = now + RESET_AGAIN_S if self._resets_left else math.inf
 
-    # What only this board has
+    # Functions that only this board has
 
     def set_led(self, on: bool, now: float) -> None:
         """Switch the board's LED; the line is sent several times, as lines may be lost."""
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Start a record; a RecordReading or RecordFailed follows. Raises RequestRefused."""
+        """Start a record; a RecordReading or RecordFailed follows.
+
+        Raises RequestRefused if the board could not complete the record.
+        """
         self._ecu.record(kind, samples)
 
     def distribute_ball(self) -> None:
-        """Send the ball command once, as a repetition would distribute another ball."""
+        """Send the ball command only once, because a repetition would distribute another ball."""
         self._once += packed(self._ecu.distribute_ball())

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of the kind of board: the public firmware, or a board as in the manual.
+"""Detection of the kind of board: with the public firmware, or as the manual describes it.
 
-The public firmware sends odometry after each group of ticks, under the same number. Ticks of the
-manual's board count in both directions; a negative count proves that they do. Works on counts and
-on the order of groups.
+The public firmware sends odometry after each group of ticks, with the same command byte. The ticks
+of a board as in the manual count in both directions; a negative count proves this. Works on counts
+and on the order of groups.
 """
 
 from typing import Final
@@ -14,15 +14,18 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of groups of ticks without odometry behind them that show a board like the manual's."""
+"""Number of groups of ticks after which odometry with its own command byte (0x20) shows a board as
+in the manual."""
 UNCOUNTED_M: Final = 0.06
-"""Backward motion in m without a negative count which shows that ticks do not count backwards."""
+"""Distance in m that wheels roll backward without a negative count before the driver concludes that
+ticks do not count backward."""
 
 
 class BoardKind:
-    """Kind of the board, which sets how ``motion`` models it.
+    """Kind of the board; it selects how ``motion`` models the board.
 
-    ``appends``: this is the public firmware, or one like it.
+    ``appends``: the board sends odometry after each group of ticks, with the same command byte, as
+    the public firmware does.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -32,13 +35,13 @@ class BoardKind:
         self._lone_ticks, self._uncounted_m = 0, 0.0
 
     def took_ticks(self, counts: tuple[int, int]) -> None:
-        """Note a group of ticks with these new counts."""
+        """Note a group of ticks; ``counts``: ticks of each wheel since the group before."""
         self._lone_ticks += 1
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
 
     def took_odometry(self, *, appended: bool) -> None:
-        """Note a group of odometry; ``appended``: it came under the number of the ticks."""
+        """Note a group of odometry; ``appended``: it has the command byte of the ticks."""
         motion = self._motion
         if appended and not self.appends:
             self.appends, motion.holds = True, True
@@ -50,7 +53,7 @@ class BoardKind:
             motion.signed |= self._lone_ticks >= LONE_TICKS
 
     def watch(self, told: Told | None) -> None:
-        """Detect that ticks do not count backwards: a wheel rolls back, but no count falls."""
+        """Detect that ticks do not count backward: a wheel rolls backward, but no count falls."""
         if told is None or not self._motion.signed or self._seen_signed:
             return
         for index, wheel in enumerate(self._motion.wheels):

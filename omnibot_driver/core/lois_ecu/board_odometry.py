@@ -2,9 +2,9 @@
 
 """Changes between two odometry groups (0x20): turn, distance, and wheel speeds from the velocity.
 
-The public firmware integrates whole RPM of both wheels. The position in 0x20 does not change while
-both wheel speeds are equal, and the velocity in 0x20 is that of the last tick. Works on groups,
-without their times.
+The public firmware integrates the speeds of both wheels as whole RPM. The position in 0x20 does not
+change while both wheel speeds are equal, and the velocity in 0x20 is that of the last tick. Works
+on groups, without their times.
 """
 
 import math
@@ -22,10 +22,10 @@ class Told:
     """Changes that an odometry group (0x20) reports since the group before.
 
     ``turned_m``: distance of the right rim minus that of the left rim. ``along_m``: distance of the
-    middle of the axle. ``still``: position and heading did not change. If ``same_velocity`` holds
-    too, no tick came, unless both wheel speeds are equal. ``speeds_mps``: speeds of the left and
-    right rim at the last tick, rounded down to whole RPM; None where the velocity does not give
-    wheel speeds.
+    middle of the axle. ``still``: position and heading did not change. ``same_velocity``: the
+    velocity did not change. If both are true, no wheel has ticked, unless both wheel speeds are
+    equal. ``speeds_mps``: speeds of the left and right rim at the last tick, rounded down to whole
+    RPM; None if no wheel speeds in whole RPM give this velocity.
     """
 
     turned_m: float
@@ -36,7 +36,8 @@ class Told:
 
 
 class OdometryReader:
-    """Comparison of each odometry group with the group before, for a track and a wheel size."""
+    """Comparison of each odometry group with the group before; ``rpm_mps``: rim speed at one
+    RPM."""
 
     def __init__(self, track_m: float, rpm_mps: float) -> None:
         self._track_m, self._rpm_mps = track_m, rpm_mps
@@ -86,7 +87,8 @@ class OdometryReader:
 def rim_speeds(group: BoardOdometry, track_m: float) -> tuple[float, float] | None:
     """Return the speeds of the left and right rim in m/s; None if the velocity is not finite."""
     along = group.dx_mps * math.cos(group.yaw_rad) + group.dy_mps * math.sin(group.yaw_rad)
-    # After a tick that lasted for a rest, the velocity points along the middle of a large turn.
+    # After a rest between two ticks, the board computes one large turn for the time of the rest.
+    # The velocity then points along the middle of this turn.
     forward = math.copysign(math.hypot(group.dx_mps, group.dy_mps), along)
     turning = group.yaw_rate_radps * track_m / 2
     if not (math.isfinite(forward) and math.isfinite(turning)):

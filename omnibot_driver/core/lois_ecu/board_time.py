@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Delay of a group of ticks: how late it was read, by the board's time that the group contains.
+"""Delay of a group of ticks: how late the group was read, from the board's time in the group.
 
-The public firmware's clock stands still while the board sends, so the clock falls behind by 4 to 36
-%. The number of sent lines is known, and each takes about 1.2 ms. A board as in the manual has a
-clock that does not stop. Both models of the clock are fitted to the last arrivals, and the better
-fit is used. The fit is a straight line below all arrivals, because a read may be late but never
-early. Works on clock counts, numbers of lines and arrival times.
+The clock of the public firmware stops while the board sends, so it falls behind by 4 to 36 %. The
+missing time can be added: the number of lines sent is known, and each takes about 1.2 ms. The clock
+of a board as in the manual does not stop. Both models of the clock are fitted to the last arrivals,
+and the better fit is used. The fit is a straight line below all arrivals, because a read may be
+late but never early. Works on clock counts, numbers of lines and arrival times.
 """
 
 import math
@@ -20,24 +20,26 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of groups kept: five seconds, in which a crystal off by 100 ppm drifts by 0.5 ms."""
+"""Number of stored groups: those of five seconds. A clock with an error of 100 ppm drifts by 0.5 ms
+in this time."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s; a longer one means that the board has restarted, or that its clock
 has another unit."""
 UNKNOWN_S: Final = 0.012
-"""Standard deviation of an arrival in s, while the clock is unknown."""
+"""Standard deviation of an arrival time in s, while the unit of the board's clock is unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
 """Longest time in s between groups that were read together after a pause of the reader. Only the
-last of them is kept, as its delay is the smallest."""
+last of these groups is stored, because its delay is the smallest."""
 Point = tuple[float, float]
 """Arrival time in s, and how far the board's clock is behind the arrival time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
 
 
 class BoardTime:
-    """Estimate of the delay of each group of ticks; ``stddev_s``: its standard deviation in s."""
+    """Estimator of the delay of each group of ticks; ``stddev_s``: error of a delay in s (1
+    sigma)."""
 
     def __init__(self) -> None:
         self.stddev_s = UNKNOWN_S
@@ -47,8 +49,8 @@ class BoardTime:
         """Forget what is known of the clock, after a reconnection or a restart of the board."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrival time minus board time since the first group, in s: for a clock that runs always,
-        and for one that stands still while lines are sent."""
+        """Arrival time minus board time since the first group, in s, for two models: a clock that
+        always runs, and a clock that stops while lines are sent."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -64,7 +66,8 @@ class BoardTime:
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         """Return the delay in s of ticks that arrive at ``now``.
 
-        The delay is at least zero. ``now`` minus the delay never lies before the previous result.
+        The delay is at least zero. The corrected time, ``now`` minus the delay, is never before
+        that of the previous call.
         """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s
@@ -96,7 +99,10 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return the height of each point above a line through the lowest points of both halves."""
+    """Return the height of each point above a straight line that touches the lowest point.
+
+    The line has the slope from the lowest point of the first half to that of the second half.
+    """
     half = len(kept) // 2
     points = list(kept)
     first_s, first = min(points[:half], key=itemgetter(1))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Encoding of messages as lines, and decoding: all commands, and reports of one line.
+"""Encoding of all messages as lines, and decoding of commands and of reports with only one line.
 
 Sources: the ECU's manual; the public firmware for the order of words within a payload. Groups of
 several lines are parsed in ``groups``, records in ``record_lines``.
@@ -60,7 +60,8 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A command's byte and class, and the functions from its fields to its payload and back."""
+    """A command's byte and class, and the functions that convert its fields to a payload and
+    back."""
 
     code: Code
     kind: type
@@ -77,7 +78,7 @@ def _words(left: int, right: int) -> int:
 def _samples(*counts: int) -> int:
     for count in counts:
         if not 0 <= count <= MOST_SAMPLES:
-            raise FrameError(f"{count} samples cannot be recorded: 0 to {MOST_SAMPLES}")
+            raise FrameError(f"{count} samples cannot be recorded, only 0 to {MOST_SAMPLES}")
     return counts[0] << 16 | counts[1] if len(counts) == 2 else counts[0]
 
 
@@ -194,7 +195,7 @@ def _encode_record(record: Record) -> bytes:
 
 
 def single_report(line: Line) -> Report | None:
-    """Decode the report that ``line`` holds completely; None if it does not hold a valid one."""
+    """Decode a report that has only this one line; None if the line is not a valid report."""
     payload = line.payload
     low = payload & 0xFFFF
     high, middle, last = payload >> 16, low >> 8, low & 0xFF

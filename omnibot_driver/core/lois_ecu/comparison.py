@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Corrections of the motion filter: each report of a LOIS ECU is compared with what it expects.
+"""Corrections of the motion filter: compares each report with what the filter expects.
 
-If the board counts the ticks of a wheel, they are exact. Otherwise the heading in 0x20 is compared.
-The distance in 0x20 is compared only while the two wheel speeds differ: the public firmware does
-not change its position while they are equal. The speeds in 0x20 are compared only after a new tick,
-because a wheel at rest keeps its last speed. Works on counts and changes of 0x20, without the
-robot's pose.
+The ticks of a wheel are exact while the board counts them. While the board does not count, the
+heading in 0x20 is compared instead. The distance in 0x20 is compared only while the two wheel
+speeds differ: while they are equal, the public firmware does not change the position. The speeds in
+0x20 are compared only after a new tick, because the board keeps reporting the last speed of a wheel
+at rest. Works on counts and changes of 0x20, without the robot's pose.
 """
 
 import math
@@ -33,56 +33,58 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Age in s of ticks when their last line arrives, as ``ODOMETRY_AGE_S`` of odometry."""
+"""Age in s of ticks when their last line arrives; ``ODOMETRY_AGE_S`` is the same for odometry."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""Variances, in squared ticks, of the error of a count, and of heading and distance of 0x20."""
+"""Error variances, in squared ticks: of a count, of the heading in 0x20, and of the distance in
+0x20."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Residual in ticks beyond which the wheel has changed its speed although its set-point has not."""
+"""Residual in ticks that shows a change of the wheel's speed without a change of its set-point."""
 SAME_TICKS: Final = 0.6
-"""Residual in ticks within which an unchanged count is not a measurement."""
+"""Residual in ticks below which an unchanged count is not used as a measurement."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""Residual, in standard deviations and in m, beyond which a heading is discarded: the board has
-integrated an old speed while the wheel was at rest."""
+"""Limits of the residual of a heading, in standard deviations and in m. A residual beyond both is
+discarded, because the board has integrated an old speed while the wheel was at rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""Standard deviations in m of a wheel's distance after 1 m without ticks, besides all other errors:
-usually, and at speeds that swing, of which the board reports too few."""
+"""Additional standard deviations in m of a wheel's distance after 1 m without ticks: in the usual
+case, and while the speed oscillates, because then the board reports it too seldom."""
 SWERVED_M: Final = 0.05
-"""Standard deviation in m of the position after 1 m at such speeds, even with known distances."""
+"""Additional standard deviation in m of the position after 1 m at an oscillating speed, even if the
+distances of the wheels are known."""
 EQUAL_RPM: Final = 3.0
 """Standard deviation in RPM of the true difference of two speeds that are reported as equal."""
 
 
 class Comparison:
-    """Comparison of reports with ``motion``, which they correct."""
+    """Comparison of reports with the estimate of ``motion``, and correction of this estimate."""
 
     def __init__(self, motion: MotionFilter) -> None:
         self._motion = motion
         self._counted_m = [0.0, 0.0]
         self._counted = [False, False]
-        """Whether the ticks of each wheel counted at the last group."""
+        """Whether the board counted the ticks of each wheel at the last group."""
         self._turned_m = 0.0
         self._speeds = ReportedSpeed(motion, 0), ReportedSpeed(motion, 1)
 
     # Ticks
 
     def begin_counts(self) -> None:
-        """Start counting anew: later counts are compared with the present ones."""
+        """Make the present counts the reference for later counts."""
         self._counted_m = [0.0, 0.0]
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
-        """Correct the filter by this many more ticks of a wheel in ``duration_s``.
+        """Correct the filter by the number of new ``ticks`` of a wheel in ``duration_s``.
 
-        ``late_s``: how much later than usual they came.
+        ``late_s``: how much later than usual the ticks arrived, in s.
         """
         motion, estimate = self._motion, self._motion.filter
         wheel, tick_m = motion.wheels[index], motion.tick_m
@@ -110,7 +112,7 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Start anew: later headings and distances are compared with the present ones."""
+        """Make the present heading and distance in 0x20 the reference for later ones."""
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
         self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)
@@ -121,9 +123,9 @@ class Comparison:
         self._motion.differing_mps = math.inf
 
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
-        """Correct the filter by the changes of 0x20 since the group before, ``duration_s`` ago.
+        """Correct the filter by the changes of 0x20 since the last group, ``duration_s`` ago.
 
-        ``late_s``: how much later than usual the group came.
+        ``late_s``: how much later than usual the group arrived, in s.
         """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
@@ -156,11 +158,12 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Take back the wheel's distance since its reported speed last changed: it stood still."""
+        """Subtract the wheel's distance since its reported speed last changed: the wheel was at
+        rest."""
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:
-        """Correct the filter by the fact that both speeds are equal, whatever they are."""
+        """Correct the filter by the fact that both wheels have the same, unknown speed."""
         motion = self._motion
         sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
         if sure and not any(speed.resting.chance for speed in self._speeds):
@@ -171,7 +174,8 @@ class Comparison:
             speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Correct the filter by the fact that neither wheel has rolled further than ``ticks``."""
+        """Correct the filter by the fact that neither wheel has rolled more than ``ticks``
+        ticks."""
         motion = self._motion
         self.begin_odometry()
         variance = (ticks * motion.tick_m / max(duration_s, 0.01)) ** 2

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The conversation with a LOIS ECU: its lines become readings, and orders become its lines.
+"""The conversation with a LOIS ECU: decodes its lines to readings, and encodes orders as lines.
 
-Call ``wrote`` with all bytes that are sent: the odometry depends on them, because the board reports
-little of where its wheels turn. ``translation`` explains what the board sends, ``opening`` how
-settings reach it, and ``outbound`` why set-points look as they do.
+Call ``wrote`` with all bytes that are sent. The odometry depends on the commands, because the board
+reports little about the motion of its wheels. ``translation`` explains what the board sends,
+``opening`` how settings reach the board, and ``outbound`` which set-points are sent.
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ from omnibot_driver.core.lois_ecu.upkeep import Upkeep
 
 
 class LoisConversation:
-    """A conversation with one LOIS ECU on one line; ``settings`` may be replaced at any time."""
+    """A conversation with one LOIS ECU on one port; ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -84,12 +84,13 @@ class LoisConversation:
         self._translation.connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
-        """Return the readings that these bytes complete. Call it without bytes when none came."""
+        """Return the readings that these bytes complete. At ``held_until``, call it with empty
+        bytes."""
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
 
     def flush(self, now: float) -> list[LoisReading]:
-        """Return the readings that held lines still give, as the line is closed."""
+        """Return the readings of lines that were held back; call it when the port closes."""
         return self._understood(self._decoder.flush(now), now)
 
     def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
@@ -141,17 +142,18 @@ class LoisConversation:
         )
 
     def silence(self) -> None:
-        """Forget the mode, as the board has been silent for too long."""
+        """Set ``mode`` to unknown, because the board has been silent for too long."""
         self.mode = Mode.UNKNOWN
 
     @property
     def translation(self) -> Translation:
-        """Translation of reports, which knows the robot's state."""
+        """Translation of reports; it contains the estimate of the robot's motion."""
         return self._translation
 
     @property
     def held_until(self) -> float:
-        """Time at which ``receive`` without bytes returns held data; infinity without any."""
+        """Time at which ``receive`` with empty bytes returns held reports; infinity if none is
+        held."""
         return self._decoder.resolves_at
 
     def predicted(self, now: float) -> FusedOdometry | None:
@@ -159,16 +161,16 @@ class LoisConversation:
         return self._translation.odometry.predict(now)
 
     def reset_odometry(self) -> None:
-        """Begin the odometry frame at the robot's present pose."""
+        """Move the origin of the odometry frame to the robot's present pose."""
         odometry = self._translation.odometry
         self._translation.headings.begin_frame(odometry.yaw_rad)
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether the robot is seen at rest since it was stopped; None if unknown.
+        """Return whether ticks show that the stopped robot is at rest; None if unknown.
 
-        The public firmware does not count ticks of a wheel that was commanded backward, or by RPM
-        0/0.
+        The result is None without recent ticks, and after a backward command or RPM 0/0: the public
+        firmware then does not count ticks.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -197,7 +199,7 @@ class LoisConversation:
 
     @property
     def advice(self) -> str | None:
-        """Advice on settings that contradict the data, or are missing; None if there is none."""
+        """Advice on settings that are missing or contradict the received data; otherwise None."""
         if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
             return OWN_GAINS.format(gains)
         return self._suspicion.advice
@@ -209,13 +211,13 @@ class LoisConversation:
 
     @property
     def confirmed(self) -> bool:
-        """Whether the board has answered, and its ticks come with the period that was set."""
+        """Whether the board has answered, and sends its ticks with the requested period."""
         return self._upkeep.writer.confirmed
 
     # Outbound
 
     def due(self, now: float) -> bytes:
-        """Return the lines that are due: settings, modes, a record, and RPM 0/0 after a Stop.
+        """Return the lines that are due: settings, modes, the request for a record, and RPM 0/0.
 
         Call it at ``wake_at``.
         """
@@ -225,7 +227,7 @@ class LoisConversation:
 
     @property
     def wake_at(self) -> float:
-        """Time of the next call of ``due``, or of ``receive`` without bytes."""
+        """Time at which to call ``due``, and ``receive`` with empty bytes, next."""
         return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property
@@ -234,7 +236,7 @@ class LoisConversation:
         return self._points.driving
 
     def wrote(self, data: bytes, now: float) -> None:
-        """Record that these bytes went to the board."""
+        """Note that these bytes were sent to the board."""
         said = self._points.wrote(data, now)
         if said:
             self._stall.wrote(said[-1], now)
@@ -246,15 +248,18 @@ class LoisConversation:
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """Return RPM 0/0, sent in turn with Stop, as the board does not latch an e-stop.
+        """Return RPM 0/0, which is sent in turn with Stop.
 
-        In a terminal mode the result is empty and only Stop is sent: the public firmware passes all
-        characters that it receives on to the sensor, and reads at most 480 characters a second.
+        The board does not latch an e-stop, so both are repeated.
+
+        In a terminal mode the result is empty, so only Stop is sent: the public firmware forwards
+        all received characters to the sensor, and then reads at most 480 characters a second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode a velocity as RPM or duty, by the drive mode; Stop if it rounds to zero."""
+        """Encode a velocity as RPM or duty, depending on the drive mode; Stop if it rounds to
+        zero."""
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
@@ -273,17 +278,19 @@ class LoisConversation:
     # Other requests
 
     def reset(self) -> bytes:
-        """Return Stop and the board's reset, after which its counters start at zero."""
+        """Return Stop and the reset command, after which the board's counters start at zero."""
         self._decoder.forget_counters()
         self._translation.connect()
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """Write all settings again: by the manual a reset includes controllers and interfaces."""
+        """Write all settings again: by the manual, a reset also resets controllers and
+        interfaces."""
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Send a command several times, as lines are lost; repeating it must be harmless."""
+        """Send a command several times, as lines may be lost. Repeating the command must be
+        harmless."""
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:
@@ -291,7 +298,7 @@ class LoisConversation:
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Start a record. Raises RequestRefused where it could not complete."""
+        """Start a record. Raises RequestRefused if the board could not complete it."""
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
         self._upkeep.request.begin(kind, samples, self._decoder)

@@ -1,13 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Decoder from a stream of bytes to reports.
+"""Decoder that turns a stream of bytes into reports.
 
-A line ends with a line feed and begins at the last ``:`` before that. So when a line loses its
-end, the next line can still be decoded. All other bytes are counted and discarded. A line that lost
-or gained characters has a wrong length. Two lines can become one only if fourteen characters
-between them are lost, and the result would have to pass the checksum too.
+A line ends with a line feed and begins at the last ``:`` before it. So if the end of a line is
+lost, the next line can still be decoded. All other bytes are counted and discarded. A line that
+lost or gained characters has a wrong length. Two lines can become one only if fourteen characters
+in a row are lost, from the end of one and the beginning of the next. The checksum of the resulting
+line would have to be right too.
 
-This module does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
+This module does not read a clock, and no input raises an error. It holds less than ``LONGEST_LINE``
 bytes between calls, and looks at each byte a bounded number of times.
 """
 
@@ -26,7 +27,7 @@ LONGEST_LINE: Final = 256
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counters of one decoder, or of one after the other.
+    """Counters of one decoder, or of several decoders that follow each other.
 
     ``lines``: valid lines; ``faults``: pieces of input that were discarded, because they were not a
     line; ``groups``: counters of groups of lines.
@@ -43,7 +44,8 @@ class LoisDecoder:
 
     If ``sum_required`` is false, lines without a checksum are accepted too. ``terminal``: the board
     passes on a sensor's lines, so text is returned and not regarded as damage. ``times``: for each
-    report of the last call, when its last line arrived, which may be before that call.
+    report that the last call returned, the arrival time of the report's last line, which may be
+    earlier than the call.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:
@@ -57,7 +59,7 @@ class LoisDecoder:
 
     @property
     def statistics(self) -> DecoderStatistics:
-        """Counters, which may be replaced by those of an earlier decoder before the first data."""
+        """Counters. Before the first data you may replace them with those of an earlier decoder."""
         return self._statistics
 
     @statistics.setter
@@ -77,7 +79,7 @@ class LoisDecoder:
 
     @property
     def resolves_at(self) -> float:
-        """Time by which ``feed`` must be called again, even without bytes, in s."""
+        """Time in s at which ``feed`` must be called again, even without bytes."""
         return self._assembler.resolves_at
 
     @property
@@ -90,7 +92,7 @@ class LoisDecoder:
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
-        """Accept any next counts, as the board was commanded to set its counters to zero."""
+        """Accept any counts next, because the board was commanded to set its counters to zero."""
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:
@@ -113,7 +115,7 @@ class LoisDecoder:
         return self._untimed(found)
 
     def flush(self, now: float) -> list[Report]:
-        """Return the report that was held back, if it is complete, as the port closes."""
+        """Return the report that was held back, if it is complete; call it when the port closes."""
         if self._held or self._cut_bytes:
             self._damaged(len(self._held) + self._cut_bytes)
         self._held, self._cut_bytes = b"", 0

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""History of a filter's states, to restore one from before a restart that was noticed late.
+"""History of a filter's states. It restores a past state, if a restart is noticed late.
 
-Works on states and times, without their meaning.
+Works on states and times. Does not know what a state means.
 """
 
 from collections import deque
@@ -11,7 +11,8 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 
 KEPT: Final = 32
-"""Number of stored states: at least as many as groups that arrive before a restart is noticed."""
+"""Number of stored states; fewer groups than this arrive until a restart of the board is
+noticed."""
 
 
 class FilterHistory:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The estimate of a LOIS ECU's motion as it is passed on: values only."""
+"""Odometry estimates of a robot with a LOIS ECU: values only."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -15,7 +15,7 @@ Source = Literal["standing", "ticks", "ticks and heading", "commands and heading
 
 @dataclass(frozen=True, slots=True)
 class FusedOdometry:
-    """The odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
+    """Odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in the body frame.
 
     ``twist_covariance``: variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
     ``displacement``: motion since the previous estimate, in the robot's axes. ``wheel_ways_m``:
