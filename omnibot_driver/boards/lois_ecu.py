@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Profile of the LOIS ECU: its parameters, and what is made from their values."""
+"""Profile of the LOIS ECU: its parameters, and the objects that are made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -58,7 +58,7 @@ def make(values: Mapping[str, Any]) -> LoisEcuBoard:
 
 
 def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
-    """Make the board's settings, which its data does not reveal, from checked values."""
+    """Return the settings of the board and its robot, made from checked parameter values."""
     wheels = kinematics(values)
     return LoisEcuSettings(
         wheel_radius_m=wheels.wheel_radius_m,
@@ -90,7 +90,7 @@ def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
 
 
 def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
-    """Return a left and a right wheel, with the sizes that calibration found."""
+    """Return the kinematics of both wheels, with their calibrated sizes."""
     linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
     return DifferentialKinematics(
         wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]
@@ -100,7 +100,8 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
     """Create this board's own topics and services, and return its publishing functions.
 
-    They are the GPS fix, GPS time, heading, e-stop button; LED and balls; and duties.
+    The topics are GPS fix, GPS time, heading, e-stop button, sensor lines and duties. The services
+    are LED, balls and records.
     """
     from omnibot_driver.boards.lois_ecu_topics import LoisEcuTopics  # needs ROS
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters that the LOIS ECU has and other boards need not have. Knows no ROS.
+"""The LOIS ECU's own parameters, in addition to those of every board. Does not know ROS.
 
 Settings that the board stores are unset by default: the driver writes them only if the user gives a
 value.
@@ -17,8 +17,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest rate of commands in a terminal mode, in Hz. A command is a line of 14 characters, and the
-line to the compass carries 34 such lines per second."""
+"""Largest rate of commands in a terminal mode, in Hz. A command has 14 characters, and the board
+can forward 34 such commands per second to the compass."""
 
 WHEELS: Final = (
     Parameter(

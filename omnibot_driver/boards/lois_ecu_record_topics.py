@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Services that make the LOIS ECU record; each is answered when its file is written.
+"""Services that start a record of the LOIS ECU; each answers when its file is written.
 
-They only connect ROS to the session.
+This module only connects ROS to the session.
 """
 
 import threading

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A record of the LOIS ECU as a CSV file: complete under its final name, or not at all.
+"""Saving of a LOIS ECU's record as a CSV file, which is complete or does not exist.
 
-This module knows what was recorded, and files. It knows no ROS and no lines of the board.
+Knows records and files. Does not know ROS, nor the lines of the board.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.readings import RecordReading
 
 SATURATED: Final = 0xFFFF
-"""Count of a tick that took longer than 16 bits can hold."""
+"""Count that the board reports for a tick whose time does not fit into 16 bits."""
 
 Row = tuple[object, ...]
 
@@ -62,8 +62,8 @@ def remark(reading: RecordReading) -> str:
         return ""
     if reading.count_s is None:
         return (
-            "the file has only the board's timer counts, without times and speeds, because the"
-            " driver does not know the unit of the board's clock yet"
+            "the record's file has only the board's timer counts, without times and speeds, because"
+            " the driver does not know the unit of the board's clock yet"
         )
     slow = (*reading.record.left, *reading.record.right).count(SATURATED)
     if not slow:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Topics and services that only the LOIS ECU has. They only connect ROS to the session."""
+"""Topics and services that only the LOIS ECU has. This module only connects ROS to the session."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final, cast
@@ -29,8 +29,8 @@ from omnibot_driver.core.session import Session
 from omnibot_driver.qos import DEEP, LATCHED
 
 FIX_VARIANCE_M2: Final = 0.4**2
-"""Variance of a float32 longitude, in m². The GPS position is less accurate, but the board does not
-report its accuracy."""
+"""Variance in m² that comes from the rounding of a longitude to float32. The GPS adds a larger
+error, which the board does not report."""
 GPS_VARIANCE_M2: Final = 5.0**2
 ABSENT: Final = [-1.0] + [0.0] * 8
 TERMINAL_DEPTH: Final = 100
@@ -89,7 +89,7 @@ class LoisEcuTopics:
         elif not duty and self._duty is not None:
             self._node.destroy_subscription(self._duty)
             self._duty = None
-        if terminal and self._terminal is None:  # it stays: the reader's thread may be using it
+        if terminal and self._terminal is None:  # never removed: the reader's thread may use it
             self._terminal = self._node.create_publisher(String, "~/terminal", TERMINAL_DEPTH)
 
     # From the board
@@ -170,7 +170,7 @@ class LoisEcuTopics:
         return float(self._values["cmd_vel_timeout"])
 
     def _drive(self, session: Session, message: Float32MultiArray, now: float) -> None:
-        """Command duties in percent, as wheel rates that the board's settings turn into them."""
+        """Command duties in percent, converted to wheel rates by the board's settings."""
         duties = list(message.data)
         require_finite("duty_cmd", duties)
         if len(duties) != 2:

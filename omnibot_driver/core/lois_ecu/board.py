@@ -125,8 +125,7 @@ class LoisEcuBoard(Board):
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings of bytes and groups that were held back; call it when the port
-        closes."""
+        """Return the readings of held bytes and groups; call it when the port closes."""
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
@@ -212,8 +211,7 @@ class LoisEcuBoard(Board):
         return min(self._ecu.wake_at, self._odometry_due_at, once_at, self._reset_at_s)
 
     def leave(self) -> None:
-        """Make ``due`` return nothing from now on, so that Stop remains the last line that is
-        sent."""
+        """Make ``due`` return nothing from now on, so that Stop is the last line that is sent."""
         self._leaving = True
 
     def due(self, now: float) -> Packets:
@@ -258,8 +256,7 @@ class LoisEcuBoard(Board):
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Return Stop. Its ``:`` begins a new line, so the board discards a partial line before
-        it."""
+        """Return Stop. Its ``:`` makes the board discard a partial line that came before."""
         return self.stop()
 
     def stop(self) -> Packets:

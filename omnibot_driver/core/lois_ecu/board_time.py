@@ -38,8 +38,7 @@ UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
 
 
 class BoardTime:
-    """Estimator of the delay of each group of ticks; ``stddev_s``: error of a delay in s (1
-    sigma)."""
+    """Estimator of the delay of each group of ticks, with its standard deviation ``stddev_s``."""
 
     def __init__(self) -> None:
         self.stddev_s = UNKNOWN_S

@@ -60,8 +60,7 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A command's byte and class, and the functions that convert its fields to a payload and
-    back."""
+    """A command's byte and class, and functions that convert its fields to a payload and back."""
 
     code: Code
     kind: type

@@ -158,8 +158,7 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Subtract the wheel's distance since its reported speed last changed: the wheel was at
-        rest."""
+        """Subtract the wheel's distance since its reported speed last changed: it was at rest."""
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:
@@ -174,8 +173,7 @@ class Comparison:
             speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Correct the filter by the fact that neither wheel has rolled more than ``ticks``
-        ticks."""
+        """Correct the filter by the fact that neither wheel rolled more than ``ticks`` ticks."""
         motion = self._motion
         self.begin_odometry()
         variance = (ticks * motion.tick_m / max(duration_s, 0.01)) ** 2

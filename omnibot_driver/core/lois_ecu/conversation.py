@@ -84,8 +84,7 @@ class LoisConversation:
         self._translation.connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
-        """Return the readings that these bytes complete. At ``held_until``, call it with empty
-        bytes."""
+        """Return the readings that these bytes complete. At ``held_until``, call it with b""."""
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
 
@@ -152,8 +151,7 @@ class LoisConversation:
 
     @property
     def held_until(self) -> float:
-        """Time at which ``receive`` with empty bytes returns held reports; infinity if none is
-        held."""
+        """Time at which ``receive(b"", …)`` returns held reports; infinity if none is held."""
         return self._decoder.resolves_at
 
     def predicted(self, now: float) -> FusedOdometry | None:
@@ -227,7 +225,7 @@ class LoisConversation:
 
     @property
     def wake_at(self) -> float:
-        """Time at which to call ``due``, and ``receive`` with empty bytes, next."""
+        """Time at which to call ``due``, and ``receive`` with b"", next."""
         return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property
@@ -258,8 +256,7 @@ class LoisConversation:
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode a velocity as RPM or duty, depending on the drive mode; Stop if it rounds to
-        zero."""
+        """Encode a velocity as RPM or duty, by the drive mode; return Stop if it rounds to zero."""
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
@@ -284,13 +281,11 @@ class LoisConversation:
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """Write all settings again: by the manual, a reset also resets controllers and
-        interfaces."""
+        """Write all settings again: by the manual, a reset affects controllers and interfaces."""
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Send a command several times, as lines may be lost. Repeating the command must be
-        harmless."""
+        """Send a command several times, as lines may be lost; the repetition must be harmless."""
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:

@@ -1,20 +1,22 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Assembly of reports that take several lines: groups behind a marker line.
+"""Assembly of reports that take several lines: each is a group of lines after a marker line.
 
-A group is returned complete or not at all. A lost line makes it too short; a repeated or foreign
-line makes it too long or cuts it. So a group is known to be complete when something else follows
-it. It is returned with its last line already if no line repeats the one before (so none was
-received twice) and its values can follow those of the last group. Otherwise it waits for the next
-line, or for ``QUIET_S`` without one.
+A group is returned complete or not at all. A lost line makes it too short; a repeated line, or a
+line of another group, makes it too long or interrupts it. So a group is known to be complete when
+something else follows it. It is returned earlier, with its last line, on two conditions: no line
+equals the one before it (so none was received twice), and the values can follow those of the last
+group. Otherwise the group is held until the next line comes, or until no line has come for
+``QUIET_S``.
 
-Silence completes a group that has a valid length. It does not end an unfinished group, because a
-reader may be late for the rest. But a rest that comes almost a period later may be the rest of the
-next group: then all lines between them were lost. So that group is discarded.
+Silence completes a held group of a valid length. A shorter group continues to wait, because its
+other lines may be read late. But lines that come almost a period later may belong to the next
+group, if all lines between them were lost. In this case the shorter group is discarded.
 
-0x12 is two kinds of group, distinguished by their length: ticks of 3 lines, and in the public
-firmware 6 lines of odometry right behind them. A count of -1 looks like a marker; there the length
-decides too. Records are assembled in ``record_lines``. Works on lines and arrival times.
+The command byte 0x12 has two kinds of groups, distinguished by their length: 3 lines of ticks, and
+in the public firmware 6 lines of odometry directly after the ticks. A count of -1 looks like a
+marker; the length of the group also shows which of the two it is. Records are assembled in
+``record_lines``. Works on lines and arrival times.
 """
 
 import math
@@ -46,12 +48,12 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group of a valid length has ended: its lines follow each other within
-1.2 ms, and a reader usually passes them on within this time."""
+"""Silence in s after which a group of a valid length is complete: the board sends the lines of a
+group 1.2 ms apart, and a reader usually delivers them within ``QUIET_S``."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest pause within a group, in s and as part of the time between its marker and the marker of
-the group before."""
+"""Longest pause within a group: in s, and as a fraction of the time between the markers of this
+group and the group before."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
@@ -62,13 +64,14 @@ _LONGEST: Final = 10
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
 Timed = tuple[float, Report]
-"""A report, and when its last line arrived, which may be before it is known to be complete."""
+"""Arrival time of a report's last line in s, and the report. It may be known to be complete only
+later than this time."""
 
 
 class Assembler:
     """Assembler of reports from lines.
 
-    Call ``add`` for each line, ``damage`` where characters were not a line, and ``rest`` while
+    Call ``add`` for each line, ``damage`` for characters that are not a line, and ``rest`` while
     nothing arrives. ``statistics``: the counters to increase.
     """
 
@@ -85,11 +88,12 @@ class Assembler:
         self._done = False
         self._begun_at: dict[int, float] = {}
         self._late_s: dict[int, float] = {}
-        """By code: when the last group began, and the longest pause in s within a group."""
+        """For each command byte: when its last group began, and the longest pause within a group,
+        in s."""
         self._astray = False
         self._after_ticks = False
         self._appends = True
-        """Whether this board sends odometry behind its ticks, as far as is known."""
+        """Whether this board sends odometry directly after its ticks, as far as is known."""
         self._at = -math.inf
 
     @property
@@ -101,7 +105,7 @@ class Assembler:
     def resolves_at(self) -> float:
         """Time at which a held group is returned if nothing follows it.
 
-        Infinity without a group, and while the group may be unfinished.
+        Infinity if no group is held, or if the held group may be unfinished.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 
@@ -115,7 +119,7 @@ class Assembler:
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
-        """Forget the counters, as a reset starts them anew."""
+        """Forget the last counts and poses, because a reset of the board restarts them."""
         self._ticks_gate.forget()
         for gate in self._odometry_gates.values():
             gate.forget()
@@ -144,7 +148,7 @@ class Assembler:
         return [*found, (now, report)]
 
     def damage(self) -> None:
-        """Note that characters between two lines were not a line."""
+        """Note that characters were received that are not a line."""
         if self._code is not None and not self._done:
             self._drop()
         self._record.damage()
@@ -154,7 +158,7 @@ class Assembler:
         return self._end(now) if now >= self.resolves_at else []
 
     def finish(self, now: float) -> list[Timed]:
-        """Return the held group if it is complete, as the line is closed."""
+        """Return the held group if it is complete; call it when the port closes."""
         found = self._end(now)
         self._record.cut_off()
         return found
@@ -162,19 +166,19 @@ class Assembler:
     # Groups
 
     def _begin(self, code: int, now: float) -> None:
-        """Begin a group, and learn from the time since the one before how late its rest may be."""
+        """Begin a group; set its longest pause, from the time since the group before."""
         since_s = now - self._begun_at.get(code, -math.inf)
-        if since_s > QUIET_S and not self._after_ticks:  # not read together, nor sent together
+        if since_s > QUIET_S and not self._after_ticks:  # neither read nor sent together
             self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))
         self._begun_at[code] = self._at = now
         self._code, self._payloads, self._done, self._astray = code, [], False, False
 
     def _may_be_minus_one(self, code: int) -> bool:
-        """Return whether this marker may be a count of -1; if not, the group gets too long."""
+        """Return whether this marker may be a count of -1; if not, the group becomes too long."""
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
     def _may_be_complete(self) -> bool:
-        """Return whether a held group has a valid length, and nothing shows that it is longer."""
+        """Return whether a held group has a valid length, and nothing shows that it continues."""
         if self._code is None or self._done:
             return False
         if len(self._payloads) not in _LENGTHS[Code(self._code)]:

@@ -2,11 +2,11 @@
 
 """Filter of compass headings that rejects the false headings of the public firmware near north.
 
-The firmware averages three numbers of 0 to 359 degrees: between 359 and 1 it reports 120 or -121. A
-heading is accepted if it differs from the last accepted one by the turn of the odometry since then.
-Any other heading is accepted only when ``SURE_AFTER`` further headings agree with it. A false
-heading (about 120 or -120 degrees while the robot faces north) is not accepted. Works on degrees
-and the odometry's yaw.
+The firmware averages three headings of 0 to 359 degrees as plain numbers: for 359, 1 and 1 it
+reports 120, and for 359, 359 and 1 it reports -121. A heading is accepted if it differs from the
+last accepted one by the turn of the odometry since then. Any other heading is accepted only when
+``SURE_AFTER`` further headings agree with it. A false heading (about 120 or -120 degrees while the
+robot faces north) is rejected even then. Works on degrees and the odometry's yaw.
 """
 
 import math
@@ -29,13 +29,13 @@ class HeadingFilter:
         self.forget()
 
     def forget(self) -> None:
-        """Treat the next heading as the first, which is rejected until a second one agrees."""
+        """Reject the next heading, and accept the second one if it agrees with the first."""
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
         self._agreed = 0
 
     def begin_frame(self, yaw_rad: float) -> None:
-        """Continue in an odometry frame that begins at this yaw of the present one."""
+        """Change to a new odometry frame, whose yaw in the present frame is ``yaw_rad``."""
         if self._last is not None:
             self._last = self._last[0], self._last[1] - yaw_rad
         if self._other is not None:

@@ -3,8 +3,8 @@
 """One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
 
 ``:<command><payload><checksum>\\n``, 14 characters. The checksum is the XOR of the first eleven
-characters. The board can be set to accept lines without it (12 characters), but always sends it.
-This module knows the layout only, not what a command means.
+characters. The board can be set to accept lines without a checksum (12 characters), but always
+sends one. This module knows the layout only, not what a command means.
 """
 
 import re

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speeds that the public firmware measures and keeps, and what 0x20 shows because of them.
+"""Speeds that the public firmware measures and keeps, and their effect on 0x20.
 
-A part of each step of the motion filter. Works on its states, without reports.
+This is a part of each step of the motion filter. Works on the states of the filter, without
+reports.
 """
 
 import math
@@ -24,18 +25,20 @@ if TYPE_CHECKING:
 
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""Mean and standard deviation of the ticks that the measured speed misses when a wheel starts."""
+"""Mean and standard deviation, in ticks, of the motion that 0x20 misses when a wheel starts."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance in squared ticks per s by which 0x20 misses the motion of a wheel beyond ``FAST_RPM``: a
-tick that comes soon after one that waited while the board sent has no speed."""
+"""Variance, in squared ticks per s, of the motion that 0x20 misses of a wheel above ``FAST_RPM``.
+The firmware gives no speed to a tick that comes soon after a delayed one, and ticks are delayed
+while the board sends."""
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
     """Predict the speeds that the firmware keeps, and the resulting changes of 0x20.
 
-    The firmware measures at each tick of either wheel. So a wheel that rolls alone is measured
-    as it is, while a wheel at rest beside a rolling one keeps the speed that it had.
+    The firmware updates 0x20 at each tick of either wheel, with the speed that it measured last for
+    each wheel. So if only one wheel rolls, its present speed enters 0x20, but for the wheel at rest
+    the old speed does.
     """
     dt, new = step.dt, step.new
     turn: Terms = [(TURN, 1.0)]

@@ -2,9 +2,9 @@
 
 """All messages of the manual's table as values; ``codec`` turns them into lines and back.
 
-Sources: the ECU's manual, table of messages; the public firmware for 0x21 to 0x23. What the host
-sends is a ``Command``, what the ECU sends a ``Report``; some command bytes are both. Units are in
-the names. Modules that use a count know what it is in SI units.
+Sources: the ECU's manual, table of messages; the public firmware for 0x21 to 0x23. A message from
+the host is a ``Command``, and one from the ECU a ``Report``; some command bytes are used for both.
+Units are in the names. Counts are converted to SI units where they are used.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Code(IntEnum):
 
 
 class Setting(IntEnum):
-    """A float32 setting that can be written but not read back; the value is its command byte."""
+    """A float32 setting that can be written but not read back; identified by its command byte."""
 
     LEFT_KP = 0x06
     LEFT_TN = 0x07
@@ -63,7 +63,7 @@ class Setting(IntEnum):
 
 
 class Stream(IntEnum):
-    """A message that the ECU can send periodically; the value is its command byte."""
+    """A message that the ECU can send periodically; identified by its command byte."""
 
     GPS_POSITION = 0x0D
     GPS_TIME = 0x0E
@@ -74,10 +74,10 @@ class Stream(IntEnum):
 
 
 class TerminalMode(IntEnum):
-    """What the board's host line carries.
+    """What the serial line between the board and the host carries.
 
-    ``HOST`` is the protocol. ``HOST_WITHOUT_SUM`` is the protocol too, but the host's lines do not
-    have a checksum. The others pass a serial input through and silence the protocol.
+    ``HOST``: the protocol. ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no
+    checksum. In all other modes the board forwards a serial input and sends no messages of its own.
     """
 
     HOST = 0
@@ -165,7 +165,7 @@ class SetPeriod:
 
 @dataclass(frozen=True, slots=True)
 class SetTerminalMode:
-    """A command that sets the terminal mode, and whether the host's lines are checked."""
+    """A command that sets the terminal mode, and whether lines from the host need a checksum."""
 
     mode: TerminalMode
 
@@ -174,7 +174,8 @@ class SetTerminalMode:
 class Reset:
     """A command that resets the board.
 
-    By the manual it resets controllers, interfaces and counters; in the firmware only the ticks.
+    By the manual it resets controllers, interfaces and counters; the firmware resets only the
+    ticks.
     """
 
 
@@ -227,7 +228,7 @@ class GpsTime:
 
 @dataclass(frozen=True, slots=True)
 class GpsDate:
-    """The GPS date in UTC, with the year of the century; zeros while unknown."""
+    """The GPS date in UTC, with a year of two digits; zeros while unknown."""
 
     year: int
     month: int
@@ -243,7 +244,7 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """Encoder ticks since the board started or was reset, and its clock when it sent the ticks.
+    """Encoder ticks since the board started or was reset, and the board's time of sending them.
 
     ``time_counts``: ns by the manual, ms in the firmware; wraps at 2³². Ticks are signed.
     """
@@ -257,7 +258,8 @@ class Ticks:
 class BoardOdometry:
     """The board's own dead reckoning, in its earth frame; velocities may be NaN or infinite.
 
-    ``appended``: the group came right behind a group of ticks, with the command byte of the ticks.
+    ``appended``: the group came directly after a group of ticks, with the command byte of the
+    ticks.
     """
 
     x_m: float
@@ -273,8 +275,9 @@ class BoardOdometry:
 class Record:
     """A complete record; ``left`` and ``right`` have as many samples as requested.
 
-    A record of headings has only ``left``. RPM: time of a tick in the board's unit (``COUNT_S`` in
-    ``record_request``); torque: 12-bit values of an ADC; heading: degrees.
+    A record of headings has only ``left``. Samples of RPM are times from tick to tick in the
+    board's unit (``COUNT_S`` in ``record_request``), samples of torque 12-bit values of an ADC, and
+    samples of headings degrees.
     """
 
     kind: RecordKind

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on what is misconfigured, found from bytes that are not lines and from the settings.
+"""Advice on a misconfiguration, which shows in the settings or in bytes that are not valid lines.
 
-The advice is one sentence at most. Advice from bytes (another board, a wrong setting) is given only
-while valid lines do not arrive. Works on bytes and settings, without times.
+There is at most one piece of advice at a time. Advice from bytes (another board, a wrong setting)
+is given only while valid lines do not arrive. Works on bytes and settings, without times.
 """
 
 import re
@@ -22,13 +22,13 @@ GAINS: Final = (
 )
 """Gains of the speed controllers; the board does not report which values it has."""
 OWN_GAINS: Final = (
-    "the speed controllers run with the board's own {}. With those of the public firmware a"
-    " wheel oscillates, so the robot does not hold its course, and after 5 m odometry is wrong"
-    " by 0.04 m on average, in a few drives by 0.2 to 2 m. Run calibrate step, or set these"
+    "the speed controllers run with the board's own {}. With the gains of the public firmware a"
+    " wheel oscillates, so the robot does not hold its course. After 5 m, odometry is wrong by"
+    " 0.04 m on average, and by 0.2 to 2 m in a few drives. Run calibrate step, or set these"
     " parameters"
 )
-"""Advice if the user has not set all gains. Its figures are from 150 forward drives of the compiled
-firmware, with correct wheel sizes."""
+"""Advice if the user has not set all gains. The figures are from 150 forward drives with the
+compiled firmware and correct wheel sizes."""
 LOOK_AT: Final = 600
 """Number of bytes without a valid line after which advice is given; the board sends at least 70
 bytes per second."""
@@ -71,7 +71,8 @@ def own_gains(settings: LoisEcuSettings) -> str:
 def _advice(seen: bytes) -> str:
     if len(_OMNIBOT.findall(seen)) >= 5:
         return (
-            "the port carries an OmniBot board's frames: set board to omnibot, or choose its port"
+            "the port carries an OmniBot board's frames: set board to omnibot, or choose the ECU's"
+            " port"
         )
     if len(_NMEA.findall(seen)) >= 3:
         return (

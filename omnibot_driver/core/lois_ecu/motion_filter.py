@@ -1,14 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kalman filter of both wheels' motion, and of what the board's counters report of that motion.
+"""Kalman filter of both wheels' motion, and of the board's counters that report this motion.
 
-States of each wheel: its distance, speed and acceleration, the ticks that should have counted, the
-speed that the firmware measured last, and a bias. States of the body: its position, and the changes
-of 0x20's heading and distance. Errors of all of them are correlated with those of the position, so
-whatever the board reports corrects the position as far as it can.
+States of each wheel: distance, speed, acceleration, the ticks that the board should have counted,
+the speed that the firmware measured last, a bias, and the excess of its speed backward. States of
+the body: position, and the changes of the heading and the distance in 0x20. The errors of all these
+states are correlated with the error of the position, so each report of the board also corrects the
+position.
 
-The wheels are the board's left and right; distances and speeds are those of nominal wheels. Works
-on the commanded course and the firmware's counters, without messages.
+Left and right are those of the board; distances and speeds are for wheels of nominal size. Works on
+commands and the firmware's counters, without messages.
 """
 
 import math
@@ -42,9 +43,9 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that is predicted at once; earlier time is skipped."""
+"""Longest time in s that one call of ``advance`` predicts: of a longer time, only the last part."""
 ROLLED_OUT_S: Final = 0.15
-"""Time in s for which a wheel without power rolls on, at the speed that it had."""
+"""Time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
 """Standard deviation of the time at which a command takes effect, in controller periods."""
 ROUNDED: Final = 0.4
@@ -53,9 +54,11 @@ ROUNDED_STDDEV: Final = 0.15
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""Excess of the speed of a wheel that rolls backward, with the board's own gains and with gains
-that are set: the firmware lowers its target with each tick until the controller's next step, and a
-feed-forward may drive the wheel much faster. ``EXCESS_CHANGE``: after a change of the set-point."""
+"""Fraction by which a wheel that rolls backward is faster than its set-point: mean, standard
+deviation, and additional standard deviation after a change of the set-point. Each has two values:
+for the board's own gains, and for gains that the user set. The wheel is faster because the firmware
+lowers the target with each tick until the controller's next step. A feed-forward may add much
+more."""
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
 
@@ -63,13 +66,14 @@ ROLLING_MPS: Final = 1e-6
 class MotionFilter:
     """Estimate of the wheels' motion and the body's pose.
 
-    ``tick_m``, ``rpm_mps``: distance of a tick, and speed at one RPM, of a rim. ``turn_sign``: -1
-    if the board's left wheel is the robot's right one. ``signed``: ticks always count in both
-    directions. ``holds``: a wheel at rest keeps its measured speed.
+    ``tick_m``, ``rpm_mps``: distance that a rim moves in one tick, and its speed at one RPM.
+    ``turn_sign``: -1 if the board's left wheel is the robot's right one. ``signed``: ticks always
+    count in both directions. ``holds``: the board keeps the last measured speed of a wheel at rest.
 
-    ``tuned``: whether the controllers have gains that the user set. A wheel that is halted soon
-    after a change of its set-point rolled at another speed than the model says, perhaps in the
-    other direction. Its distance has an error of that change times ``UNSETTLED_S[tuned]``.
+    ``tuned``: whether the controllers have gains that the user set. If a wheel is halted soon after
+    a change of its set-point, it did not roll at the speed of the model, and perhaps rolled in the
+    other direction. The error of its distance is then this change of speed times
+    ``UNSETTLED_S[tuned]``.
     """
 
     def __init__(self) -> None:
@@ -79,7 +83,8 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Least difference of both measured speeds since the last reset of this value, in m/s."""
+        """Smallest difference between both measured speeds since this value was last reset, in
+        m/s."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 
@@ -94,7 +99,7 @@ class MotionFilter:
         return self.filter.mean[PER_WHEEL * wheel + SPEED]
 
     def way_m(self, wheel: int) -> float:
-        """Return the distance that a wheel has rolled since the beginning, in m."""
+        """Return the distance that a wheel has rolled since the odometry was reset, in m."""
         return self.filter.mean[PER_WHEEL * wheel + WAY]
 
     def rounded_mps(self, wheel: int) -> float:
@@ -138,11 +143,11 @@ class MotionFilter:
             at_s = end_s
 
     def restart(self, then_s: float) -> None:
-        """Go back to ``then_s``, when the board restarted, and let the wheels roll out since then.
+        """Restore the state at ``then_s``, when the board restarted, and add the coasting after it.
 
-        Estimates of the time after are discarded. Where ticks count in both directions, they have
-        started at zero and report how far the wheels rolled out. Elsewhere the set-points are
-        forgotten too.
+        Later estimates are discarded. If ticks count in both directions, they have restarted at
+        zero and report how far the wheels coasted. Otherwise this distance is estimated, and the
+        set-points are forgotten.
         """
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
@@ -168,8 +173,8 @@ class MotionFilter:
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
         """Add an error to a wheel's distance, and to all states that depend on that distance.
 
-        ``stddev_m``: standard deviation of the error. ``counted``: the error arose before the
-        wheel's ticks stopped counting.
+        ``stddev_m``: standard deviation of the error. ``counted``: the error arose before the board
+        stopped counting the wheel's ticks.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -178,7 +183,7 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return the terms that an unmeasured distance of this wheel changes."""
+        """Return the states, with factors, that change with an unmeasured distance of a wheel."""
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = [*self._way_terms(index), (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
@@ -187,7 +192,7 @@ class MotionFilter:
         return terms
 
     def _way_terms(self, index: int) -> Terms:
-        """Return the terms that a distance of this wheel changes."""
+        """Return the states, with factors, that change with a distance of a wheel."""
         base, yaw = PER_WHEEL * index, self.yaw_rad
         terms = [(base + WAY, 1.0), (X, math.cos(yaw) / 2), (Y, math.sin(yaw) / 2)]
         counts = self.wheels[index].counts(self.speed_mps(index), signed=self.signed)
@@ -228,7 +233,7 @@ class MotionFilter:
             self._begin_biases()
 
     def _begin_biases(self) -> None:
-        """Reset the biases: of duty a relative one; else the dropped fraction of an RPM, in m/s."""
+        """Reset the biases: relative with duty, otherwise the dropped part of an RPM in m/s."""
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:
                 self.filter.forget(BIAS + index, 0.0, DUTY_STDDEV**2)
@@ -238,7 +243,7 @@ class MotionFilter:
             self.begin_excess()
 
     def begin_excess(self) -> None:
-        """Reset the part by which each wheel rolls backward faster than its set-point."""
+        """Reset the fraction by which each wheel rolls backward faster than its set-point."""
         for index in (0, 1):
             mean = EXCESS_MEAN[self.tuned] if self.holds else 0.0
             stddev = EXCESS_STDDEV[self.tuned] if self.holds else 0.0

@@ -2,10 +2,11 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-Ticks are exact to one tick, but the public firmware counts them only while a wheel is commanded
-forward. Elsewhere the commands say how the wheels should move (``motion_filter``), and 0x20 how
-they did (``comparison``). Errors of the wheels' sizes and their slip, which the board cannot
-report, are kept apart. Time is an argument; all times are arrival times in s.
+Counts of ticks are exact, but the public firmware counts only while a wheel is commanded forward.
+At other times the commands show how the wheels should move (``motion_filter``), and 0x20 shows how
+they moved (``comparison``). The board cannot report errors of the wheels' sizes and their slip, so
+these are estimated separately (``size_errors``). Time is an argument; all times are arrival times
+in s.
 """
 
 import math
@@ -31,19 +32,19 @@ from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, U
 __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 WHEEL_DRIFT: Final = 0.0035
-"""Random walk of a wheel on the ground, in m after 1 m."""
+"""Random walk of a wheel on the ground: standard deviation in m after 1 m."""
 LATE_S: Final = 0.012
-"""Standard deviation of an arrival in s, where nothing better is known."""
+"""Standard deviation of an arrival time in s, while no better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""Silence, in s and in periods of the ticks, after which the prediction of the pose ends: the board
-may be switched off."""
+"""Silence, in s and in periods of the ticks, after both of which the prediction of the pose ends:
+the board may be switched off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
 
 class LoisOdometry:
-    """Odometry of a robot with a LOIS ECU, by ``settings``; wheels are in the order left, right."""
+    """Odometry of a robot with a LOIS ECU and these ``settings``; wheel order: left, right."""
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._motion = MotionFilter()
@@ -57,7 +58,7 @@ class LoisOdometry:
         self._uncertainty = Uncertainty(OdometryNoise())
         self._source: Source = "standing"
         self.late_stddev_s = LATE_S
-        """Standard deviation of the stamps, in s."""
+        """Standard deviation of the timestamps, in s."""
         self.configure(settings)
         self.reset()
         self.connect()
@@ -92,7 +93,7 @@ class LoisOdometry:
 
     @property
     def appends(self) -> bool:
-        """Whether this is the public firmware, or one like it."""
+        """Whether the board appends odometry to its ticks, as the public firmware does."""
         return self._kind.appends
 
     @property
@@ -107,7 +108,7 @@ class LoisOdometry:
         return left.rests, right.rests
 
     def reset(self) -> None:
-        """Begin the odometry frame at the robot's present pose."""
+        """Move the origin of the odometry frame to the robot's present pose."""
         for state in (X, Y, WAY, PER_WHEEL + WAY):
             self._motion.filter.forget(state, 0.0, 0.0)
         for wheel in self._motion.wheels:
@@ -119,7 +120,7 @@ class LoisOdometry:
         self._motion.history.forget()
 
     def connect(self) -> None:
-        """Begin a new connection: counters may have started anew, but the pose continues."""
+        """Begin a new connection: the counters may have restarted, but the pose continues."""
         self._lost_s = max(self._heard_at_s, self._lost_s)
         self._ticks = None
         self._board.begin()
@@ -137,7 +138,7 @@ class LoisOdometry:
     # Outbound
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Record that a set-point went to the board."""
+        """Note that a set-point was sent to the board."""
         if isinstance(command, SetRpm):
             kind: CommandKind = "rpm"
             unit = self._settings.rim_mps_per_rpm
@@ -154,7 +155,7 @@ class LoisOdometry:
         self.wrote(SetRpm(0, 0), now)
 
     def stalled(self, wheels: tuple[bool, bool]) -> None:
-        """Believe that these wheels have been at rest since their reported speeds changed last."""
+        """Treat these wheels as at rest since their reported speeds last changed."""
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:
                 self._comparison.came_to_rest(index)
@@ -181,7 +182,7 @@ class LoisOdometry:
             return []
         counts = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
         if max(map(abs, counts)) * self._settings.tick_m > FASTEST_MPS * (now - from_s + 1.0):
-            self._comparison.begin_counts()  # the counters started anew
+            self._comparison.begin_counts()  # the counters have restarted
             return [self._estimate()]
         self._kind.took_ticks(counts)
         for index, count in enumerate(counts):
@@ -190,7 +191,7 @@ class LoisOdometry:
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
-        """Process odometry (0x20, or what came behind 0x12).
+        """Process odometry (0x20, or odometry that was appended to 0x12).
 
         It corrects the next predictions and the next estimate.
         """
@@ -212,14 +213,14 @@ class LoisOdometry:
         self._heading_compared = True
 
     def predict(self, now: float) -> FusedOdometry | None:
-        """Return the odometry predicted for ``now``; None before the first ticks of a line."""
+        """Return the odometry predicted for ``now``; None before a connection's first ticks."""
         if self._ticks is None or self._at_s == -math.inf:
             return None
         self._advance(min(now, self._heard_at_s + self._unheard_s))
         return self._fused(max(now, self._at_s))
 
     def _keep(self, now: float) -> None:
-        """Store the state after a report, as later predictions may have to be undone."""
+        """Store the state after a report, because later predictions may have to be discarded."""
         self._heard_at_s, self._lost_s = now, -math.inf
         for index, wheel in enumerate(self._motion.wheels):
             speed_mps = abs(self._motion.speed_mps(index))
@@ -227,9 +228,9 @@ class LoisOdometry:
         self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
-        """Add the errors of a long silence, and forget what 0x20 was compared with.
+        """Add the errors of a long silence, and make the present 0x20 the reference for later ones.
 
-        The stop may not have reached the board, so each wheel may have kept its speed.
+        A stop may not have reached the board, so each wheel may have continued at its speed.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:
@@ -267,7 +268,8 @@ class LoisOdometry:
         fused = self._fused(self._at_s)
         self._uncertainty.move(self._pose.yaw_rad, self._tangent(fused.wheel_ways_m))
         self._sizes.move(*fused.wheel_ways_m, motion.turn_sign * motion.track_m)
-        # The error within a tick has another direction after a turn: the next does not cancel it.
+        # An error of less than a tick is usually cancelled by the next error. After a turn it is
+        # not, because the two have different directions.
         turned = min(abs(fused.displacement.yaw_rad), 1.0)
         hidden = HIDDEN_PART * (self._settings.tick_m * turned) ** 2
         for state in (X, Y):

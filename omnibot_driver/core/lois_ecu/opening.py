@@ -1,24 +1,27 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writing of settings to a board that does not acknowledge, and loses single lines.
+"""Writing of settings to a board that acknowledges nothing and loses single lines.
 
-Every line is sent ``ROUNDS`` times, with longer pauses between the rounds than the board is deaf
-for. Two things can be confirmed: the period of the ticks, and that the board answers, because each
-round requests the date once, which is off after a boot. While either is missing, the rounds
-continue. Writing a gain resets the firmware's controller, so settings wait while the robot drives.
+All settings are sent in ``ROUNDS`` rounds. The pause between two rounds is longer than the time for
+which the board cannot receive. Two things confirm the settings: the ticks arrive with the requested
+period, and a date arrives. Each round requests one date, because the board sends no dates after a
+boot. The rounds continue until both have arrived. Writing a gain resets the firmware's controller,
+so rounds after the first ``ROUNDS`` wait while the robot drives.
 
-After that, the date is requested while it is unknown although the GPS works (``ask_date``): the GPS
-had none before, or midnight has passed.
+Later, ``ask_date`` requests the date while the GPS works but the date is unknown: the GPS had no
+date before, or midnight has passed.
 
-A request replaces the date's period on the board. So if that period is set, the requests end with
-the first answer, and the rounds after it restore the period.
+On the board, a request for one date ends the periodic sending of dates. So if a period of the date
+is set, the requests end with the first answer, and the following rounds restore the period.
 
-The lines of other commands (``write``) do not wait, and neither a restart nor a change of settings
-removes them. But they keep their distance from the motion before them (``AFTER_MOTION_S``).
+Other commands (``write``) are also sent while the robot drives. They remain queued after a restart
+of the board and after a change of settings. They are sent at least ``AFTER_MOTION_S`` after a
+motion command.
 
-A board with another terminal mode or checksum setting is silent, or seems to ignore everything.
-Then a line that restores the setting is sent both with and without a checksum, and after it the
-left short correction, which any write of the terminal mode overwrites.
+A board in another terminal mode, or with another checksum setting, is silent or seems to ignore
+everything. The driver then sends the line that restores the setting, both with and without a
+checksum. After it, the driver writes the left short correction, because any write of the terminal
+mode overwrites this setting.
 """
 
 import math
@@ -48,22 +51,24 @@ ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
 AFTER_MOTION_S: Final = 0.015
-"""Shortest time in s from a motion to the line of a command that is not a setting.
+"""Shortest time in s from a motion command to a command that is not a setting.
 
-The board may be deaf for 13 ms at once. If that removed the end of a motion and the beginning of
-this line, their rests could be another motion. The reverse order is harmless. Less than the time
-between two set-points, so that the line is sent however often motions are sent.
+The board may receive nothing for 13 ms. If it missed the end of a motion command and the beginning
+of the next line, the remaining parts could form another motion command. The reverse order is
+harmless. The value is less than the time between two set-points, so that the other command is sent
+even if motion commands are sent at the highest rate.
 """
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group to the next round of settings or request of the date, varied because the
-board is deaf while it sends another group."""
+"""Times in s from a group to the next round of settings, or to the next request for the date. They
+are used in turn, because after a fixed time the board might always be sending another group, and
+would then receive nothing."""
 CONFIRMED_WITHIN: Final = 0.35
-"""Part by which the ticks' period may differ from the requested one."""
+"""Fraction by which the period of the ticks may differ from the requested one."""
 DATE_AGAIN_S: Final = 3.0
-"""Shortest time in s between two requests of a date that is unknown."""
+"""Shortest time in s between two requests for an unknown date."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
-"""Time in s before a recovery; the board boots for two seconds."""
+"""Time in s without an answer before a recovery; longer than the two seconds of a boot."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the left short correction in the public firmware after a boot."""
 
@@ -87,11 +92,12 @@ class SettingsWriter:
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
         self.overwritten = False
-        """Whether the terminal mode was written, which overwrites the left short correction."""
+        """Whether the terminal mode was written; this overwrites the setting "left short
+        correction"."""
 
     @property
     def confirmed(self) -> bool:
-        """Whether the board has sent the requested date, and sends ticks with the set period."""
+        """Whether the board has sent a requested date, and sends ticks with the set period."""
         return self._answered and self._in_period
 
     @property
@@ -101,12 +107,12 @@ class SettingsWriter:
 
     @property
     def ignored(self) -> bool:
-        """Whether twice the usual rounds were sent and the board has not confirmed the settings."""
+        """Whether the board has not confirmed the settings after twice the usual rounds."""
         return self._rounds >= 2 * ROUNDS and not self.confirmed
 
     @property
     def wake_at(self) -> float:
-        """Time of the next ``due``; infinity while nothing is left to send, or all of it waits."""
+        """Time at which to call ``due`` next; infinity while nothing can be sent."""
         return min(self._settings_at, self._others_at)
 
     @property
@@ -129,7 +135,7 @@ class SettingsWriter:
         return self._round_at_s if self._rounds_left else math.inf
 
     def begin(self, now: float) -> None:
-        """Start to write all settings, after a new line, a restart or a change of settings."""
+        """Start to write all settings: after a connection, a restart or a change of settings."""
         self._queue.clear()
         self._arrivals.clear()
         self._rounds_left, self._round_at_s = ROUNDS, now
@@ -146,7 +152,7 @@ class SettingsWriter:
         self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
 
     def ask_date(self, now: float) -> None:
-        """Request the date, unless it comes by itself or was requested a short time ago."""
+        """Request the date, unless dates come periodically or a request was sent just before."""
         if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
             return
         self._date_asked_at_s = now
@@ -197,8 +203,8 @@ class SettingsWriter:
     def _turned(self, rounds: int) -> list[Command]:
         """Return all commands, beginning with a different command in each round.
 
-        A round may take as long as the board takes from one group to the next. With the same order
-        it would then be deaf for the same line in each round.
+        A round may last as long as the board's period from one group to the next. In a fixed order
+        the board would then miss the same line in each round.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order
@@ -223,11 +229,11 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether a period of the date is set, which each request of a single date replaces."""
+        """Whether a period of the date is set; each request for one date ends these dates."""
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:
-        """Return the lines for a board in any mode that is silent or does not obey."""
+        """Return the lines that restore the mode of a board that is silent or does not obey."""
         self.overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
         back = SetTerminalMode(mode)

@@ -2,21 +2,21 @@
 
 """Lines that make the robot move and stop, for a board that loses characters and complete lines.
 
-Damage. A line is accepted if it is 14 characters from a ``:`` (12 without checksum) up to a line
-feed, and its checksum is right. The public firmware counts characters from the last ``:`` and
-starts anew after the fourteenth. So a line that lost characters is too short. Two lines become one
+Damage. A line is accepted if it has 14 characters (12 without checksum) from its ``:`` to its line
+feed, and if its checksum is right. The public firmware counts characters from the last ``:``, and
+restarts after the fourteenth. So a line that lost characters is too short. Two lines become one
 only if fourteen characters in a row are lost (twelve without checksum), among them the end of one
-and the beginning of the next. A loss of up to two characters never makes another line. While the
-board sends a group it receives nothing for 13 ms. Set-points are at least 18 ms apart, so such a
-pause does not remove both the end of one line and the beginning of the next.
+and the beginning of the next. A loss of up to two characters never turns a line into another valid
+line. While the board sends a group, it receives nothing for 13 ms. Set-points are at least 18 ms
+apart, so such a gap does not remove both the end of one line and the beginning of the next.
 
-Choice of zero. In the firmware both zeros take the power away with the controller's next step. Duty
-0/0 leaves the hidden RPM target, so ticks continue to count while a robot that drove forward rolls
-out: its standstill can be proved. RPM 0/0 ends the counting, and clears the measured speed. RPM 0/0
-must be sent before the wheels turn again: for the controller, a wheel at rest keeps its last speed,
-and a slower set-point in the same direction would never start it. So Stop is duty 0/0, the
-emergency stop is RPM 0/0 (while it is latched both alternate), and RPM 0/0 precedes the first
-set-points after a Stop.
+Duty 0/0 and RPM 0/0. In the firmware both remove the power with the controller's next step. Duty
+0/0 does not change the firmware's RPM target. So after driving forward, the board continues to
+count ticks while the robot rolls out, and the counts can prove the standstill. RPM 0/0 ends the
+counting and clears the measured speed. It must be sent before the wheels turn again: the controller
+still uses the last speed of a wheel at rest, and with a slower set-point in the same direction the
+wheel would never start. So Stop is duty 0/0. The emergency stop is RPM 0/0; while it is latched,
+both are sent in turn. RPM 0/0 also precedes the first set-points after a Stop.
 """
 
 from typing import Final
@@ -35,7 +35,8 @@ MOST_RPM: Final = 50
 """Largest set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""Number of set-points after a Stop before which RPM 0/0 is sent: several, as lines may be lost."""
+"""RPM 0/0 is sent before each of this number of set-points after a Stop, because lines may be
+lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
@@ -50,7 +51,7 @@ def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], 
 
 
 def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
-    """Return the set-points among complete lines that were written, in order."""
+    """Return the set-points in these written lines, in order."""
     length = LENGTH if with_sum else LENGTH_WITHOUT_SUM
     found: list[SetRpm | SetDuty] = []
     for line in data.splitlines(keepends=True):

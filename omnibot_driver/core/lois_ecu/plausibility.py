@@ -2,9 +2,9 @@
 
 """Plausibility of a complete group of lines: its ranges, and its change since the group before.
 
-A group that is not reachable from the last one is kept aside. If the next one is reachable from it,
-the board has started anew (a restart, a reset), and that next one is accepted. Works on values and
-arrival times.
+A group that cannot follow the last accepted group is not accepted, but stored. If the next group
+can follow the stored one, the board was restarted or reset, and the next group is accepted. Works
+on values and arrival times.
 """
 
 import math
@@ -26,11 +26,13 @@ FARTHEST: Final = 1e5
 LATEST_S: Final = 0.3
 """Longest time in s from the sending of a group to its arrival."""
 SLOWEST_CLOCK: Final = 0.5
-"""Lowest rate of the board's clock, as part of real time; it stands still while the board sends."""
+"""Lowest rate of the board's clock, as a fraction of real time; the clock stops while the board
+sends."""
 SURE_AFTER: Final = 2
-"""Number of further clock steps in one unit after which the clock has that unit."""
+"""Number of further clock steps in the same unit after which this unit is accepted."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest clock step in s from which the unit is learnt; arrival times blur shorter ones."""
+"""Shortest clock step in s from which the unit is learnt; arrival times are too inexact for shorter
+ones."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -82,7 +84,7 @@ class Gate(Generic[Group]):
 
 
 class TicksGate(Gate[Ticks]):
-    """Check of ticks, which also learns the unit of the board's clock and then requires it."""
+    """Check of ticks. It also learns the unit of the board's clock, and then requires this unit."""
 
     def __init__(self) -> None:
         super().__init__(_ticks_follow)

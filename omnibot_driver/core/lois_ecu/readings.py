@@ -16,7 +16,7 @@ from omnibot_driver.core.readings import DisplacementReading
 class FixReading:
     """GPS position in degrees, north and east positive.
 
-    ``valid``: it is not 0/0, and the GPS has a date.
+    ``valid``: the position is not 0/0, and the GPS has a date.
     """
 
     latitude_deg: float
@@ -49,7 +49,7 @@ class RecordReading:
 
 @dataclass(frozen=True, slots=True)
 class RecordComes:
-    """Notice that lines of a requested record arrive; a complete one takes up to 1.3 s."""
+    """Notice that lines of a requested record are arriving; a complete record takes up to 1.3 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class RecordFailed:
 
 @dataclass(frozen=True, slots=True)
 class TerminalLeft:
-    """Notice that a terminal mode has ended, in which presses of the e-stop button are unknown."""
+    """Notice that a terminal mode has ended; presses of the e-stop button in it are unknown."""
 
 
 LoisReading = (

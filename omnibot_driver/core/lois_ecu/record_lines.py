@@ -26,7 +26,7 @@ class GroupStatistics:
     """Counters of groups and records since their creation.
 
     ``damaged_groups``: discarded groups and records; ``damaged_records``: the records among them;
-    ``implausible``: groups that were complete and cannot be true; ``unknown_lines``: valid lines
+    ``implausible``: complete groups whose values are not plausible; ``unknown_lines``: valid lines
     that are not a report.
     """
 
@@ -39,8 +39,8 @@ class GroupStatistics:
 class RecordAssembler:
     """Assembler of the lines of a record.
 
-    Call ``add`` for its lines, ``cut_off`` when another message comes, and ``damage`` where
-    characters were not a line.
+    Call ``add`` for the lines of the record, ``cut_off`` when another message comes, and ``damage``
+    when characters come that are not a line.
     """
 
     def __init__(self, statistics: GroupStatistics) -> None:
@@ -93,8 +93,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether this line ends the record.
 
-        The end of a torque record looks like a reading of two motors without current, so it is
-        valid only after all samples.
+        The end of a torque record looks like a sample of two motors without current, so it is
+        accepted as the end only after all samples.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Request of a record, sent again until the record begins to arrive, as the board may lose lines.
+"""Request for a record. It is sent up to three times, because the board may lose lines.
 
-The request also finds out whether the record arrives or fails. Each repetition makes the board
-start the record anew, so all repetitions are sent within a short time.
+The repetitions end when the record begins to arrive. Each repetition makes the board restart the
+record, so all are sent within a short time. This module also detects whether the record arrives or
+fails.
 """
 
 import math
@@ -30,15 +31,15 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s at which the request is sent: further apart than the board is deaf for, and not by a
-multiple of its usual periods."""
+"""Times in s at which the request is sent. The intervals are longer than the board can be deaf, and
+are not multiples of its usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
-"""Time unit in s of an RPM record, by the unit of 0x12's time: the public firmware departs from the
-manual in both."""
+"""Time unit in s of an RPM record, by the unit of the time in 0x12. The public firmware differs
+from the manual in both units."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
-    """Return the command for a record. Raises RequestRefused if it could not complete."""
+    """Return the command for a record. Raises RequestRefused if the board could not complete it."""
     if not 0 < samples <= MOST_SAMPLES:
         raise RequestRefused(
             f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
@@ -53,7 +54,7 @@ def command_of(kind: RecordKind, samples: int) -> Command:
 
 
 class RecordRequest:
-    """Request of one record; ``kind``: the kind that is awaited, or None."""
+    """Request for one record; ``kind``: the kind of the awaited record, or None."""
 
     def __init__(self) -> None:
         self.kind: RecordKind | None = None
@@ -82,7 +83,7 @@ class RecordRequest:
         if self.kind is None:
             return found
         if decoder.in_record:
-            self._command = None  # a repetition would start it anew
+            self._command = None  # a repetition would restart the record
         for place, reading in enumerate(found):
             if isinstance(reading, Record):
                 self._end()
@@ -102,7 +103,7 @@ class RecordRequest:
 
     @property
     def wake_at(self) -> float:
-        """Time of the next ``due``; infinity while nothing is left to send."""
+        """Time at which to call ``due`` next; infinity while nothing is left to send."""
         if self._command is None or self._said == len(SAID_AFTER_S):
             return math.inf
         if self._begun_s == math.inf:

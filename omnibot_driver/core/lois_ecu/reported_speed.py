@@ -2,9 +2,10 @@
 
 """Corrections of one wheel by the speeds that a LOIS ECU reports for it.
 
-A speed is that of the wheel's last tick, which the board keeps until the next. It is a measurement
-only if the wheel has ticked since, if the tick did not wait while the board sent, and if the wheel
-is not at rest. Works on reported speeds and the motion filter, without messages.
+A reported speed is that of the wheel's last tick, and the board keeps it until the next tick. It is
+a new measurement only if the wheel has ticked since the last report, if this tick was not delayed
+while the board sent, and if the wheel is not at rest. Works on reported speeds and the motion
+filter, without messages.
 """
 
 import math
@@ -16,33 +17,38 @@ from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, W
 
 ODOMETRY_AGE_S: Final = 0.0135
 """Age in s of odometry when its last line arrives: a line of 14 characters takes 1.2 ms, and the
-content is from the beginning of the first line."""
+values are from the time at which the first line began."""
 DOUBT: Final = 3.0
-"""Residual, in standard deviations, beyond which it is not noise: the estimate is wrong."""
+"""Residual, in standard deviations, that shows an error of the estimate instead of noise."""
 FASTER_RPM: Final = 2.5
-"""Lowest speed in RPM to compare: a slower one may be that of a tick that lasted for a rest."""
+"""Lowest reported speed in RPM that is used: at a lower speed the wheel may have been at rest
+between the last two ticks."""
 LONGEST_PAUSE_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""Largest change of a wheel's speed, in RPM and in RPM per s: a larger one shows a tick that waited
-while the board sent something else."""
+"""Largest change of a wheel's speed: a constant in RPM, and a part in RPM per s. A larger change
+shows a tick that was delayed while the board sent something else."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""A wheel that is commanded steadily, with gains that the user set, stays this near its speed. One
-reading that differs by more is of a tick that waited, or of the tick behind it."""
+"""Largest difference from the expected speed, in RPM and as a fraction, of a wheel with a constant
+set-point and gains that the user set. A single speed that differs by more comes from a delayed
+tick, or from the tick after it."""
 COASTED_TICKS: Final = 1.0
-"""Ticks by which a wheel that comes to rest has rolled less than at its last reported speed."""
+"""Number of ticks by which a wheel that comes to rest rolls less far than its last reported speed
+suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
-"""Part of its time for which an unexpected change of speed may have lasted."""
+"""Fraction of the time between two reports for which an unexpected change of speed may have
+lasted."""
 UNSEEN_PART: Final = 0.6
-"""Largest part of ``WINDUP_M`` by which a wheel without a seen tick has wound up."""
+"""Largest fraction of ``WINDUP_M`` that the controller's integral can have reached while the wheel
+shows no tick."""
 
 
 class ReportedSpeed:
-    """The reported speed of the wheel with this index, which corrects ``motion``."""
+    """Correction of ``motion`` by the reported speed of the wheel with this index."""
 
     def __init__(self, motion: MotionFilter, index: int) -> None:
         self._motion, self._index = motion, index
@@ -53,15 +59,16 @@ class ReportedSpeed:
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Note the estimated speed for a time in which none was reported."""
+        """Note the estimated speed for ``duration_s`` in which no speed was reported."""
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """Take back the distance since the reported speed last changed, when the wheel stopped.
+        """Subtract the distance since the reported speed last changed: the wheel was at rest.
 
-        A wheel that has not turned since it was commanded to start has rolled nothing since then.
+        If the wheel has not turned since it was commanded to start, subtract the distance since
+        then.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -71,13 +78,13 @@ class ReportedSpeed:
         rolled_m = motion.way_m(self._index) - wheel.rolled_to_m
         too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
         motion.shift(self._index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
-        for state in (X, Y):  # it may have had another heading then
+        for state in (X, Y):  # the robot may have had another heading then
             motion.filter.disturb([(state, 1.0)], (too_far_m / 4) ** 2)
         motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
         motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
 
     def take(self, speed_mps: float, duration_s: float) -> None:
-        """Correct a wheel by the speed of its last tick, which the board keeps until the next."""
+        """Correct the wheel by a reported speed, which is that of its last tick."""
         motion, estimate = self._motion, self._motion.filter
         wheel, base = self._wheel, self._wheel.base
         rpm_mps, tick_m = motion.rpm_mps, motion.tick_m
@@ -127,7 +134,7 @@ class ReportedSpeed:
         return motion.tuned and wheel.steady and strays
 
     def _rest(self, told_mps: float, duration_s: float, *, repeated: bool) -> None:
-        """Decide whether this wheel is at rest by now, or rolls again."""
+        """Decide whether this wheel has come to rest, or rolls again."""
         motion, resting = self._motion, self.resting
         wheel, tick_m, speed = self._wheel, motion.tick_m, motion.speed_mps(self._index)
         sign = math.copysign(1.0, wheel.course.target_mps)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Proof by the board's tick counters that it has obeyed a reset, and what they cannot prove.
+"""Proof from the board's tick counters that it has obeyed a reset, and the limits of the proof.
 
-A count near zero proves nothing by itself: it may have been there before, or a wheel may have
-rolled back to it. Works on counts and times.
+A count near zero proves nothing by itself: the count may have been near zero before, or a wheel may
+have rolled back. Works on counts and times.
 """
 
 import math
@@ -12,20 +12,21 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.messages import Ticks
 
 FEW_TICKS: Final = 20
-"""Most ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
+"""Largest number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""Number of ticks that exceeds what a wheel rolls before its counts show an obeyed reset."""
+"""Number of ticks that a wheel cannot roll between a reset and the next counts."""
 STEADY_TICKS: Final = 3
-"""Lowest count of a wheel at rest that cannot come from backlash."""
+"""Lowest count of a wheel at rest from which backlash cannot turn the wheel back to zero."""
 UNPROVED_S: Final = 2.5
-"""Time in s to wait for a proof where none may come; meanwhile the reset is repeated."""
+"""Longest time in s to wait for a proof, because there may never be one; meanwhile the reset is
+repeated."""
 
 
 class ResetProof:
     """Search for a proof that the board has obeyed a reset.
 
-    ``before``: counts when the reset was sent, or None if unknown. ``steady``: they had not changed
-    for some time. ``remark``: what was not proved, as a sentence.
+    ``before``: counts when the reset was sent, or None if unknown. ``steady``: these counts had not
+    changed for some time. ``remark``: what was not proved, as a sentence.
     """
 
     def __init__(self, before: Ticks | None, *, steady: bool) -> None:
@@ -37,15 +38,14 @@ class ResetProof:
         """Note that the reset is repeated, and use the present counts if they prove more.
 
         Counts of wheels at rest prove more than those of wheels that rolled. Counts of wheels that
-        still roll are not better than the first ones.
+        still roll prove no more than the first ones.
         """
         if before is not None and steady and _largest(before) >= STEADY_TICKS:
             self._before, self._steady = before, steady
             self._waits_since_s, self._seen = math.inf, None
 
     def look(self, ticks: Ticks, now: float) -> bool:
-        """Return whether the counts are near zero, and the reset is proven or the wait for that
-        over."""
+        """Return whether the counts are near zero, and prove the reset or the wait has ended."""
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks
         if _largest(ticks) > FEW_TICKS:
@@ -63,7 +63,7 @@ class ResetProof:
 
     @property
     def remark(self) -> str:
-        """Sentence on what was not proved; empty where the counts prove the reset."""
+        """Sentence on what was not proved; empty if the counts prove the reset."""
         if self._proved:
             return ""
         if self._before is None:
@@ -71,8 +71,8 @@ class ResetProof:
         else:
             was = f"{self._before.left} and {self._before.right} ticks"
         return (
-            "reset sent, but unconfirmed: the wheel counters are near zero now and were near zero"
-            f" before ({was}), so they do not show whether the board obeyed"
+            "reset sent, but unconfirmed: the wheel counters are near zero now, but their values"
+            f" before the reset ({was}) do not prove that the board obeyed"
         )
 
 

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Chance that a wheel is at rest while the board keeps reporting the same speed for it.
+"""Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
-The public firmware keeps the speed of the last tick of a wheel at rest. A wheel that comes to rest
-slows down first, and its last tick gives 5 to 17 RPM: that number then stays. A wheel that rolls
-steadily repeats a number too, but not one that it has just fallen to. Works on the speeds that the
-board reports, one for each group, and on the time between them.
+For a wheel at rest, the public firmware keeps reporting the speed of the last tick. A wheel slows
+down before it comes to rest, so this speed is usually 5 to 17 RPM, and is then repeated. The speed
+of a wheel that rolls steadily is repeated too, but has not fallen just before. Works on the speeds
+that the board reports, one for each group, and on the time between them.
 """
 
 from collections import deque
@@ -14,29 +14,30 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""Range in RPM of the last speed of a wheel that came to rest: a wheel that starts shows less, and
-a faster one ticks once more before it is at rest."""
+"""Range in RPM of the last speed of a wheel that came to rest: a wheel that is starting shows a
+lower speed, and a faster wheel ticks once more before it is at rest."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""Rate of the clock, as part of real time, while speeds are not reported."""
+"""Rate of this module's clock, as a fraction of real time, while speeds are not reported."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Chances that the wheel is at rest, by the number of repetitions: after a fall to a speed beyond
-``FAST_RPM``, after a far fall, after a far fall from a speed that was reported once, and after a
-shorter fall; ``TUNED``: after each of them with gains that the user set. A wheel with such gains
-rarely comes to rest without a Stop, and often rolls at a steady speed after it has overshot. The
-chances were counted on the public firmware."""
+"""Probabilities that the wheel is at rest, by the number of repetitions of its speed. ``FAST``:
+after a fall to a speed above ``FAST_RPM``. ``FAR``: after a fall by ``FELL_FAR_RPM``. ``LONE``:
+after such a fall from a speed that was reported only once. ``NEAR``: after a smaller fall.
+``TUNED``: after any of these with gains that the user set. With such gains a wheel rarely comes to
+rest without a Stop, and often rolls at a steady speed after an overshoot. The probabilities were
+counted on the public firmware."""
 
 
 class RestingWheel:
-    """Estimate of the ``chance`` (0..1) that a wheel is at rest."""
+    """Estimator of the probability ``chance`` (0..1) that a wheel is at rest."""
 
     def __init__(self) -> None:
         self.forget()
@@ -63,7 +64,7 @@ class RestingWheel:
         self._lately.append((self._clock_s, rpm))
 
     def tell(self, rpm: float, since_s: float, *, tuned: bool = False) -> None:
-        """Take a reported speed without its sign, ``since_s`` after the one before.
+        """Process a reported speed without its sign, ``since_s`` after the speed before.
 
         ``tuned``: whether the controller has gains that the user set.
         """
@@ -71,7 +72,7 @@ class RestingWheel:
         if abs(rpm - self._told_rpm) < SAME_RPM:
             self._repeats += 1
         else:
-            # A lone fast speed comes from a late tick, after which the next one seems early.
+            # A single high speed comes from a delayed tick: the next tick then seems early.
             speeds = sorted({before for _, before in self._lately}, reverse=True)
             self._fell_rpm = speeds[1] - rpm if len(speeds) > 1 else 0.0
             self._lone = bool(speeds) and self._fell_rpm < FELL_FAR_RPM <= speeds[0] - rpm
@@ -86,7 +87,7 @@ class RestingWheel:
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
-        """Return the chances of rest by number of repetitions; empty if the wheel rolls."""
+        """Return the probabilities of rest by number of repetitions; empty if the wheel rolls."""
         if not SLOWEST_RPM < rpm < FASTEST_RPM:
             return ()
         if rpm > FAST_RPM:

@@ -2,7 +2,7 @@
 
 """Set-points for a LOIS ECU: the encoding of motions, and a memory of what was sent last.
 
-``outbound`` explains why set-points look as they do. Works on commands, times and written bytes.
+``outbound`` explains the choice of set-points. Works on commands, times and written bytes.
 """
 
 import math
@@ -23,9 +23,10 @@ CLEAR_AGAIN_S: Final = 0.15
 class SetPoints:
     """Encoder of set-points, with a memory of those that were sent.
 
-    ``saturated``: number of motions that were too fast. ``stopped_at_s``: time since which only
-    zeros were sent, infinite while the robot is driven. ``stood``: the robot was seen at rest since
-    then. ``moved_at_s``: when a motion was last sent.
+    ``saturated``: number of commands that were slowed because they were too fast. ``stopped_at_s``:
+    time since which only zeros were sent, infinite while the robot is driven. ``stood``: the robot
+    was seen at rest since ``stopped_at_s``. ``moved_at_s``: time at which a motion command was last
+    sent.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -47,7 +48,7 @@ class SetPoints:
         return self._said is not None and _moves(self._said)
 
     def wrote(self, data: bytes, now: float) -> list[SetRpm | SetDuty]:
-        """Record that these bytes went to the board; return the set-points in them."""
+        """Note that these bytes were sent to the board; return the set-points in them."""
         said = outbound.set_points(data, with_sum=self.settings.with_sum)
         for command in said:
             if _moves(command):
@@ -68,16 +69,16 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Send the clearing command again before the next set-points."""
+        """Send RPM 0/0 again before the next set-points."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
     def clears_at(self) -> float:
-        """The time of the clearing command after a Stop; infinity if none is due."""
+        """Time at which to send RPM 0/0 after a Stop; infinity if it need not be sent."""
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Return whether to send the clearing command now, and regard it as sent."""
+        """Return whether to send RPM 0/0 now, and treat it as sent."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S

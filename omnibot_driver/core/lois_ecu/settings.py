@@ -14,7 +14,8 @@ DriveMode = Literal["rpm", "duty"]
 USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
     {Stream.TICKS: 200, Stream.ODOMETRY: 200}
 )
-"""Periods in ms that the odometry needs. Shorter ones make the board deaf for more of the time."""
+"""Periods in ms that the odometry needs. With shorter periods the board sends for a larger part of
+the time, in which it cannot receive."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,12 +25,12 @@ class LoisEcuSettings:
     ``inverted``: the board's left wheel is the robot's right one, and the other way round.
     ``drive_mode``: whether ``cmd_vel`` is sent as RPM or as duty. ``duty_scale``: percent of duty
     for each m/s of a rim; ``max_duty``: largest percentage for a motor. ``low_pass``: 0..1, the
-    part of a new set-point that each step of the speed controller takes over; a board without it
-    never turns its wheels in RPM mode. ``written``: further settings that the user wants on the
-    board. ``periods_ms``: periods of what the board sends by itself; others stay as they are.
-    ``with_sum``: lines to the board have a checksum. ``declination_rad``: of magnetic north, east
-    positive. ``odom_rate_hz``: how often the odometry is published, predicted from one group to the
-    next.
+    fraction of a change of the set-point that each step of the speed controller applies; until it
+    is written, the wheels never turn in RPM mode. ``written``: further settings that the user wants
+    on the board. ``periods_ms``: periods of the messages that the board sends periodically; the
+    periods of other messages are not changed. ``with_sum``: lines to the board have a checksum.
+    ``declination_rad``: declination of magnetic north, east positive. ``odom_rate_hz``: how often
+    the odometry is published, predicted from one group to the next.
     """
 
     wheel_radius_m: float = 0.13

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Covariance of a pose due to errors of the wheels' sizes, and to a slip common to both wheels.
+"""Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-Such an error is constant during a drive, so the error of the yaw grows, and the error of the pose
-soon is not proportional to the cause. So the drive is repeated with each error in either direction:
-the spread of the resulting poses is the covariance. Works on distances of the wheels.
+Such an error is constant during a drive, so the yaw error grows, and soon the error of the pose is
+not proportional to its cause. Therefore the drive is computed again with each error, once positive
+and once negative. The spread of the resulting poses is the covariance. Works on distances of the
+wheels.
 """
 
 import math
@@ -17,11 +18,12 @@ KINDS: Final = 3
 """Number of kinds of errors: size of the left wheel, size of the right wheel, slip of both."""
 WHEEL_SCALE: Final = 0.01
 WHEEL_SLIP: Final = 0.005
-"""Standard deviations of a wheel's relative size, and of the part that slip takes from both."""
+"""Standard deviations of a wheel's relative size, and of the fraction of both wheels' distances
+that is lost by slip."""
 
 
 class SizeErrors:
-    """Drives with errors of the wheels' sizes and slip."""
+    """Drives that are computed again with errors of the wheels' sizes and with slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)
@@ -38,7 +40,7 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """Continue all drives by these distances; a negative ``track_m`` turns the other way."""
+        """Continue all drives by these distances; a negative ``track_m`` reverses the turns."""
         self._believed = _moved(self._believed, left_m, right_m, track_m)
         self._places = [
             _moved(place, left * left_m, right * right_m, track_m)

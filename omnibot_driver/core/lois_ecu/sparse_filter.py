@@ -2,8 +2,8 @@
 
 """Kalman filter of a few states, in plain numbers, without a matrix library.
 
-Most of the transition is the identity, and a measurement is of one to three states. Both are given
-as their non-zero terms, so that a step costs little.
+Most rows of the transition matrix are those of the identity matrix, and a measurement depends on
+one to three states. Both are given as their non-zero terms, so that a step takes little time.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ class SparseFilter:
         self.covariance = [[0.0] * states for _ in range(states)]
 
     def propagate(self, rows: Mapping[int, Terms]) -> None:
-        """Propagate the covariance by a transition; ``rows`` are those that differ from identity.
+        """Propagate the covariance by a transition, whose ``rows`` differ from the identity matrix.
 
         The mean is not changed, as its transition need not be linear.
         """
@@ -32,7 +32,7 @@ class SparseFilter:
         self.covariance = whole
 
     def disturb(self, terms: Terms, variance: float) -> None:
-        """Add to the covariance one error of this variance, which changes states by ``terms``."""
+        """Add one error of this variance to the covariance; ``terms``: its effect on the states."""
         covariance = self.covariance
         for i, a in terms:
             row = covariance[i]
@@ -40,7 +40,7 @@ class SparseFilter:
                 row[j] += variance * a * b
 
     def forget(self, state: int, mean: float, variance: float) -> None:
-        """Set a state to this value, independent of all others."""
+        """Set a state to this mean and variance, uncorrelated with all other states."""
         covariance = self.covariance
         for row in covariance:
             row[state] = 0.0
@@ -49,12 +49,12 @@ class SparseFilter:
         self.mean[state] = mean
 
     def variance_of(self, terms: Terms) -> float:
-        """Return the variance of the sum of states that ``terms`` weight."""
+        """Return the variance of the sum of states, weighted by ``terms``."""
         covariance = self.covariance
         return max(sum(a * b * covariance[i][j] for i, a in terms for j, b in terms), 0.0)
 
     def measure(self, terms: Terms, residual: float, variance: float) -> None:
-        """Correct all states by a measurement of this combination of states.
+        """Correct all states by a measurement of the sum of states, weighted by ``terms``.
 
         ``residual``: measured minus expected value. ``variance``: that of the measurement.
         """

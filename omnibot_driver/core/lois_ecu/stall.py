@@ -2,16 +2,17 @@
 
 """Detection of a wheel that is commanded to turn but stands still: it may never start by itself.
 
-For the public firmware's controller, a wheel at rest keeps its last speed. If that is more than a
-new, slower set-point, the motor gets no power. RPM 0/0 clears it.
+The public firmware's controller continues to use the last measured speed of a wheel at rest. If
+this speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
 
-Ticks show a wheel that turns forward; 0x20 shows one that should turn backward. If that wheel is at
-rest, the pose of 0x20 does not change while nothing ticks, and while the other wheel ticks its
-velocity repeats the same speed of this one. A wheel that rolls steadily repeats a speed too, but
-not far above its set-point: there the controller gives it no power, so it would become slower. Two
-kinds of wheels are different. A feed-forward gives power at any speed. And a controller that was
-saturated may keep full power, until RPM 0/0 starts it anew: such a wheel is faster than the last
-speed of any wheel that comes to rest. Works on set-points, reports and times.
+Ticks show whether a wheel turns forward, and 0x20 whether it turns backward. If a wheel that should
+turn backward is at rest, there are two cases. While the other wheel is also at rest, the pose in
+0x20 does not change. While the other wheel turns, 0x20 repeats the same speed for the wheel at
+rest. A wheel that rolls steadily also repeats a speed, but this speed is not far above its
+set-point: there the controller gives no power, so the wheel would slow down. Two exceptions have
+power at such a speed. A feed-forward gives power at any speed. A saturated controller may keep full
+power until RPM 0/0 restarts it; the wheel is then faster than any wheel that comes to rest. Works
+on set-points, reports and times.
 """
 
 import math
@@ -23,23 +24,25 @@ from omnibot_driver.core.lois_ecu.resting import FASTEST_RPM
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 STALLED_S: Final = 2.0
-"""Time in s without a sign of motion; with the firmware's own gains a wheel starts in half of
-it."""
+"""Time in s without a sign of motion after which a wheel is stalled; with the firmware's own gains
+a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""Limits above a set-point, as a factor and in RPM, beyond which a repeated speed is a kept one: a
-wheel that rolls backward is up to 10 % and one RPM faster than its set-point."""
+"""Limits above a set-point, as a factor and in RPM. A repeated speed beyond both is the last speed
+of a wheel at rest, because a wheel that rolls backward exceeds its set-point by at most 10 % and
+one RPM."""
 UNLIKE: Final = 1.15
-"""Greatest ratio of the speeds, each over its set-point, of two wheels that roll backward."""
+"""Largest ratio of the relative speeds (speed divided by set-point) of two wheels that roll
+backward."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
-"""Number of groups that must agree, because few arrive on a bad line."""
+"""Smallest number of groups that must show no motion, because on a bad line few groups arrive."""
 
 
 class StallWatch:
-    """Watch of both wheels; ``stalled`` once for each ``STALLED_S`` that one is at rest.
+    """Watch of both wheels; ``stalled`` reports a wheel at rest once in each ``STALLED_S``.
 
     ``settings`` may be replaced at any time. ``saturated``: whether each wheel's controller may be
     saturated, so that the wheel rolls.
@@ -51,13 +54,14 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.saturated = [False, False]
         self._quiet = [0, 0]
-        """Groups since then that could have shown this wheel's motion and did not."""
+        """Number of groups since ``_seen_at`` that could have shown each wheel's motion, but did
+        not."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Record a set-point. A duty bypasses the controller, so it cannot stall a wheel."""
+        """Note a set-point. A duty bypasses the controller, so it cannot stall a wheel."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]
@@ -75,7 +79,7 @@ class StallWatch:
         now: float,
         resting: tuple[bool, bool] = (False, False),
     ) -> None:
-        """Process a report: ticks show a forward wheel's motion, and odometry a backward one's."""
+        """Process a report: ticks show motion forward, and odometry shows motion backward."""
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
             told = rim_speeds(report, self.settings.track_m)
@@ -109,8 +113,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for this wheel.
 
-        It does if the speed repeats, and either the other wheel's speed has changed or this speed
-        is far above the set-point.
+        This is so if the speed repeats, and if the other wheel's speed has changed or the repeated
+        speed is far above the set-point.
         """
         if told is None or self._told is None:
             return False
@@ -134,7 +138,7 @@ class StallWatch:
         return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
-        """Return whether the reported speed is that of the set-point or more."""
+        """Return whether the wheel gets no power: its reported speed reaches the set-point."""
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS
 

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes into a terminal mode and out of it, and the standstill that any change of mode waits for.
+"""Changes of the terminal mode, and the standstill that is needed before a change of any mode.
 
-In a terminal mode the board passes a sensor's lines through and silences its protocol. It still
-obeys set-points, but it does not show motion, and the public firmware does not report presses of
-its button. So the robot is stopped first, and is not driven before the protocol is received again.
-Whatever is written is repeated until its effect is seen. Works on modes and times.
+In a terminal mode the board forwards a sensor's lines and sends no messages of its own. It still
+obeys set-points, but does not report motion, and the public firmware does not report presses of the
+e-stop button. So the robot is stopped first, and is not driven until the board's own messages
+arrive again. A mode is written repeatedly until the received data shows that the board obeys. Works
+on modes and times.
 """
 
 import math
@@ -18,7 +19,7 @@ UNPROVED_S: Final = 2.0
 """Time in s for which Stop is sent to a robot whose standstill cannot be seen."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""Time in s after a mode was written in which reports from before the change still arrive."""
+"""Time in s after the writing of a mode, in which earlier reports may still arrive."""
 
 
 class ModeChange:
@@ -31,12 +32,13 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """Sensor's mode that was written to the board; None once the protocol is received again."""
+        """Sensor's mode that was written to the board; None once the board's own messages arrive
+        again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
         self._stopping_since_s: float | None = None
         self.left = False
-        """Whether the protocol is received again after a terminal mode; the reader clears it."""
+        """Whether a terminal mode has ended; the code that reads this attribute clears it."""
 
     def connect(self) -> None:
         """Begin a new connection: the board may be in any mode."""
@@ -60,7 +62,7 @@ class ModeChange:
 
     @property
     def sensor_wanted(self) -> bool:
-        """Whether a sensor's mode is wanted, in which the protocol is silent."""
+        """Whether a sensor's mode is wanted, in which the board sends no messages of its own."""
         return self.wanted in SENSORS
 
     @property
@@ -97,7 +99,7 @@ class ModeChange:
         return True
 
     def due(self, now: float, *, settled: bool) -> TerminalMode | None:
-        """Return the mode to write now, or None. ``settled``: other settings are not waiting."""
+        """Return the mode to write now, or None. ``settled``: all settings are sent."""
         if self._stopping or now < self._again_at_s:
             return None
         if self.sensor_wanted:
@@ -117,4 +119,4 @@ class ModeChange:
             return
         if not self.sensor_wanted:
             self.left = True
-        self._told = None  # a sensor's mode is requested again
+        self._told = None  # so that ``due`` writes a sensor's mode again

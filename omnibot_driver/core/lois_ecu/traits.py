@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Capabilities of a LOIS ECU, and what to check when a robot with one does not obey."""
+"""Capabilities of a LOIS ECU, and advice on what to check when its robot does not obey."""
 
 from typing import Final
 
@@ -10,7 +10,8 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
 STANDS_AFTER_S: Final = 0.6
-"""Time in s without a tick that shows a wheel at rest; the slowest, at 2 RPM, ticks every 0.5 s."""
+"""Time in s without a tick after which a wheel is at rest; the slowest wheel, at 2 RPM, ticks every
+0.5 s."""
 TRAITS: Final = Traits(
     imu_period_s=None,
     authorities=frozenset({Authority.BASE, Authority.WHEELS}),
@@ -22,7 +23,7 @@ TRAITS: Final = Traits(
     stands_after_s=STANDS_AFTER_S,
     unproved_s=2.0,
     slack_mps=0.15,  # a tick in 0.2 s is 0.07 m/s
-    slack_radps=1.2,  # with the board's own gains the wheels do not speed up alike
+    slack_radps=1.2,  # with the board's own gains one wheel accelerates faster
     advice={
         Fault.WRONG_WAY: "check `inverted`, and the wiring of motors and encoders",
         Fault.WRONG_TURN: "check `inverted`, and the wiring of motors and encoders",
@@ -40,7 +41,7 @@ TRAITS: Final = Traits(
             " `low_pass`; in duty mode, `duty_scale`"
         ),
         Fault.HELD_BY_ESTOP: (
-            "check whether the e-stop button is held, and motor power; the board reports each"
+            "check motor power, and whether the e-stop button is held; the board reports each"
             " press and release only once"
         ),
     },

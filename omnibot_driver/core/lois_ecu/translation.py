@@ -2,8 +2,8 @@
 
 """Translation of a LOIS ECU's reports to readings in SI units.
 
-It also detects a restart of the board: its ticks are near zero again, or its clock is behind. Works
-on reports, without lines.
+This module also detects a restart of the board: the ticks are near zero again, or the board's clock
+has gone back. Works on reports, without lines.
 """
 
 import math
@@ -43,8 +43,8 @@ RESTARTED_TICKS_PER_S: Final = 60.0
 """Fall of the counts towards zero, in ticks and in ticks per s, beyond which the board has
 restarted: wheels do not roll back that fast."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which wheels may have rolled back if the clock contradicts the time since
-the last ticks. The decoder then forgets the clock's unit."""
+"""Longest time in s for which wheels may have rolled back, if the board's clock contradicts the
+time since the last ticks. (The decoder has then forgotten the clock's unit.)"""
 
 
 class Translation:
@@ -132,7 +132,7 @@ class Translation:
                 self._time.sent(1)
                 clock = (report.hours, report.minutes, report.seconds)
                 if clock < self._clock:
-                    self._date = None  # after midnight the date is another one
+                    self._date = None  # after midnight there is a new date
                 self._clock = clock
                 self._gps_works |= any(clock)
                 return [TimeReading(self._utc_s(report))]
@@ -175,7 +175,7 @@ class Translation:
 
     @property
     def needs_date(self) -> bool:
-        """Whether the last reports contain a position or a time, and its date is unknown."""
+        """Whether the last reports contain a GPS position or time, but the date is unknown."""
         return self._gps_works and self._date is None
 
     @property

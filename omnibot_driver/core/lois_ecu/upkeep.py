@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Everything that is written to a LOIS ECU besides motions and requests, and when.
+"""Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
-That is its settings, its mode, a record, RPM 0/0 after a Stop, and the recovery of a board that is
-silent or ignores commands. Composes the parts that know each of these; must not know what is read.
+It contains settings, the terminal mode, requests for records, RPM 0/0 after a Stop, and the
+recovery of a board that is silent or ignores commands. Combines the classes for each of these. Must
+not know what the board sends.
 """
 
 import math
@@ -38,7 +39,7 @@ class Upkeep:
         self.heard_at_s = self._recovered_at_s = -math.inf
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """Use other settings: changed ones are written; another mode stops the robot first."""
+        """Use new settings: write those that changed; a change of mode first stops the robot."""
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
             self.change.stop_first(f"drive_mode is changing to {settings.drive_mode}")
@@ -85,7 +86,7 @@ class Upkeep:
         )
 
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
-        """Return Stop or the terminal mode, while one of them has to be sent."""
+        """Return Stop or the terminal mode, if one of them is due."""
         change, with_sum = self.change, self.writer.settings.with_sum
         if change.stops(now, stands=stands):
             return outbound.lines(outbound.STOP, with_sum=with_sum)

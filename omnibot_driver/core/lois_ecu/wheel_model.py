@@ -2,8 +2,8 @@
 
 """Model of one wheel's commands: when they take effect, and what the firmware then counts.
 
-The public firmware keeps an RPM target for each wheel. Its sign decides whether ticks count, and
-which sign the measured speed gets. Works on set-points and times.
+The public firmware stores an RPM target for each wheel. The sign of the target decides whether
+ticks are counted, and is the sign of the measured speed. Works on set-points and times.
 """
 
 import math
@@ -15,7 +15,7 @@ HEARD_S: Final = 0.008
 """Time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""Periods of the speed controller in s, by the manual and of the public firmware."""
+"""Period of the speed controller in s: by the manual, and in the public firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 
@@ -34,7 +34,7 @@ class _Effect:
 
 
 class WheelModel:
-    """The command of one wheel, advanced by ``carry_out``. Speeds are of the rim, as commanded.
+    """The command of one wheel; ``carry_out`` advances it. Speeds are commanded rim speeds.
 
     ``kind``, ``target_mps``: the motor's command. ``hidden_mps``: the firmware's RPM target; in
     duty mode it stays as it was, but ticks under negative duty lower it.
@@ -45,8 +45,8 @@ class WheelModel:
         self.target_mps = 0.0
         self.hidden_mps = 0.0
         self.step_s = step_s
-        """Period of the controller in s. A command takes effect with its next step, after half a
-        period on average."""
+        """Period of the controller in s. A command takes effect with the controller's next step,
+        which comes after half a period on average."""
         self._effects: deque[_Effect] = deque(maxlen=128)
         self._heard: tuple[CommandKind, float] = ("rpm", 0.0)
         self._rpm_mps = 0.0
@@ -67,7 +67,7 @@ class WheelModel:
         return bool(self._effects)
 
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
-        """Record that this command was written at ``at_s``."""
+        """Note that this command was written at ``at_s``."""
         if (kind, speed_mps) == self._heard and not (kind == "rpm" and not speed_mps):
             return
         halts = kind == "rpm" and (not speed_mps or speed_mps * self._rpm_mps < 0)

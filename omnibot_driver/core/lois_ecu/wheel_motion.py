@@ -3,9 +3,9 @@
 """Motion of a wheel under its commands, as a step of the motion filter.
 
 A wheel coasts without power, follows a duty, or is driven by the board's speed controller. The
-controller sees the speed that was measured last. With the public firmware a wheel at rest keeps
-that speed, so it may get little power, or none. The user's gains and motors are unknown, therefore
-the noise is large. Works on commands and the states of one wheel.
+controller uses the last measured speed. The public firmware does not set this value to zero when
+the wheel stops, so a wheel at rest may get little power, or none. The user's gains and motors are
+unknown, so the assumed noise is large. Works on commands and the states of one wheel.
 """
 
 import math
@@ -19,19 +19,21 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², counted ticks in
 m, and the speed in m/s that was measured last."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""States of the body: position, and the turn and distance that 0x20 should show; then of each wheel
-a bias, and the part by which it rolls backward faster than its set-point."""
+"""States of the body: position, and the turn and distance that 0x20 should show. ``BIAS`` and
+``EXCESS`` are the first of two states each, one for each wheel: a bias, and the fraction by which
+the wheel rolls backward faster than its set-point."""
 STATES: Final = 18
 
 CONTROL_RATE: Final = 2.0
 """Rate in 1/s at which the controller reaches its target, as a critically damped system."""
 PUSH_PER_SPEED: Final = 2.2
-"""Standard deviation of the acceleration after a change of speed, per m/s of it, in 1/s."""
+"""Standard deviation of the acceleration after a change of speed, per m/s of this change, in
+1/s."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that the ground adds to a speed, in (m/s)² per s."""
 WINDUP_M: Final = 0.08
-"""Integral of the missing speed, in m, at which the controller sets a resting wheel in motion."""
+"""Integral of target minus measured speed, in m, at which a wheel at rest starts to move."""
 DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
@@ -40,10 +42,12 @@ DRY_MPS2: Final = 0.7
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
-"""Longest time in s for which a wheel rolls on in the old direction after a change of sign."""
+"""Longest time in s for which a wheel rolls on in the old direction after its set-point has changed
+its sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Time in s, with the board's own gains and with gains that are set, for which a wheel that is
-halted rolled otherwise than the model says: with the public firmware's own gains it swings."""
+"""Time in s for which the speed of a halted wheel has differed from the model: with the board's own
+gains, and with gains that the user set. With the public firmware's own gains the speed
+oscillates."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -53,9 +57,9 @@ Terms = list[tuple[int, float]]
 
 @dataclass(slots=True)
 class Step:
-    """One step of the filter by ``dt`` s: ``new`` means, rows of the transition, and noises.
+    """One step of the filter over ``dt`` s: the ``new`` means, rows of the transition, and noises.
 
-    ``unsure_mps``: standard deviation of the speed that each wheel's controller sees.
+    ``unsure_mps``: standard deviation of the measured speed that each wheel's controller uses.
     """
 
     dt: float
@@ -68,8 +72,8 @@ class Step:
 class Wheel:
     """State of one wheel in addition to its states in the filter, which begin at index ``base``.
 
-    ``blind``: since this was last cleared, the wheel moved or had a target while its ticks did not
-    count.
+    ``blind``: whether the wheel has moved, or has had a target, while the board did not count its
+    ticks. The user of this class clears it.
     """
 
     def __init__(self, base: int) -> None:
@@ -80,24 +84,25 @@ class Wheel:
         self.begin_again()
 
     def begin_again(self) -> None:
-        """Forget all commands and history, as the board has just started."""
+        """Forget all commands and history, because the board has just started."""
         self.course = WheelModel(self.course.step_s)
         self.restless_mps = 0.0
         """Largest recent difference of target and speed, in m/s; decays with time."""
         self.unsettled_mps = 0.0
         """Difference of target and speed at the last set-point, in m/s; decays with time."""
         self.wound_m = 0.0
-        """Integral of the missing speed since the controller was reset, in m."""
+        """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
         """Whether the wheel is without power until the controller has wound up."""
         self.rolls_on = False
-        """Whether the reported speed may be that from before the target changed its sign."""
+        """Whether the reported speed may be from before the target changed its sign."""
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
         """Speed in m/s when the controller was reset, and the time in s since then."""
         self.locked = False
-        """Whether the wheel rests without power, as the speed measured last exceeds its target."""
+        """Whether the wheel is at rest without power, because the last measured speed exceeds its
+        target."""
         self.rests = False
         """Whether the wheel is at rest, as shown by a measured speed that stays the same."""
         self.blind = False
@@ -112,7 +117,7 @@ class Wheel:
 
     @property
     def steady(self) -> bool:
-        """Whether the set-point has been the same for long enough to be reached."""
+        """Whether the set-point has been constant for long enough for the wheel to reach it."""
         return self.restless_mps < STEADY_PART * abs(self.course.target_mps)
 
     def counts(self, speed_mps: float, *, signed: bool) -> float:
@@ -127,7 +132,8 @@ class Wheel:
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
         """Add one step of this wheel to ``step``.
 
-        ``holds``: the measured speed is kept at rest. ``signed``: ticks count in both directions.
+        ``holds``: the board keeps the last measured speed of a wheel at rest. ``signed``: ticks
+        count in both directions.
         """
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]

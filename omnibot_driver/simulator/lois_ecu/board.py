@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU and its robot: it obeys, measures and sends in steps of a millisecond.
+"""The simulated LOIS ECU and its robot, which advance in steps of a millisecond.
 
-Pure: bytes in, ticks of ``tick_s``, bytes out; the same settings and input give the same output.
-Knows the manual's table and, by ``Quirks``, the public firmware. Must not know ports or real time.
+Pure: takes bytes, advances by ``tick_s``, and returns bytes; the same settings and input give the
+same output. Knows the manual's table of messages and, through ``Quirks``, the public firmware. Must
+not know ports or real time.
 
 Assumptions where the manual says nothing: set points never expire; encoder ticks are signed and
 wrap at 2³²; the button is reported on press and on release, and both set the set points to zero.
@@ -116,8 +117,7 @@ class SimulatedLois:
 
     @property
     def terminal_mode(self) -> int:
-        """Terminal mode that 0x11 wrote last; in modes other than 0 and 4 the board sends no own
-        lines."""
+        """Terminal mode that 0x11 wrote last; in all but 0 and 4, the board's own lines stop."""
         return self._terminal.mode
 
     @property
@@ -155,11 +155,11 @@ class SimulatedLois:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
-        """Block these wheels by hand, and release the wheels that are not named."""
+        """Block the wheels for which the argument is true; release the others."""
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
-        """Receive bytes; they arrive at 115200 baud, beginning now, and ``now`` is ignored."""
+        """Begin to receive these bytes at 115200 baud; ``now`` and ``channel`` are ignored."""
         self._uart.receive(data)
 
     def advance(self) -> list[Packet]:

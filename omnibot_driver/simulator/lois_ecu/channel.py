@@ -29,8 +29,8 @@ class WheelChannel:
 
     ticks: encoder ticks, as 0x12 reports them. rpm: measured speed in RPM, an integer. exact_rpm:
     measured speed in RPM, with fraction. duty_percent: duty of the motor, -100..100. open_loop:
-    whether a duty is commanded, not a speed. record, record_left: samples taken, number of samples
-    still to take.
+    whether a duty is commanded, not a speed. record, record_left: the samples taken, and the number
+    of samples still to take.
     """
 
     def __init__(
@@ -49,8 +49,8 @@ class WheelChannel:
         self._count = 0
         self._ticked_s = 0.0
         self.turned_ticks = 0
-        """Ticks since the odometry last read this number; signed by the true direction of the
-        wheel."""
+        """Ticks since the odometry last read this number; the sign is that of the wheel's true
+        direction."""
         self.record: list[int] = []
         self.record_left = 0
         self._records_torque = False
@@ -117,7 +117,7 @@ class WheelChannel:
     # Commands
 
     def command_rpm(self, rpm: int) -> None:
-        """Set the speed target in RPM and close the loop; zero or a reversal stops the motor."""
+        """Set the speed target in RPM, with closed loop; zero or a reversal stops the motor."""
         self.open_loop = False
         if rpm == 0 or rpm * self._next_target < 0:
             self._halt()

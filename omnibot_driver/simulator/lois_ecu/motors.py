@@ -84,7 +84,7 @@ class Motor:
 
 
 class Encoder:
-    """An encoder disc; the short level is ``short`` of a period long, the long level the rest.
+    """An encoder disc. The fraction ``short`` of each period is the short level, the rest the long.
 
     ``steps``: edges per turn. ``noise``: standard deviation of the length of a level, as a fraction
     of half a period.
@@ -94,7 +94,7 @@ class Encoder:
         self._periods = 0.0
         self._per_turn = steps / 2
         self._short = short
-        # The distance between two marks has the position errors of both, hence the root of 2.
+        # The distance between two marks has the errors of both, hence the square root of 2.
         self._off = [
             noise / 2 / 2**0.5 * random.gauss(0.0, 1.0) for _ in range(steps if noise else 1)
         ]
@@ -139,11 +139,11 @@ class Gains:
 
 
 class SpeedController:
-    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) by the trapezoidal rule, as the firmware extends it.
+    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) by the trapezoidal rule, with firmware additions.
 
-    The coefficients are for steps of ``NOMINAL_STEP_S``, whatever the true step is. An output
-    beyond 100 % does not enter the state (anti-windup), and an output against the target becomes
-    zero.
+    The coefficients are for steps of ``NOMINAL_STEP_S``, even if the true step differs. An output
+    beyond 100 % does not enter the state (anti-windup). An output whose sign differs from the
+    target's becomes zero.
     """
 
     def __init__(self, gains: Gains) -> None:

@@ -18,7 +18,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--firmware",
         choices=get_args(Firmware),
         default="documented",
-        help="behaviour of the board: as in the manual (documented, the default) or that of the"
+        help="behaviour of the board: that of the manual (documented, the default) or that of the"
         " public firmware (firmware)",
     )
     parser.add_argument(

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of a simulated LOIS ECU and its robot: nominal values, planted errors, firmware.
+"""Settings of a simulated LOIS ECU and its robot: nominal values, deliberate errors, firmware.
 
 ``Quirks`` are the deviations of the public firmware from the manual, one switch each, so that a
 driver can be tested against both, or against a single deviation.
@@ -15,15 +15,18 @@ class Quirks:
     """Deviations of the public firmware from the manual: none by default, all in ``FIRMWARE``.
 
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
-    odometry_stands_at_equal_speeds: its position does not change while both integer RPMs are equal.
-    velocity_may_be_nan: two ticks within one count of the timer divide by zero.
+    odometry_stands_at_equal_speeds: the position in 0x20 does not change while both integer RPMs
+        are equal.
+    velocity_may_be_nan: two ticks within one count of the timer make the velocity in 0x20 NaN or
+        infinite, by a division by zero.
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
     keeps_speed_of_stalled_wheel: a wheel without ticks keeps its last measured speed.
     duty_drags_target: a negative duty command lowers the wheel's RPM target by 1 at each tick.
-    reverse_runs_fast: a negative duty of the controller does the same until the next control step.
+    reverse_runs_fast: a negative duty of the speed controller also lowers the target by 1 at each
+        tick, until the next control step.
     low_pass_starts_at_zero: the low pass of the target has gain 0, so the wheels do not follow an
         RPM target until 0x23 is written.
-    extra_settings: 0x21 to 0x23 exist.
+    extra_settings: the settings 0x21 to 0x23 exist.
     appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
     clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
     clock_stops_while_sending: the clock of the board stops while a message or record is sent.
@@ -33,14 +36,14 @@ class Quirks:
         progress is sent.
     odometry_period_is_fixed: writing the period of 0x20 has no effect.
     terminal_mode_zeroes_correction: every write of 0x11 overwrites the left short correction.
-    button_is_lost_in_terminal_mode: a press is not reported.
-    terminal_mixes_sensors: each mode forwards both sensors, character by character.
+    button_is_lost_in_terminal_mode: in a terminal mode, a press of the button is not reported.
+    terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set points.
-    terminal_passes_input_on: what the host sends is forwarded to the sensor at its baud rate (9600,
-        4800), and the board reads no further input until that is done.
+    terminal_passes_input_on: characters from the host are forwarded to the sensor at the sensor's
+        baud rate (9600, 4800), and the board reads no further input until they are forwarded.
     one_ball_in_six_seconds: 0x19 is ignored within 6 s of the previous ball.
-    gps_is_ignored: position, time and date are zeros.
-    headings_average_over_north: the mean of 359, 1 and 1 is 120.
+    gps_is_ignored: GPS position, time and date are zeros.
+    headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
     records_in_100_us: tick times are in 100 µs, not in 100 ns.
     torque_comes_as_rpm: the reply to 0x17 has command number 0x04.
     record_waits_for_one_more: a record of n headings is sent when sample n + 1 arrives.
@@ -48,7 +51,7 @@ class Quirks:
     lenient_hex: a line with a field that is not hexadecimal is obeyed if its checksum is right.
     limits_rpm: targets beyond 50 RPM are limited to 50 RPM.
     fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
-    slow_timer: a count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
+    slow_timer: a timer count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
     slow_boot: the board does not react for 2 s after power-up; it reads the input afterwards.
     """
 
@@ -99,7 +102,7 @@ class MotorSettings:
     """A first-order motor with dry friction.
 
     rpm_per_percent: speed per duty beyond the dead zone. dead_zone_percent: duty below which the
-    motor has no torque. time_constant_s: of the speed.
+    motor has no torque. time_constant_s: time constant of the speed.
     friction_rpm_per_s: additional deceleration without power.
     second_time_constant_s, dead_time_s: lag and delay of the power stage, before the motor.
     backlash_turns: play between motor and encoder, in turns of the wheel.

@@ -37,7 +37,7 @@ class Terminal:
         return self._to_sensor > 0
 
     def heard(self, count: int) -> None:
-        """Note ``count`` characters from the host, which some firmware forwards to the sensor."""
+        """Note ``count`` characters from the host; the public firmware forwards them."""
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)
 
@@ -50,7 +50,7 @@ class Terminal:
         return b""
 
     def mixed(self) -> bytes:
-        """Advance by one step; return a waiting character of each sensor, none while ``busy``."""
+        """Advance by one step; return a waiting character of each sensor, or b"" if ``busy``."""
         if self.busy:
             speed = CHARACTERS_PER_STEP.get(self.mode, BYTES_PER_STEP)
             self._to_sensor = max(self._to_sensor - speed, 0.0)

@@ -12,7 +12,7 @@ INPUT_DEPTH = 600
 
 
 class Uart:
-    """The port; with ``loses``, all but the first byte that arrives with interrupts off are lost.
+    """The port; if ``loses``, only the first byte that arrives while interrupts are off is kept.
 
     received: all bytes sent to the port. lost_bytes: number of bytes that were lost.
     input: characters received but not read yet.
