@@ -85,7 +85,7 @@ def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
-    """Return a function that opens a device, or any URL that pyserial knows."""
+    """Return a function that opens the port: a device, or a URL that pyserial supports."""
     return partial(SerialPort, values["port"], values["baudrate"])
 
 

@@ -163,7 +163,8 @@ _RANGES: Final = {
     "long_correction": (0.1, 10.0),
     "feed_forward": (0.0, 1000.0),
 }
-"""Least and largest value by kind: a negative gain is unstable, and Tn is a divisor."""
+"""Smallest and largest value for each kind of setting: a negative gain is unstable, and Tn is a
+divisor."""
 
 
 _UNITS: Final = {"tn": "s", "td": "s"}
@@ -236,7 +237,7 @@ SENT: Final = (
 
 
 def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
-    """Reject a terminal mode without checksum, since one setting of the board chooses both."""
+    """Reject a terminal mode without checksum: one setting of the board selects either."""
     if values["terminal_mode"] != "host" and not values["checksum"]:
         raise ParameterError(
             "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"
@@ -260,7 +261,7 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_possible_periods(values: Mapping[str, Any]) -> None:
     """Reject periods below ``SHORTEST_PERIOD_S``, and a period of ticks above 0.5 s or off.
 
-    A period of 0 would make the public firmware deaf to commands.
+    With a period near 0 the public firmware would always be sending, and would miss all commands.
     """
     for name in PERIODS:
         period_s = values[name]

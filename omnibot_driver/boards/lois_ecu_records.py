@@ -27,7 +27,7 @@ Row = tuple[object, ...]
 def table(reading: RecordReading) -> Iterator[Row]:
     """Yield the header, then one row for each sample; an unknown value is empty.
 
-    RPM: time from tick to tick in s, and the speed calculated from it, besides the board's own
+    RPM: time from tick to tick in s, the speed calculated from this time, and the board's own
     counts. Torque: counts of a 12 bit ADC, whose scale the board does not report. Heading: degrees
     clockwise from magnetic north.
     """
@@ -81,7 +81,7 @@ def file_name(kind: RecordKind, at_s: float) -> str:
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
     """Write the record to ``path``; return False, and leave no file, if ``wanted`` returns False.
 
-    Raises OSError.
+    Raises OSError if the file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Delay of a group of ticks: how late the group was read, from the board's time in the group.
+"""Estimation of how late a group of ticks was read, from the board's time in the group.
 
 The clock of the public firmware stops while the board sends, so it falls behind by 4 to 36 %. The
 missing time can be added: the number of lines sent is known, and each takes about 1.2 ms. The clock

@@ -64,8 +64,8 @@ _LONGEST: Final = 10
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
 Timed = tuple[float, Report]
-"""Arrival time of a report's last line in s, and the report. It may be known to be complete only
-later than this time."""
+"""Arrival time of a report's last line in s, and the report. The report may be returned later than
+this time, when it is known to be complete."""
 
 
 class Assembler:
@@ -229,7 +229,7 @@ class Assembler:
             return []
         if isinstance(group, Ticks) and was_after_ticks:
             if self._appends and not self._ticks_gate.would_pass(group, self._at):
-                self.statistics.damaged_groups += 1  # more likely half an odometry group
+                self.statistics.damaged_groups += 1  # probably half an odometry group
                 return []
             self._appends = False
         if not in_range(group):

@@ -4,9 +4,9 @@
 
 The firmware averages three headings of 0 to 359 degrees as plain numbers: for 359, 1 and 1 it
 reports 120, and for 359, 359 and 1 it reports -121. A heading is accepted if it differs from the
-last accepted one by the turn of the odometry since then. Any other heading is accepted only when
-``SURE_AFTER`` further headings agree with it. A false heading (about 120 or -120 degrees while the
-robot faces north) is rejected even then. Works on degrees and the odometry's yaw.
+last accepted one by about the turn of the odometry since then. Any other heading is accepted only
+when ``SURE_AFTER`` further headings agree with it. A false heading (about 120 or -120 degrees while
+the robot faces north) is rejected even then. Works on degrees and the odometry's yaw.
 """
 
 import math
@@ -44,7 +44,8 @@ class HeadingFilter:
     def believes(self, heading_deg: float, yaw_rad: float) -> bool:
         """Return whether a heading is accepted.
 
-        ``heading_deg``: clockwise from north. ``yaw_rad``: yaw of the odometry at the same time.
+        ``heading_deg``: heading clockwise from north. ``yaw_rad``: yaw of the odometry at the same
+        time.
         """
         if self._last is not None and _goes_on(self._last, heading_deg, yaw_rad):
             self._last, self._other, self._agreed = (heading_deg, yaw_rad), None, 0

@@ -100,7 +100,7 @@ class RecordKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SetDuty:
-    """A command of an open-loop duty for each motor: percent of the supply, -100..100."""
+    """A command of an open-loop duty for each motor, in percent of the supply: -100..100."""
 
     left_percent: int
     right_percent: int

@@ -233,7 +233,11 @@ class MotionFilter:
             self._begin_biases()
 
     def _begin_biases(self) -> None:
-        """Reset the biases: relative with duty, otherwise the dropped part of an RPM in m/s."""
+        """Reset the biases.
+
+        The bias of a wheel that a duty drives is a relative error of its speed. Otherwise the bias
+        is the dropped fraction of an RPM, in m/s.
+        """
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:
                 self.filter.forget(BIAS + index, 0.0, DUTY_STDDEV**2)

@@ -107,7 +107,7 @@ class SettingsWriter:
 
     @property
     def ignored(self) -> bool:
-        """Whether the board has not confirmed the settings after twice the usual rounds."""
+        """Whether the settings are unconfirmed after twice the usual number of rounds."""
         return self._rounds >= 2 * ROUNDS and not self.confirmed
 
     @property

@@ -14,8 +14,8 @@ from typing import Final, Generic, Literal, TypeVar
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, GpsPosition, Ticks
 
 FASTEST_TICKS_PER_S: Final = 300.0
-"""Largest plausible rate of ticks: five turns a second of a wheel with 60 ticks, six times what the
-firmware commands."""
+"""Largest plausible rate of ticks: that of a wheel with 60 ticks at five turns per second, six
+times the highest speed of the firmware."""
 TICKS_MARGIN: Final = 30
 FASTEST_MPS: Final = 5.0
 FASTEST_RADPS: Final = 20.0

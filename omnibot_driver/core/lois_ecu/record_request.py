@@ -78,7 +78,8 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings, with the awaited record or the reason why the record will not come.
 
-        ``prevented``: why the board will not send the record, as a sentence; empty if it may.
+        ``prevented``: why the board will not send the record, as a sentence; empty if it may still
+        come.
         """
         if self.kind is None:
             return found

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Proof from the board's tick counters that it has obeyed a reset, and the limits of the proof.
+"""Proof, by the tick counters, that the board has obeyed a reset, and the limits of this proof.
 
 A count near zero proves nothing by itself: the count may have been near zero before, or a wheel may
 have rolled back. Works on counts and times.
@@ -14,7 +14,7 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 FEW_TICKS: Final = 20
 """Largest number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""Number of ticks that a wheel cannot roll between a reset and the next counts."""
+"""More ticks than a wheel can roll between a reset and the next counts."""
 STEADY_TICKS: Final = 3
 """Lowest count of a wheel at rest from which backlash cannot turn the wheel back to zero."""
 UNPROVED_S: Final = 2.5
@@ -45,7 +45,11 @@ class ResetProof:
             self._waits_since_s, self._seen = math.inf, None
 
     def look(self, ticks: Ticks, now: float) -> bool:
-        """Return whether the counts are near zero, and prove the reset or the wait has ended."""
+        """Return whether the reset can be reported.
+
+        The counts must be near zero. They must also prove the reset, or ``UNPROVED_S`` must have
+        passed.
+        """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks
         if _largest(ticks) > FEW_TICKS:

@@ -29,8 +29,8 @@ class LoisEcuSettings:
     is written, the wheels never turn in RPM mode. ``written``: further settings that the user wants
     on the board. ``periods_ms``: periods of the messages that the board sends periodically; the
     periods of other messages are not changed. ``with_sum``: lines to the board have a checksum.
-    ``declination_rad``: declination of magnetic north, east positive. ``odom_rate_hz``: how often
-    the odometry is published, predicted from one group to the next.
+    ``declination_rad``: declination of magnetic north, east positive. ``odom_rate_hz``: rate at
+    which the odometry is published; it is predicted between two groups.
     """
 
     wheel_radius_m: float = 0.13

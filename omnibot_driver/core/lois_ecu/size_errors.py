@@ -50,7 +50,7 @@ class SizeErrors:
     def covariance(self, yaw_rad: float) -> Covariance:
         """Return the covariance for a pose with this yaw.
 
-        The pose's frame may be rotated against that of the drives.
+        The frame of the pose may be rotated relative to the frame of the drives.
         """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw

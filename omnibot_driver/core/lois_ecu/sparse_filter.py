@@ -23,9 +23,11 @@ class SparseFilter:
         self.covariance = [[0.0] * states for _ in range(states)]
 
     def propagate(self, rows: Mapping[int, Terms]) -> None:
-        """Propagate the covariance by a transition, whose ``rows`` differ from the identity matrix.
+        """Propagate the covariance by a transition.
 
-        The mean is not changed, as its transition need not be linear.
+        ``rows``: the rows of the transition matrix that differ from the identity matrix.
+
+        The mean is not changed, because its transition may be non-linear.
         """
         half = _applied(rows, self.covariance)
         whole = _applied(rows, [list(column) for column in zip(*half, strict=True)])
@@ -56,7 +58,7 @@ class SparseFilter:
     def measure(self, terms: Terms, residual: float, variance: float) -> None:
         """Correct all states by a measurement of the sum of states, weighted by ``terms``.
 
-        ``residual``: measured minus expected value. ``variance``: that of the measurement.
+        ``residual``: measured minus expected value. ``variance``: variance of the measurement.
         """
         covariance = self.covariance
         along = [sum(factor * row[state] for state, factor in terms) for row in covariance]

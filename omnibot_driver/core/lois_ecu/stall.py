@@ -9,10 +9,10 @@ Ticks show whether a wheel turns forward, and 0x20 whether it turns backward. If
 turn backward is at rest, there are two cases. While the other wheel is also at rest, the pose in
 0x20 does not change. While the other wheel turns, 0x20 repeats the same speed for the wheel at
 rest. A wheel that rolls steadily also repeats a speed, but this speed is not far above its
-set-point: there the controller gives no power, so the wheel would slow down. Two exceptions have
-power at such a speed. A feed-forward gives power at any speed. A saturated controller may keep full
-power until RPM 0/0 restarts it; the wheel is then faster than any wheel that comes to rest. Works
-on set-points, reports and times.
+set-point: far above it the controller gives no power, so the wheel would slow down. There are two
+exceptions. A feed-forward gives power at any speed. A saturated controller may keep full power
+until RPM 0/0 restarts it; the wheel is then faster than any wheel that comes to rest. Works on
+set-points, reports and times.
 """
 
 import math

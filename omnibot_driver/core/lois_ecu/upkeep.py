@@ -2,9 +2,9 @@
 
 """Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
-It contains settings, the terminal mode, requests for records, RPM 0/0 after a Stop, and the
-recovery of a board that is silent or ignores commands. Combines the classes for each of these. Must
-not know what the board sends.
+It covers settings, the terminal mode, requests for records, RPM 0/0 after a Stop, and the recovery
+of a board that is silent or ignores commands. Combines the classes for each of these. Must not know
+what the board sends.
 """
 
 import math

@@ -36,8 +36,8 @@ class _Effect:
 class WheelModel:
     """The command of one wheel; ``carry_out`` advances it. Speeds are commanded rim speeds.
 
-    ``kind``, ``target_mps``: the motor's command. ``hidden_mps``: the firmware's RPM target; in
-    duty mode it stays as it was, but ticks under negative duty lower it.
+    ``kind``, ``target_mps``: the motor's command. ``hidden_mps``: the firmware's RPM target; a duty
+    does not change it, but each tick with a negative duty lowers it.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -81,7 +81,7 @@ class WheelModel:
             self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
     def next_change_s(self) -> float:
-        """Return when the next effect is due; infinity without any."""
+        """Return when the next effect is due; infinity if there is none."""
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:

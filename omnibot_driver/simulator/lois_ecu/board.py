@@ -117,7 +117,10 @@ class SimulatedLois:
 
     @property
     def terminal_mode(self) -> int:
-        """Terminal mode that 0x11 wrote last; in all but 0 and 4, the board's own lines stop."""
+        """Terminal mode that 0x11 wrote last.
+
+        The board sends lines of its own only in modes 0 and 4.
+        """
         return self._terminal.mode
 
     @property

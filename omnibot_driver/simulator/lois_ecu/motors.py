@@ -139,11 +139,11 @@ class Gains:
 
 
 class SpeedController:
-    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) by the trapezoidal rule, with firmware additions.
+    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised with the trapezoidal rule.
 
     The coefficients are for steps of ``NOMINAL_STEP_S``, even if the true step differs. An output
     beyond 100 % does not enter the state (anti-windup). An output whose sign differs from the
-    target's becomes zero.
+    target's becomes zero. The firmware adds a low-pass of the target and a feed-forward.
     """
 
     def __init__(self, gains: Gains) -> None:
