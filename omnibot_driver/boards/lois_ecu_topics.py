@@ -149,7 +149,7 @@ class LoisEcuTopics:
     def _on_ball(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         return self._say(
             lambda board, _now: board.distribute_ball(),
-            "distribute ball sent once; the board does not confirm it",
+            "ball command sent once; the board does not confirm it",
             response,
         )
 

@@ -70,7 +70,7 @@ class Form:
 
 def _words(left: int, right: int) -> int:
     if not (-0x8000 <= left <= 0x7FFF and -0x8000 <= right <= 0x7FFF):
-        raise FrameError(f"{left} and {right} do not fit two signed words of 16 bits")
+        raise FrameError(f"{left} and {right} do not fit into two signed 16-bit words")
     return from_pair(left, right)
 
 

@@ -43,9 +43,9 @@ def checksum(text: bytes) -> int:
 
 
 def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
-    """Return the characters of one line. Raises FrameError when a value does not fit."""
+    """Return the characters of one line. Raises FrameError if a value does not fit into it."""
     if not (0 <= command <= 0xFF and 0 <= payload <= MARKER):
-        raise FrameError(f"command {command} with payload {payload} does not fit a line")
+        raise FrameError(f"command {command} with payload {payload} does not fit into a line")
     text = b":%02x%08x" % (command, payload)
     return b"%s%02x\n" % (text, checksum(text)) if with_sum else text + END
 
@@ -71,10 +71,10 @@ def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
 def from_pair(left: int, right: int) -> int:
     """Return the 32-bit payload of two 16-bit words, each signed or unsigned.
 
-    Raises FrameError when a number does not fit 16 bits.
+    Raises FrameError if a number does not fit into 16 bits.
     """
     if not (-0x8000 <= left <= 0xFFFF and -0x8000 <= right <= 0xFFFF):
-        raise FrameError(f"{left} and {right} do not fit two words of 16 bits")
+        raise FrameError(f"{left} and {right} do not fit into two 16-bit words")
     return (left & 0xFFFF) << 16 | right & 0xFFFF
 
 
@@ -98,7 +98,7 @@ def from_float(number: float) -> int:
     try:
         (payload,) = _WORD.unpack(_FLOAT.pack(number))
     except OverflowError as error:
-        raise FrameError(f"{number} does not fit a float32") from error
+        raise FrameError(f"{number} does not fit into a float32") from error
     return int(payload)
 
 

@@ -93,7 +93,7 @@ class RecordRequest:
                 found[place] = RecordReading(reading, count_s, ticks_per_revolution)
                 return found
         if not prevented and decoder.group_statistics.damaged_records != self._damaged:
-            prevented = "a line of it was lost; call again"
+            prevented = "a line of the record was lost; call again"
         if not prevented:
             return found or ([RecordComes()] if decoder.in_record else [])
         self._end()
