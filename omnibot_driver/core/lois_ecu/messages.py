@@ -275,9 +275,9 @@ class BoardOdometry:
 class Record:
     """A complete record; ``left`` and ``right`` have as many samples as requested.
 
-    A record of headings has only ``left``. Samples of RPM are times from tick to tick in the
-    board's unit (``COUNT_S`` in ``record_request``), samples of torque 12-bit values of an ADC, and
-    samples of headings degrees.
+    A record of headings has only ``left``. An RPM sample is the time from one tick to the next in
+    the board's unit (``COUNT_S`` in ``record_request``). A torque sample is a 12-bit value of an
+    ADC. A heading sample is in degrees.
     """
 
     kind: RecordKind

@@ -229,7 +229,7 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether a period of the date is set; each request for one date ends these dates."""
+        """Whether a period of the date is set. A request for one date ends the periodic sending."""
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:

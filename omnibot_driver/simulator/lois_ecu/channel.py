@@ -117,7 +117,7 @@ class WheelChannel:
     # Commands
 
     def command_rpm(self, rpm: int) -> None:
-        """Set the speed target in RPM, with closed loop; zero or a reversal stops the motor."""
+        """Set the speed target in RPM (closed loop); zero or a reversal stops the motor."""
         self.open_loop = False
         if rpm == 0 or rpm * self._next_target < 0:
             self._halt()
