@@ -2,8 +2,8 @@
 
 """The calibration file: measured values of this robot, in YAML, read at start.
 
-A save replaces the complete file or nothing. The file may hold other names as well, which a save
-keeps; comments do not survive a save.
+A save replaces the file completely or not at all. It keeps names that the driver does not use, and
+loses comments.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.parameters import Table, Value
 
 RECORDED: Final = ("imu_rpy", "step")
-"""Names that the tool calibrate also writes, for people who read the file."""
+"""Names that ``calibrate`` writes for people who read the file; the driver ignores them."""
 
 
 def locate(file: str) -> Path:
@@ -36,7 +36,7 @@ def locate(file: str) -> Path:
 
 
 def load(path: Path, table: Table) -> dict[str, Value]:
-    """Return the file's values of calibrated parameters of this board; empty without a file.
+    """Return the file's values of this board's calibrated parameters; empty without a file.
 
     Raises ParameterError, with a remedy, for a file that cannot be read or has a wrong value.
     """
@@ -57,7 +57,7 @@ def names(path: Path) -> list[str]:
 
 
 def save(path: Path, values: Mapping[str, Any]) -> None:
-    """Put these values into the file and keep the others. Raises ParameterError or OSError.
+    """Put these values into the file and keep its other values. Raises ParameterError or OSError.
 
     A concurrent reader finds either the old file or the new one, and so does the next start after a
     power failure. Comments in the file are lost; a symbolic link to it is kept.

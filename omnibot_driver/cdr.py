@@ -2,10 +2,11 @@
 
 """Measurements serialised to CDR as rclpy does it, and velocity commands parsed from CDR.
 
-No ROS message objects are made for this. CDR, as DDS serialises, aligns every number to its own
-size, like a C struct on a 64-bit machine, so Python's ``struct`` with native alignment writes it. A
-string is a length and its bytes with a NUL; a sequence is a length and its elements. Whether this
-holds on this machine is not assumed: ``difference`` compares the bytes with rclpy's own.
+No ROS message objects are made for this. CDR, the format in which DDS serialises messages, aligns
+every number to its own size, like a C struct on a 64-bit machine, so Python's ``struct`` with
+native alignment writes it. A string is a length and its bytes with a NUL; a sequence is a length
+and its elements. ``difference`` checks whether this holds on the present machine: it compares the
+bytes with rclpy's own.
 """
 
 import itertools
@@ -104,14 +105,14 @@ class Serializer:
 
 
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
-    """Parse a serialised geometry_msgs/Twist; return its planar part, and whether that is all.
+    """Parse a serialised geometry_msgs/Twist; return its planar part, and whether the rest is zero.
 
-    Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist, which some
-    middlewares might deliver.
+    Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist (a middleware
+    might deliver such bytes).
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
-        finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0  # else the product is NaN
+        finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0  # otherwise the product is NaN
         if finite and encapsulation == LITTLE_ENDIAN:
             return BodyTwist(x, y, yaw), not (z or roll or pitch)
         message = deserialize_message(data, Twist)
@@ -123,7 +124,10 @@ def twist(data: bytes) -> tuple[BodyTwist, bool]:
 
 
 class Messages:
-    """A Serializer's methods that return rclpy messages, for a machine where the bytes differ."""
+    """A Serializer that returns rclpy messages instead of bytes.
+
+    It is used on a machine on which rclpy's bytes differ from those of Serializer.
+    """
 
     def __init__(self, settings: MessageSettings) -> None:
         self._settings = settings

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board's parameters declared on a node: read at start, described, and checked when set."""
+"""Declare a board's parameters on a node: read them at start, describe them, check each change."""
 
 import re
 from collections.abc import Mapping
@@ -46,10 +46,10 @@ def declare(node: Node) -> dict[str, Any]:
 
 
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
-    """Return all of the driver's values after a change; ``values``: those before the change.
+    """Return the driver's parameter values after a change; ``values`` are those before the change.
 
-    Each value has its parameter's own type: ROS also passes an integer for a real number, which a
-    message would publish as 0.
+    Each value is converted to its parameter's own type. ROS also passes an integer for a real
+    number, and a message would publish that integer as 0.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})

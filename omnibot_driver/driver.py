@@ -33,11 +33,11 @@ SETUP: Final = (
 
 
 class Ending:
-    """The end of the driver: the main thread waits here until the driver is to end.
+    """The end of the driver: the main thread waits here for a signal or a call of ``begin``.
 
-    The wait uses a pipe, because Python writes a signal's number into a pipe whichever thread the
-    signal hits. A thread that waits for a lock can miss a signal, and a signal handler must not
-    touch a lock at all. ``defect`` is the exception that ended the driver, or None.
+    The wait uses a pipe: Python writes a signal's number into it, whichever thread receives the
+    signal. A thread that waits for a lock can miss a signal, and a signal handler must not use a
+    lock at all. ``defect`` is the exception that ended the driver, or None.
     """
 
     def __init__(self) -> None:
@@ -65,9 +65,10 @@ class Ending:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the driver until a signal of ``STOPPED_BY``, a shutdown of its context or a defect.
+    """Run the driver until a signal in ``STOPPED_BY``, a shutdown of its ROS context, or a defect.
 
-    Returns the exit code: 0 when asked to end, or for help; 1 after a defect; 2 if it cannot start.
+    Returns the exit code: 0 after a request to end, or for help; 1 after a defect; 2 if the driver
+    cannot start.
     The main thread only waits, so a signal takes effect however busy the executor is, and a second
     signal cannot interrupt the shutdown.
     """
@@ -89,7 +90,8 @@ def _refuse(why: str) -> int:
 
 def _main(args: list[str]) -> int:
     ending = Ending()
-    # Imported after Ending is ready, as it takes half a second: a signal meanwhile ends the driver.
+    # This import takes half a second. Ending is ready before it, so a signal during the import
+    # ends the driver.
     import rclpy
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
     from rclpy.exceptions import NameValidationException, ParameterException

@@ -2,15 +2,15 @@
 
 """The guard: a separate process that stops the robot when the driver no longer can.
 
-It shares the driver's open lines, serial ports or connected sockets, and receives a heartbeat on
-its standard input. When the heartbeat ceases, or the driver has ended, it repeats the stop command
-that it was given, for a second or until the driver is alive again. If the last heartbeat said that
-the e-stop is latched, it repeats the emergency stop instead. It knows no board, and imports very
-little, so that it is small and starts quickly.
+It shares the driver's open lines (serial ports or connected sockets), and receives a heartbeat on
+its standard input. When the heartbeat ceases, or the driver has ended, the guard repeats the stop
+command for a second, or until the heartbeat returns. If the last heartbeat said that the e-stop is
+latched, it repeats the emergency stop instead. It knows no board, and imports very little, so that
+it is small and starts quickly.
 
-`keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each argument lists what to write,
-in order, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. When they change, the driver sends ``=STOP
-EMERGENCY_STOP`` and a newline between two heartbeats.
+`keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each argument lists the bytes to
+write and their descriptors, in order, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. When these commands
+change, the driver sends ``=STOP EMERGENCY_STOP`` and a newline between two heartbeats.
 """
 
 import _signal as signal  # type: ignore[import-not-found]  # ``signal`` itself brings ``enum``
@@ -29,7 +29,7 @@ END = b"\n"
 BYE = b"!"
 """Message that the driver has stopped the robot itself, so that the guard may end."""
 LIMIT_S = 0.5
-"""Time without a heartbeat, in s, after which the driver is taken to hang."""
+"""Time without a heartbeat, in s, after which the guard assumes that the driver hangs."""
 TIMES = 20
 PACE_S = 0.05
 
@@ -44,7 +44,7 @@ Words = list[tuple[int, bytes]]
 
 
 def watch(stop: Words, emergency_stop: Words) -> None:
-    """Watch the driver until it ends; send the stop if it hangs, or ends without notice."""
+    """Watch the driver until it ends; send the stop if it hangs, or ends without ``BYE``."""
     patience_s: float | None = LIMIT_S
     latched, rest = False, b""
     while True:
@@ -82,7 +82,7 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int]) -> None:
-    """Write the stop packets up to ``TIMES`` times, or until one of ``until`` is readable."""
+    """Write the stop ``TIMES`` times, or until one of the descriptors ``until`` is readable."""
     lines = {line for line, _ in last_words}
     for line in lines:
         drop_what_waits(line)
@@ -95,7 +95,7 @@ def speak(last_words: Words, until: list[int]) -> None:
                 drop_what_waits(line)
             except OSError as error:
                 if error.errno in GONE:
-                    lines.discard(line)  # else a datagram was lost; the next one may arrive
+                    lines.discard(line)  # otherwise only a datagram was lost; the next may arrive
         if not lines or select.select(until, [], [], PACE_S)[0]:
             return
 

@@ -33,7 +33,7 @@ DIES_WITHIN_S: Final = 1.0
 """Longest wait for a killed guard to end, in s. A guard that takes longer is in an
 uninterruptible sleep, and the driver does not wait for its end."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
-"""Longest wait for a guard that repeats the stop, in s; a process may be slow to start."""
+"""Longest wait for a guard that repeats the stop, in s; includes the start of a slow process."""
 
 
 class Keeper:
@@ -85,13 +85,14 @@ class Keeper:
         try:
             os.write(process.stdin.fileno(), message)
             self._ahead += len(message)
-        except OSError:  # gone, or it reads nothing: another one is started with these commands
+        except OSError:  # it ended or does not read: a new guard gets these commands
             self._give_up(process)
 
     def end(self, *, stopped: bool) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        Unless the robot is known to have been ``stopped``, the guard sends its stop first.
+        ``stopped``: whether the robot is known to be stopped; otherwise the guard first sends its
+        stop.
         """
         self._restart_at = math.inf
         if stopped:
@@ -115,7 +116,7 @@ class Keeper:
                 return ""
         except OSError:
             if process.poll() is None and not self._broken:
-                self._broken = True  # its pipe closes a moment before its exit code is there
+                self._broken = True  # the pipe closes a moment before the exit code is available
                 return ""
             self._give_up(process)
             return f"the guard process died (exit code {process.returncode})"
@@ -125,8 +126,8 @@ class Keeper:
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
         """Kill the guard without waiting for its end; later heartbeats check whether it has ended.
 
-        The guard may be in an uninterruptible sleep, and the e-stop needs the lock that is held
-        here.
+        Waiting for a guard in an uninterruptible sleep would delay the e-stop, because the e-stop
+        needs the lock that the caller holds.
         """
         assert process.stdin is not None
         process.stdin.close()
@@ -144,9 +145,9 @@ class Keeper:
 
     def _start(self) -> None:
         self._ahead = 0
-        # The command must not contain `omnibot_driver`, because `pkill -f` must not hit the guard:
-        # so guard.py has no folder, and the interpreter's link in a .venv is resolved. The guard
-        # needs built-in modules only.
+        # The command must not contain `omnibot_driver`, so that `pkill -f omnibot_driver` does not
+        # kill the guard. For this reason guard.py is given without its folder, and the link to the
+        # interpreter in a .venv is resolved. The guard needs built-in modules only.
         folder, name = os.path.split(guard.__file__)
         command = [os.path.realpath(sys.executable), "-I", "-S", name]
         try:

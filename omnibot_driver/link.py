@@ -7,8 +7,8 @@ once, on its own thread. No timer and no other thread delays a measurement betwe
 listener. The *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the
 watchdog does not depend on an executor. It also sends the guard its heartbeat. These threads and
 every caller use one lock. Events that the pacer and callers cause are delivered by the *teller*, so
-a slow listener delays neither of the two. All events are delivered in the order in which they
-occurred under that lock.
+a slow listener delays neither the pacer nor a caller. All events are delivered in the order in
+which they occurred under that lock.
 """
 
 import threading
@@ -29,13 +29,13 @@ from omnibot_driver.transports import Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s; longer than a guard takes to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown until the robot is proved at rest, in s; extended if a proof takes
+"""Longest wait at shutdown for a proof that the robot is at rest, in s; extended if a proof takes
 longer. Afterwards the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown until the robot is proved at rest, in s, without a guard process."""
+"""Longest wait at shutdown for a proof that the robot is at rest, in s, without a guard process."""
 SILENCE_S: Final = 0.25
-"""Longest wait for a second proof of standstill, in s, in which nothing is sent. This second proof
-shows that the last Stop was not damaged."""
+"""Longest wait for a second proof of standstill, in s. Nothing is sent during this wait, so the
+second proof shows that the last Stop was not damaged."""
 
 T = TypeVar("T")
 
@@ -46,10 +46,10 @@ class Link:
     ``opener`` opens the transport, whose name for the user is ``port``. ``guard``: whether a
     separate process sends the board's stop commands when this process cannot. ``deliver`` gets the
     session's events. ``refused`` gets the reason why a command was refused. ``report`` gets a
-    sentence about the port whenever it, or one of its lines, cannot be opened or is lost, and None
-    when the port and all its lines are open. ``on_read`` and ``on_write`` get each packet that was
-    read or written. These functions are called one at a time, in the order of the events, on the
-    reader's thread or another.
+    sentence whenever the port, or one of its lines, cannot be opened or is lost, and None when the
+    port and all its lines are open. ``on_read`` and ``on_write`` get each packet that was read or
+    written. These functions are called one at a time, in the order of the events, on the reader's
+    thread or another.
 
     ``failed`` gets the exception that ended a thread, which only a defect can cause.
     """
@@ -145,7 +145,7 @@ class Link:
 
         Returns whether this call has sent Stop and ended the threads. If the port was lost while
         the robot drove, the reader sends Stop if it can open the port again. Afterwards ``stands``
-        shows whether the robot was proved at rest.
+        shows whether the robot was shown to be at rest.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:
@@ -165,7 +165,8 @@ class Link:
         self._join(serving)
         self._shared.outbox.close()
         self._join([teller])
-        # The reader may have opened a lost port again and sent Stop. If it hangs, it has the lock.
+        # The reader may have opened a lost port again and sent Stop. The lock is not taken here,
+        # because a reader that hangs holds it.
         self.unstopped = not self._shared.told and self._session.shutdown.owed
         return ends and self._shared.told and not any(thread.is_alive() for thread in serving)
 

@@ -185,8 +185,8 @@ def diagnostic_message(
 def body_twist(twist: Any) -> BodyTwist:
     """Return the planar part of a geometry_msgs/Twist, in m/s and rad/s.
 
-    Raises CommandRefused for NaN or infinity in any of its six values: a publisher that sends one
-    invalid axis is not to be trusted with the others.
+    Raises CommandRefused for NaN or infinity in any of its six values: if one value is invalid, the
+    other values cannot be trusted either.
     """
     linear, angular = twist.linear, twist.angular
     require_finite("cmd_vel", (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
@@ -254,9 +254,8 @@ def time_message(nanoseconds: int) -> Time:
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
     """Return wall clock minus steady clock in ns; ``wall_ns`` was read between the steady times.
 
-    ``known_ns``, the offset so far, is kept unless the readings contradict it. A thread put to
-    sleep between the readings therefore causes no jitter, and a step of the wall clock is followed
-    at once.
+    ``known_ns``, the offset so far, is kept unless the readings contradict it. So a pause of the
+    thread between the readings causes no jitter, but a step of the wall clock takes effect at once.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

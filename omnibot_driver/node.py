@@ -90,8 +90,8 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        The executor would check each of them before it takes a command. A subscriber with an
-        incompatible quality of service sees a warning on its own side only.
+        The executor would check each of these callbacks before it takes a command. Without them,
+        only the subscriber logs a warning if its quality of service is incompatible.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
@@ -162,7 +162,7 @@ class OmniBotDriver(Node):
 
         def configure(session: Session, now: float) -> None:
             session.configure(settings, now, board=board)
-            if bias:  # even if it is equal: standstills may have refined the bias since
+            if bias:  # even if unchanged: the bias may have been refined since then
                 session.gyro_bias = settings.imu.gyro_bias
 
         self._link.call(configure)
@@ -231,9 +231,9 @@ class OmniBotDriver(Node):
         return selfcheck.waiting_advice(self._values["port"], self.get_clock().now().nanoseconds)
 
     def _refuse(self, text: str) -> None:
-        """Count each refusal, and log each kind every ``WARN_EVERY_S`` at most.
+        """Count each refusal, and log each kind of refusal at most once every ``WARN_EVERY_S``.
 
-        A flood of one kind therefore does not hide another.
+        Frequent refusals of one kind therefore do not hide those of another kind.
         """
         self._refusals = Refusals(count=self._refusals.count + 1, last=text)
         kind, now_s = text.partition(":")[0], time.monotonic()

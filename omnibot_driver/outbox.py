@@ -33,7 +33,8 @@ class Outbox:
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
-        """Return whether the caller may deliver directly, cheaper than ``put`` and ``deliver``.
+        """Return whether the caller may deliver directly; this is cheaper than ``put`` and
+        ``deliver``.
 
         Hold the lock under which the event occurred during this call. If it returns True,
         ``release`` must follow.
@@ -41,7 +42,7 @@ class Outbox:
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """End a claim after its delivery or its failure."""
+        """End a claim, after the delivery has succeeded or failed."""
         self._delivering.release()
         if self._waiting:
             self.deliver()
@@ -57,7 +58,7 @@ class Outbox:
         If the outbox is full, wait for that thread. Raises what the calls raise.
         """
         waiting, delivering = self._waiting, self._delivering
-        while waiting:  # again after the release: a call put meanwhile found the lock taken
+        while waiting:  # checked again after the release, for calls that were put meanwhile
             if not delivering.acquire(blocking=self.full):
                 return
             try:
@@ -67,7 +68,7 @@ class Outbox:
                 delivering.release()
 
     def hand_over(self) -> None:
-        """Have ``serve`` make the waiting calls, for a thread that must not be delayed."""
+        """Let the thread of ``serve`` make the waiting calls, so that the caller is not delayed."""
         if self._waiting:
             self._handed_over.set()
 

@@ -4,8 +4,8 @@
 
 rclpy writes log lines while it holds the interpreter. A terminal that is stopped by ctrl-S, or a
 pipe without a reader, would freeze every thread, the watchdog included, and the robot would
-continue with its last command. Output therefore passes through a pipe that loses a line rather than
-blocks.
+continue with its last command. Output therefore passes through a pipe that drops lines when it is
+full, and does not block.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ class UnblockedOutput:
     def __enter__(self) -> Self:
         _fill_gaps()
         if os.isatty(2):
-            os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # rcutils would see our pipe
+            os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # rcutils sees no terminal
         self._originals = [os.dup(descriptor) for descriptor in STANDARD]
         self._copiers = [
             threading.Thread(target=_copy, args=(_redirect(descriptor), original), daemon=True)

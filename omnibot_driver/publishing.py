@@ -88,8 +88,8 @@ class Publishing:
             Extra: self._publish_extra,
         }
         self.extras: Mapping[type, Callable[[Any, int], None]] = {}
-        """Functions that publish values of the types that only this board has, by type; each gets
-        the value and its stamp in ns."""
+        """Functions that publish the values that only this board has, by type of value. Each
+        function gets the value and its stamp in ns."""
 
     @property
     def settings(self) -> messages.MessageSettings:
@@ -101,21 +101,21 @@ class Publishing:
         self._settings, self._make = settings, self._maker(settings)
 
     def taps(self) -> dict[str, Callable[[Packet], None]]:
-        """Return the functions that publish a link's raw bytes, by the link's argument names."""
+        """Return the functions that publish raw bytes, keyed by the argument names of ``Link``."""
         return {
             "on_read": self._raw_publisher("~/raw_rx"),
             "on_write": self._raw_publisher("~/raw_tx"),
         }
 
     def deliver(self, events: Sequence[Event]) -> None:
-        """Publish events now; their stamps are of the steady clock."""
+        """Publish events now, and convert their stamps from the steady clock to ROS time."""
         if not events or self._over:
             return
         if self._time_is_simulated:
             self._deliver_simulated(events)
             return
         before_ns = time.monotonic_ns()
-        wall_ns = time.time_ns()  # a tenth of what it costs to ask the node's clock
+        wall_ns = time.time_ns()  # takes a tenth of the time of the node's clock
         offset_ns = self._clock_offset_ns = messages.clock_offset(
             self._clock_offset_ns, before_ns, wall_ns, time.monotonic_ns()
         )
@@ -170,7 +170,7 @@ class Publishing:
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
-        """Return a function that publishes packets on one topic per channel, named after it."""
+        """Return a function that publishes packets, with one topic for each channel."""
         publishers = [
             self._node.create_publisher(UInt8MultiArray, f"{topic}/{name}".rstrip("/"), RAW_DEPTH)
             for name in self._channels
@@ -223,9 +223,9 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether the text is new since the last decoded data of the board.
+        """Return whether this text has not been logged since data of the board was last decoded.
 
-        A text is logged once until new data is decoded, so a flapping port is reported once.
+        A port that is lost and opened again and again is therefore reported once.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

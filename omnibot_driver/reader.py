@@ -113,7 +113,7 @@ class Reader:
         try:
             self._attach(port)
         finally:
-            if keeper is not None:  # it has guarded until now
+            if keeper is not None:  # the old guard, which runs until the new one has started
                 keeper.end(stopped=True)
 
     def _guarded(self, port: Transport) -> tuple[Keeper | None, list[Notice]]:
@@ -161,7 +161,7 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Process what follows from the received bytes besides measurements; the lock is held."""
+        """Process the effects of the received bytes other than measurements; the lock is held."""
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:
             self._shared.settle()
@@ -187,9 +187,9 @@ class Reader:
                 if self._closing.is_set() and self._shared.port is not None:
                     told = self._shared.write_error is None and not port.missing
                     self._shared.told = told and self._session.shutdown.owed
-            else:  # Stop, directly after what can no longer be discarded
+            else:  # write Stop directly after the bytes that can no longer be discarded
                 port.write_if_room(self._session.shutdown.broken_off())
-            lines = len(port.descriptors or ())  # of several, some may be open and need a stop
+            lines = len(port.descriptors or ())  # one of several may still be open and need a stop
             stopped = self._shared.stood if self._closing.is_set() else comes_back and lines < 2
             keeper, self._shared.port, self._shared.keeper = self._shared.keeper, None, None
             self._session.closed(time.monotonic())

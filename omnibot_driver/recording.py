@@ -23,7 +23,7 @@ RAW_NAME: Final = "/raw_rx"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording in one bag, a folder or a single file, with one topic for each channel.
+    """A recording in one bag (a folder or a single file), with one topic for each channel.
 
     ``speed`` is the factor of the playback speed; infinity plays as fast as possible. ``delay_s``
     is the time until playback begins, in s.
@@ -35,7 +35,10 @@ class Recording:
     delay_s: float = 5.0
 
     def chunks(self) -> Iterator[tuple[int, Packet]]:
-        """Yield (time in ns by the recorder's clock, packet) for each packet. Raises LinkError."""
+        """Yield each packet as (time in ns by the recorder's clock, packet).
+
+        Raises LinkError if the bag cannot be read to its end.
+        """
         try:
             from rosbags.rosbag2 import Reader
             from rosbags.typesys import Stores, get_typestore

@@ -24,7 +24,7 @@ from omnibot_driver.recording import Recording
 
 JOIN_TIMEOUT_S: Final = 1.0
 SHORTEST_STEP_S: Final = 0.001
-"""Shortest time between two calls of ``Session.tick``, in s, even if it asks for less."""
+"""Shortest time between two calls of ``Session.tick``, in s, even if the session asks for less."""
 
 T = TypeVar("T")
 
@@ -80,7 +80,7 @@ class Replay:
             self._outbox.deliver()
 
     unstopped: Final = False
-    """A recording has no robot that may be moving."""
+    """Always False, because a recording has no robot that may be moving."""
 
     @property
     def blocked(self) -> bool:

@@ -2,7 +2,7 @@
 
 """One session and its open port, shared by threads: one lock, and one order of all events.
 
-Each input ends with ``settle``: what is due is written, the guard gets the present stop command,
+Each input ends with ``settle``: due packets are written, the guard gets the present stop command,
 and the events are queued in the outbox. This module starts no thread and opens no port.
 """
 
@@ -34,7 +34,7 @@ class SharedSession:
     Hold ``lock`` to use anything but ``call``, ``command`` and ``blocked``. ``changed`` is a
     condition on this lock. ``port`` is the open port and ``keeper`` its guard, each None if absent.
     ``write_error`` is the error after which nothing more is written to the port. ``deliver``,
-    ``refused`` and ``on_write`` are the link's.
+    ``refused`` and ``on_write`` are those of ``Link``.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class SharedSession:
         self.stood = False
         """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()
-        """Set when all threads are to end."""
+        """Set when all threads must end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write
         self._stall_detector = StallDetector()
         self._pacing_until = self._beat_at = -math.inf
@@ -121,9 +121,9 @@ class SharedSession:
 
     @property
     def blocked(self) -> bool:
-        """Whether the port did not accept the last packets and is to be opened again.
+        """Whether the port did not accept the last packets and will be opened again.
 
-        This lasts only a moment: the reader that opens the port is already awake.
+        This is True only for a moment: the reader, which opens the port again, is already awake.
         """
         with self.lock:
             return self.write_error is not None

@@ -3,9 +3,9 @@
 """Detection of stalls of this process: SIGSTOP, a swapped-out or suspended host, a hanging thread.
 
 During a stall the watchdog does not run either, and commands keep arriving. When the process runs
-again, commands that were sent meanwhile must not be obeyed. This module gets the time, by
-``boot_time_s``, and calls that show that the watchdog's thread runs. It knows no threads and no
-commands.
+again, commands that were sent meanwhile must not be obeyed. Callers pass the time of
+``boot_time_s``, and the watchdog's thread calls ``passed`` to show that it runs. This module knows
+no threads and no commands.
 """
 
 import math
@@ -13,9 +13,9 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Shortest stall, in s: ``passed`` has not been called for this time, although it should be called
-ten times a second. The time is less than the guard's limit, so a stall is noticed whenever the
-guard acts."""
+"""Shortest stall, in s: time without a call of ``passed``, which should be called ten times a
+second. It is less than the guard's limit, so the driver notices every stall in which the guard
+acts."""
 SETTLE_S: Final = 0.25
 """Time after a stall, in s. A command that arrives within this time is regarded as sent during the
 stall, whatever its send time. So is a command whose send time is within this time,
@@ -41,8 +41,8 @@ class StallDetector:
     The watchdog's thread calls ``passed``; every thread calls ``begun`` before it acts.
     ``outlived_by`` is never True while ``begun`` would report a stall.
 
-    All times are kept by the steady clock, so a step of the time of day moves none of them. The
-    difference of the two clocks is taken at each ``passed``.
+    All times are kept by the steady clock, so a step of the time of day does not change them. Each
+    call of ``passed`` measures the difference of the two clocks.
     """
 
     def __init__(self) -> None:
@@ -65,7 +65,7 @@ class StallDetector:
         """Note that the watchdog's thread runs; ``wall_ns`` is the time of day in ns."""
         if self._begun:
             self._begun = False
-            if now >= self._over_at + LATEST_S:  # else commands of the last are still in transit
+            if now >= self._over_at + LATEST_S:  # else those of the last stall may still arrive
                 self._from_ns = _ns(self._passed_at - LATEST_S)
             self._over_at = now
             self._until_ns = _ns(now + SETTLE_S)

@@ -15,7 +15,7 @@ MISSING: Final = (
 
 
 def transform_publisher(node: Node) -> Callable[[TransformStamped], Any] | None:
-    """Return a function that publishes a transform; None, with a warning, without tf2_ros."""
+    """Return a function that publishes a transform. Without tf2_ros, warn and return None."""
     try:
         from tf2_ros import TransformBroadcaster
     except ImportError as error:

@@ -3,12 +3,12 @@
 """Transit time of a command without a stamp, from the time at which the middleware sent it.
 
 The sender's clock may be off by any amount, so a delay shows only in comparison with other
-messages. Of a sender's messages, the one with the smallest difference between our clock and its
-clock was in transit for the shortest time. That difference is taken as the offset of the two
-clocks; the excess of any other message is its delay. The time that a message waited in this process
-is known exactly, by our own clock.
+messages. For each message, the difference between our clock at its arrival and the sender's clock
+at its sending is known. The message with the smallest difference was in transit for the shortest
+time. That difference is taken as the offset of the two clocks; the excess of any other message is
+its delay. The time that a message waited in this process is known exactly, by our own clock.
 
-Clocks step. Our clock is read twice, as time of day and as a steady clock, which gives two
+Clocks can step. Our clock is read twice, as time of day and as a steady clock, which gives two
 differences. If our time of day and the sender's step together (one host, or NTP everywhere), only
 the difference of the steady clock changes. If our time of day steps alone, only its difference
 changes. So the smaller of the two delays is used. A sender whose clock alone is set back seems to
@@ -16,9 +16,9 @@ be late from then on. When all of its messages have been late for ``HEALS_AFTER_
 difference among these messages becomes its offset. A real delay that lasts as long cannot be
 distinguished from this case.
 
-The middleware numbers the messages of each sender. It does not report who sent one, but a number
-that is not above a sender's last one belongs to another sender. This module reads no clock and
-knows no ROS.
+The middleware numbers the messages of each sender. It does not report who sent a message. But a
+message whose number is not above a sender's last number comes from another sender. This module
+reads no clock and knows no ROS.
 """
 
 import math
@@ -38,8 +38,8 @@ CLOCK_RETREATS: Final = 10.0
 that is late by the same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages of a sender among which at least one was hardly delayed. Of fewer messages,
-all may have been delayed; the send time of a less delayed message is then estimated too late."""
+"""Number of messages of a sender of which at least one is assumed to be hardly delayed. Before
+that, all may have been delayed; the estimated send time of the next message may be too late."""
 
 Differences = tuple[float, float]
 """Our clock minus a sender's when its message arrived, in s: time of day, and steady clock."""
@@ -124,7 +124,7 @@ class Transit:
             return 0.0
         sender = min(possible, key=lambda sender: sender.improbability(differences_s, at_s))
         self._senders.remove(sender)
-        self._senders.append(sender)  # the one that was silent for longest is forgotten first
+        self._senders.append(sender)  # the sender that is silent for longest is forgotten first
         sender.number = number
         return sender.hear(differences_s, at_s, longest_s)
 
@@ -159,7 +159,7 @@ class _Sender:
 
 
 class _Offset:
-    """The offset of one of our clocks from a sender's: the smallest of that sender's messages."""
+    """The offset of one of our clocks from a sender's clock: the smallest difference so far."""
 
     def __init__(self, difference_s: float, at_s: float) -> None:
         self._least_s, self._least_at_s = difference_s, at_s

@@ -2,9 +2,8 @@
 
 """The boards that the driver works with: a profile of each, imported when it is chosen.
 
-A profile is the only place where a board meets the part of the driver outside the core. It has the
-board's parameters, and makes the board's objects from their values. The rest of the driver knows no
-board.
+A profile is the only module outside the core that knows its board. It has the board's parameters,
+and makes the board's objects from their values. The rest of the driver works with any board.
 """
 
 from collections.abc import Callable, Mapping
@@ -55,9 +54,9 @@ class Profile(Protocol):
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
         """Create what only this board has: publishers, services and inputs on the node.
 
-        Returns the function that publishes each type of value that comes as an ``Extra``. The
-        link's ``call`` and ``command`` reach the session. Called once, on the executor's thread,
-        before bytes arrive.
+        Returns, by type of value, the functions that publish the values of ``Extra`` events.
+        ``call`` and ``command`` of the link give access to the session. The driver calls this once,
+        on the executor's thread, before bytes arrive.
         """
 
 

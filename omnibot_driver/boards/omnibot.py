@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Profile of the Neuron OmniBot: its parameters, and what is made from their values."""
+"""Profile of the Neuron OmniBot: its parameters, and the objects made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -28,7 +28,7 @@ def make(values: Mapping[str, Any]) -> OmniBot:
 
 
 def settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """Make the board's settings, which its data does not reveal, from checked values."""
+    """Make the settings of the board from checked values; its data does not show these settings."""
     return OmniBotSettings(
         baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],

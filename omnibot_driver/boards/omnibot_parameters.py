@@ -25,8 +25,8 @@ OMNIBOT: Final = (
         "linear_scale",
         70.0,
         "LSB/(m/s)",
-        "Size of a command for 1 m/s, in units of the board (LSB): linear speed, and rim speed of"
-        " a wheel.",
+        "Size of a command for a linear speed, or a wheel's rim speed, of 1 m/s, in units of the"
+        " board (LSB).",
         low=1.0,
         high=10_000.0,
         calibrated=True,
@@ -105,7 +105,7 @@ OMNIBOT: Final = (
         0.143,
         "m",
         "Distance from the centre of the robot to a wheel, for odometry from wheel counts and"
-        " covariance.",
+        " for the covariance.",
         low=0.01,
         high=10.0,
         calibrated=True,

@@ -2,6 +2,7 @@
 
 """The demo: simulated board and driver as separate processes, and a robot that drives a square.
 
-Like any ROS program, the demo uses the driver by its topics. It uses the simulator by its console.
+Like any ROS program, the demo uses the driver through its topics. It uses the simulator through
+its console.
 The demo must not know the bytes on the wire.
 """

@@ -113,7 +113,7 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the demo until its time is over, or SIGINT or SIGTERM.
+    """Run the demo until its time is over, or until SIGINT or SIGTERM.
 
     Returns the exit code: 0 at the end, 1 on failure, 2 on wrong usage.
     """

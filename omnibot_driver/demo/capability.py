@@ -35,7 +35,7 @@ class Capability:
 def of(name: str) -> Capability:
     """Return the abilities of the board with this name.
 
-    Raises ParameterError for an unknown board, and for one that takes no ``cmd_vel``.
+    Raises ParameterError for an unknown board, and for a board that does not accept ``cmd_vel``.
     """
     values = boards.check_all({"board": name})
     profile = boards.load(name)

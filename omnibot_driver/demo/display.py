@@ -19,7 +19,7 @@ HEADING: Final = """\
 state        imu odom lap   x m   y m yaw° x m/s y m/s rad/s x m/s y m/s rad/s"""
 
 CLOSING: Final = """
-With the real robot: wheels off the ground first ({page}), then
+With the real robot: lift its wheels off the ground first ({page}), then run
   ros2 run omnibot_driver driver --ros-args """
 
 
@@ -77,7 +77,7 @@ Where ROS 2 Jazzy is installed, watch and intervene from another terminal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """The results of a drive: what was driven and received, the pose by odometry, and the true one.
+    """The results of a drive: distance, message rates, the pose by odometry, and the true pose.
 
     ``imu_hz`` is None without an IMU. ``real``: the driver's arguments for the real robot;
     ``page``: the document of its board.

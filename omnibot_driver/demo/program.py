@@ -58,7 +58,7 @@ class Program:
             raise self.failure(f"the {self._name} ended with code {code}")
 
     def ask(self, question: str = "") -> str:
-        """Send a question to the console; return its next line, or raise DemoFailed without one."""
+        """Send a question to the console; return its next line. Raises DemoFailed if none comes."""
         stdin, stdout = self._process.stdin, self._process.stdout
         if stdin is None or stdout is None:
             raise ValueError(f"the {self._name} has no console")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Common parameters of the driver's work: the line, commands, frames.
+"""Common parameters of the driver's operation: the line, commands, frames.
 
 ``table`` decides which of them a board has. This module knows no ROS.
 """
@@ -56,7 +56,7 @@ LINE: Final = (
         0.5,
         "s",
         "Time until the driver opens a lost port again. It grows by half with each failure, up to"
-        " 2 s, if it is shorter.",
+        " 2 s. A time above 2 s does not grow.",
         low=0.05,
         high=60.0,
     ),
@@ -72,7 +72,7 @@ LINE: Final = (
         False,
         "",
         "Publish the bytes of every read and write of the port on ~/raw_rx and ~/raw_tx. replay://"
-        " plays a bag of them.",
+        " plays a bag of these topics.",
         fixed=True,
     ),
 )
@@ -82,7 +82,7 @@ COMMANDS: Final = (
         "enable_stamped_cmd_vel",
         False,
         "",
-        "Subscribe cmd_vel as geometry_msgs/TwistStamped instead of geometry_msgs/Twist.",
+        "Subscribe to cmd_vel as geometry_msgs/TwistStamped instead of geometry_msgs/Twist.",
         fixed=True,
     ),
     Parameter(
@@ -115,8 +115,8 @@ COMMANDS: Final = (
         "max_linear_acceleration",
         0.0,
         "m/s²",
-        "Largest acceleration of the linear velocity by cmd_vel, as a vector. 0 turns the limit"
-        " off. Zero commands and wheel_cmd are not limited.",
+        "Largest acceleration with which cmd_vel changes the linear velocity, as a vector. 0 turns"
+        " the limit off. Zero commands and wheel_cmd are not limited.",
         low=0.0,
         high=100.0,
     ),
@@ -124,7 +124,7 @@ COMMANDS: Final = (
         "max_angular_acceleration",
         0.0,
         "rad/s²",
-        "Largest acceleration of the yaw rate by cmd_vel. 0 turns the limit off.",
+        "Largest acceleration with which cmd_vel changes the yaw rate. 0 turns the limit off.",
         low=0.0,
         high=1000.0,
     ),
@@ -159,7 +159,7 @@ FRAMES: Final = (
         "base_frame",
         "base_link",
         "",
-        "Frame of the robot's base, which the odometry moves.",
+        "Frame of the robot's base; the odometry gives its pose in odom_frame.",
         fixed=True,
     ),
     Parameter("imu_frame", "imu_link", "", "Frame of the IMU's axes.", fixed=True),
@@ -167,8 +167,8 @@ FRAMES: Final = (
         "frame_prefix",
         "",
         "",
-        "Prefix of every frame name, with its slash, such as robot1/. robot_state_publisher uses"
-        " its prefix in the same way.",
+        "Prefix of every frame name, including the slash, such as robot1/. The parameter of this"
+        " name of robot_state_publisher works in the same way.",
         fixed=True,
     ),
     Parameter(

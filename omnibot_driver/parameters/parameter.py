@@ -28,7 +28,8 @@ class Parameter:
     value.
 
     The default of a list has at least one item. Range and choices apply to each item. ``length`` is
-    the least and the largest number of items; without ``length``, it is that of the default.
+    the least and the largest number of items; without ``length``, a list has as many items as the
+    default.
     """
 
     name: str

@@ -23,8 +23,8 @@ ROBOT: Final = (
         "odom_linear_scale",
         1.0,
         "m/m",
-        "True distance divided by the distance that the board reports (it assumes nominal wheels);"
-        " calibrate geometry measures it.",
+        "True distance divided by the distance that the board reports, which assumes nominal"
+        " wheels. calibrate geometry measures this ratio.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -33,8 +33,8 @@ ROBOT: Final = (
         "odom_angular_scale",
         1.0,
         "rad/rad",
-        "True angle divided by the angle that the board reports (it assumes nominal wheels);"
-        " calibrate geometry measures it.",
+        "True angle divided by the angle that the board reports, which assumes nominal wheels."
+        " calibrate geometry measures this ratio.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -44,7 +44,7 @@ ROBOT: Final = (
         2.0,
         "m/s",
         "Highest linear speed that the robot can reach, even if it is pushed. The driver rejects"
-        " faster displacements and applies corrections of odom no faster. It must not be below"
+        " faster displacements, and never corrects odom faster than this. It must not be below"
         " max_linear_speed.",
         low=0.1,
         high=10.0,
@@ -81,7 +81,7 @@ ROBOT: Final = (
         4.0,
         "m/s²",
         "Largest spike of one accelerometer axis that the driver publishes. It rejects a larger"
-        " spike that lasts one reading and has the size of a flipped bit.",
+        " spike if this lasts one reading and has the size of a flipped bit.",
         low=0.1,
         high=1000.0,
     ),

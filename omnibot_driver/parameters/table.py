@@ -61,8 +61,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""By common parameter: the condition on a board's traits under which the board has this
-parameter."""
+"""Conditions on a board's traits, by the name of the common parameter that needs them. A parameter
+that is not listed needs none."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",
@@ -78,8 +78,8 @@ DISPENSABLE: Final = frozenset(
         "twist_angular_stddev",
     }
 )
-"""Common parameters that a board may lack; the driver reads all others on each board
-whose traits they fit."""
+"""Common parameters that a board may omit. All other common parameters exist on each board whose
+traits they fit, because the driver reads them there."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
 """Values of ``on_exit`` besides stop, with the request that a board must accept for each."""
 
@@ -205,7 +205,7 @@ def _require_ranges(values: Mapping[str, Any]) -> None:
 
 
 def _require_possible_speeds(values: Mapping[str, Any]) -> None:
-    """Reject speed limits above the fastest believable speed, where odometry rejects motion."""
+    """Reject speed limits above the fastest possible speed: odometry would reject such motion."""
     for kind, unit in (("linear", "m/s"), ("angular", "rad/s")):
         commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
         if commanded in values and values[commanded] > values[possible]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the program's own arguments, and those of ROS.
 
-    ROS's stand between ``--ros-args`` and ``--`` (or the end); both markers are kept with them.
+    ROS's arguments stand between ``--ros-args`` and ``--`` (or the end), and include both markers.
     """
     own: list[str] = []
     ros: list[str] = []

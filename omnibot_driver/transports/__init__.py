@@ -12,14 +12,15 @@ from typing import Final, Protocol
 from omnibot_driver.core.packets import Packet, Packets
 
 READ_TIMEOUT_S: Final = 0.2
-"""Longest wait of a ``read``, in s, after which a reader without ``interrupt`` can end."""
+"""Longest wait of a ``read``, in s; a reader that ``interrupt`` cannot wake ends after this
+time."""
 WRITE_TIMEOUT_S: Final = 0.2
 NONE_MISSING: Final[Mapping[int, str]] = {}
 """Value of ``missing`` for a transport that is open completely or not at all."""
 
 
 class LinesChanged(Exception):
-    """A line of several was lost or reopened; ``Transport.missing`` has those that are missing."""
+    """One of several lines was lost or reopened; ``Transport.missing`` has those missing now."""
 
 
 class Transport(Protocol):
@@ -29,7 +30,7 @@ class Transport(Protocol):
     def descriptors(self) -> tuple[int | None, ...] | None:
         """File descriptors by channel, which another process may inherit to write the same bytes.
 
-        None if descriptors cannot be inherited; None as an item for each missing line.
+        None if descriptors cannot be inherited. The item of a missing line is None.
         """
 
     @property
@@ -47,8 +48,8 @@ class Transport(Protocol):
     def read(self) -> Packet:
         """Wait for a packet and return it; after a while without any, return one without bytes.
 
-        Raises LinkError when the line is lost, and LinesChanged when one of several is lost or is
-        back.
+        Raises LinkError when the line is lost, and LinesChanged when one of several lines is lost
+        or open again.
         """
 
     def write(self, packets: Packets) -> None:
@@ -61,7 +62,7 @@ class Transport(Protocol):
         """Write what is accepted without waiting, perhaps nothing; return the number of bytes."""
 
     def interrupt(self) -> None:
-        """End a ``read`` that waits in another thread, where it can be ended."""
+        """End a ``read`` that waits in another thread, if this kind of port allows it."""
 
     def close(self) -> None:
         """Close the lines. A second call does nothing."""

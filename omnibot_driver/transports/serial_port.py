@@ -32,8 +32,8 @@ PEER_OPTIONS: Final = {
     socket.TCP_KEEPINTVL: 1,
     socket.TCP_USER_TIMEOUT: 5000,
 }
-"""Socket options: a network peer that acknowledges nothing for five seconds is lost; an idle one is
-probed every second."""
+"""Socket options: a network peer that acknowledges nothing for five seconds is regarded as lost; an
+idle peer is probed every second."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Major device numbers of pseudo-terminals in Linux."""
 
@@ -61,13 +61,13 @@ class SerialPort:
                 url,
                 baudrate=baudrate,
                 timeout=READ_TIMEOUT_S,
-                # Over rfc2217 pyserial cannot limit a write; there its socket does, to 5 s.
+                # Over rfc2217 pyserial cannot limit a write's time; the socket limits it to 5 s.
                 write_timeout=None if url.startswith("rfc2217:") else WRITE_TIMEOUT_S,
                 exclusive=True,
             )
         except LinkError:
             raise
-        except Exception as error:  # its URL handlers can raise any exception
+        except Exception as error:  # pyserial's URL handlers can raise any exception
             raise LinkError(_explain(url, parameter, error)) from error
         try:
             self._settle_in()
@@ -101,7 +101,7 @@ class SerialPort:
         except OSError as error:
             if not data:
                 raise LinkError(f"lost {self._url} while reading: {error}") from error
-        return data  # bytes from before a loss; the next call detects it again
+        return data  # from before a loss, which the next call detects again
 
     def write(self, packets: Packets) -> None:
         """Write all bytes at once."""
@@ -128,7 +128,7 @@ class SerialPort:
             self._serial.reset_output_buffer()
 
     def interrupt(self) -> None:
-        """End a ``read`` that waits in another thread, where the port can do so."""
+        """End a ``read`` that waits in another thread, if this kind of port allows it."""
         cancel = getattr(self._serial, "cancel_read", None)
         if cancel is not None:
             cancel()
@@ -185,7 +185,10 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Write all bytes. Unlike pyserial, sleep until there is room. Raises TimeoutError."""
+    """Write all bytes; unlike pyserial, sleep until there is room.
+
+    Raises TimeoutError after ``WRITE_TIMEOUT_S``.
+    """
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:
         try:
@@ -234,7 +237,7 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
             f"{url} is in use by another program{_owner(url)}, perhaps a second driver; end it"
             f" first (`fuser {url}` names it; the guard of a killed driver ends by itself)"
         )
-    # A text that pyserial makes of another error names the port twice.
+    # pyserial's text for an error of the operating system would name the port twice.
     source = error.__context__ if isinstance(error.__context__, OSError) else error
     reason = getattr(source, "strerror", None) or source
     if isinstance(source, ConnectionRefusedError):

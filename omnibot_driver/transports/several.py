@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Several lines of bytes as one transport, with the channels of one line after those of another.
+"""Several lines of bytes as one transport; each line is one channel.
 
-A line that is missing or blocked does not keep the others from being read or written. It is opened
-again by itself, while the others stay open. When the set of present lines has changed, ``read``
-raises LinesChanged.
+If a line is missing or blocked, the others are still read and written. Only this line is opened
+again, while the others stay open. When the set of present lines has changed, ``read`` raises
+LinesChanged.
 """
 
 import select
@@ -61,9 +61,10 @@ class Several:
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Descriptors of all lines; None in the place of a missing one, even if it is still open.
+        """Descriptors of all lines; None for a missing line, even if it is still open.
 
-        A copy of its descriptor in another process would keep it from being opened again.
+        A copy of its descriptor in another process would prevent the driver from opening the line
+        again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -84,9 +85,9 @@ class Several:
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
-        """Return what has come in on one of the lines; the lines take turns.
+        """Return the bytes received on one of the lines; the lines take turns.
 
-        Raises LinesChanged when a line is lost or is back, and LinkError when all are missing.
+        Raises LinesChanged when a line is lost or open again, and LinkError when all are missing.
         """
         if not self._ready:
             self._open_missing()
@@ -114,7 +115,7 @@ class Several:
             return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """Write to each line its packets; what is not accepted at once follows later."""
+        """Write to each line its packets; bytes that are not accepted at once follow later."""
         now = time.monotonic()
         with self._writing:
             for line, data in self._shared_out(packets):
@@ -125,7 +126,7 @@ class Several:
             self._wake_up.ring()
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write to each line what it accepts of its packets at once; return the number of bytes."""
+        """Write to each line the bytes that it accepts at once; return their number."""
         with self._writing:
             return sum(
                 line.port.write_if_room(((0, data),))
@@ -154,7 +155,7 @@ class Several:
             yield self._lines[channel], joined(own)
 
     def _open_missing(self) -> None:
-        """Open the missing lines whose retry is due. One that accepted no data is closed first."""
+        """Open the missing lines whose retry is due. A line that is still open is closed first."""
         now = time.monotonic()
         for channel, line in enumerate(self._lines):
             if not line.trouble or now < line.retry_at:
@@ -180,7 +181,7 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write waiting bytes where there is room, and watch for room where bytes remain.
+        """Write waiting bytes to lines with room, and watch for room on lines where bytes remain.
 
         A line without room for ``WRITE_TIMEOUT_S`` is regarded as missing.
         """
@@ -212,7 +213,7 @@ class Several:
     def _close(self, line: "Line") -> None:
         with self._writing:
             port = line.end()
-        if port is not None:  # it may wait for output that the kernel still has
+        if port is not None:  # without the lock, as this may wait for the kernel's output
             port.close()
 
     def _require_one(self) -> None:
@@ -246,9 +247,9 @@ class Line:
         self.trouble, self.waits, self.watched = "", b"", False
 
     def write(self, data: bytes, now: float) -> bool:
-        """Write ``data`` after the waiting bytes; return False if some remain for too long.
+        """Write ``data`` after the waiting bytes; return False if bytes have waited for too long.
 
-        To a missing line that is still open, write only what is accepted at once.
+        To a missing line that is still open, write only the bytes that it accepts at once.
         """
         if self.port is None:
             return True

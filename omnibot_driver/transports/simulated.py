@@ -3,7 +3,7 @@
 """``sim://``: a simulated board inside this process, as a transport.
 
 Options follow a question mark: ``sim://?seed=1&lose=0.001``. The board starts when the transport is
-opened, and ends with it. This module knows the package of the simulated board by its name, and not
+opened, and ends with it. This module knows the name of the simulated board's package, but not
 the meaning of its bytes.
 """
 
@@ -109,9 +109,9 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
         self._inbox.put(packet)
 
     def read(self, timeout_s: float | None) -> Packet:
-        """Return the oldest unread datagram, or the oldest unread bytes of one channel in a row.
+        """Return the oldest unread datagram, or the oldest consecutive bytes of one channel.
 
-        ``(0, b"")`` after ``timeout_s``, or after ``cancel``.
+        Returns ``(0, b"")`` after ``timeout_s``, or after ``cancel``.
         """
         with self._came:
             self._came.wait_for(lambda: self._outbox or self._cancelled or self._error, timeout_s)

@@ -44,7 +44,7 @@ class UdpPorts:
             except BaseException:
                 self.close()
                 raise
-        except (OSError, ValueError) as error:  # a name that cannot be one is a ValueError
+        except (OSError, ValueError) as error:  # an impossible host name raises ValueError
             reason = getattr(error, "strerror", None) or error
             raise LinkError(
                 f"cannot reach {url}: {reason}; check the parameter `port` and the network"
@@ -138,7 +138,7 @@ class UdpPorts:
             except OSError as error:
                 if not (may_be_stale and _is_silence(error)):
                     raise
-                may_be_stale = False  # it is of an earlier datagram, and this one was not sent
+                may_be_stale = False  # the error of an earlier datagram; this one was not sent
             else:
                 return
 

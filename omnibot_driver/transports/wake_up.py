@@ -2,7 +2,7 @@
 
 """A pipe that ends a thread's wait for arrivals when another thread writes into it.
 
-This module knows one pair of descriptors, and not what is waited for.
+This module knows one pair of descriptors, but not what the thread waits for.
 """
 
 import contextlib

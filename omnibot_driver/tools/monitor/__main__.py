@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     parser = argparse.ArgumentParser(
         prog="monitor",
-        description="A running driver on one screen, with an e-stop under the space bar.",
+        description="Show a running driver on one screen; the space bar latches the e-stop.",
         epilog="ROS's own arguments follow --ros-args. Exit codes: 0 at the end, 1 with a message"
         " when something is missing or wrong, 2 on wrong usage. See docs/tools/monitor.md.",
     )
@@ -55,7 +55,7 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         "--driver",
         default="omnibot_driver",
         metavar="NAME",
-        help="its node name (default: %(default)s)",
+        help="the driver's node name (default: %(default)s)",
     )
     parser.add_argument("--once", action="store_true", help="print one snapshot and end")
     parser.add_argument("--json", action="store_true", help="print one snapshot as JSON and end")
@@ -84,7 +84,7 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
 def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
     if not options.once and not has_screen():
         if options.teleop:
-            raise ToolError("--teleop needs a terminal: a pipe has no keys to be held")
+            raise ToolError("--teleop needs a terminal: a pipe has no keys")
         print(
             "monitor: this is not a terminal, so one snapshot is printed, as with --once",
             file=sys.stderr,
@@ -129,7 +129,7 @@ def _find(feed: "Feed", timeout_s: float) -> None:
         domain = os.environ.get("ROS_DOMAIN_ID", "0")
         raise ToolError(
             f"no driver is running in ROS domain {domain}: start one with ros2 run omnibot_driver"
-            " driver, or set ROS_DOMAIN_ID as it is where the driver runs"
+            " driver, or set ROS_DOMAIN_ID to the driver's domain"
         )
     namespace, _, name = there[0].rpartition("/")
     others = f"--namespace {namespace or '/'}" + (
@@ -139,7 +139,7 @@ def _find(feed: "Feed", timeout_s: float) -> None:
 
 
 def _gather(feed: "Feed", timeout_s: float) -> View:
-    """Wait for all topics of a driver in this state and a full window of rates; return the view."""
+    """Wait for all topics of the present state, and for a full window of rates; return the view."""
     began_s = time.monotonic()
     _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)
     _comes_about(lambda: time.monotonic() - began_s > WINDOW_S, WINDOW_S)

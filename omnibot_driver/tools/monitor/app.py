@@ -128,7 +128,7 @@ class Monitor(App[None]):
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.exit)
-        # Within a write, Textual's handler would wait for that write to end.
+        # Called during a write, Textual's own handler would wait for the end of this write.
         if callable(leave := signal.getsignal(signal.SIGTSTP)):
             loop.add_signal_handler(signal.SIGTSTP, leave, signal.SIGTSTP, None)
         loop.add_signal_handler(signal.SIGCONT, self._come_back)
@@ -138,7 +138,7 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        Otherwise keys would have two readers, each of which runs until its own end.
+        ``suspend`` ends the thread that reads keys; otherwise a second one would run beside it.
         """
         with self.suspend():
             pass
@@ -207,7 +207,7 @@ class Monitor(App[None]):
         return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:
-        """Stop the robot that the keys steer when the terminal loses the focus."""
+        """Stop steering the robot when the terminal loses the focus."""
         if self._robot.dead_man:
             self._robot.dead_man.stop()
 

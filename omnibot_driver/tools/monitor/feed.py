@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Connect the monitor to the driver: topics update a model; services and ``cmd_vel`` are sent.
+"""Connect the monitor to the driver: topics update a model, requests and ``cmd_vel`` are sent.
 
 Callbacks run on a separate executor thread, so the screen does not delay them.
 """
@@ -49,7 +49,7 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 INSIST_EVERY_S: Final = 0.2
 PARAMETERS: Final = ("port", "max_linear_speed", "max_angular_speed")
 IMU_PARAMETER: Final = "imu_frame"
-"""A parameter of drivers whose board has an IMU."""
+"""A parameter that a driver has only if its board has an IMU."""
 
 
 class Feed:
@@ -127,7 +127,7 @@ class Feed:
         )
 
     def diagnoses(self) -> bool:
-        """Whether the driver publishes diagnostics (one that replays a recording does not)."""
+        """Whether the driver publishes diagnostics (a driver that replays a recording does not)."""
         return any(
             f"{info.node_namespace.rstrip('/')}/{info.node_name}" == self.driver
             for info in self._node.get_publishers_info_by_topic(DIAGNOSTICS_TOPIC)
@@ -188,8 +188,7 @@ class Feed:
         self._learned = False
 
     def _learn(self) -> None:
-        """Read the driver's parameter names after each change of state: it may be another
-        driver."""
+        """Read the parameter names after each change of state, as another driver may run now."""
         if not self._learned and self._list.service_is_ready():
             self._learned = True
             listing = self._list.call_async(ListParameters.Request())

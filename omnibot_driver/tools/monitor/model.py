@@ -24,7 +24,7 @@ DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
 """Time in which a command is valid, in s: the driver's ``cmd_vel_timeout``."""
 SILENT_S: Final = 3.0
-"""Time without diagnostics or other messages, in s, after which they are outdated.
+"""Time, in s, after which diagnostics are outdated, and a driver that sends nothing is silent.
 
 Diagnostics are published every second.
 """
@@ -32,9 +32,9 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""Largest speed of the robot, in m/s, to tell a reset of the odometry.
+"""Largest speed of the robot, in m/s, that is assumed to detect a reset of the odometry.
 
-A pose further away than ``JUMP_M`` and this speed allow begins a new path.
+A pose that is further away than ``JUMP_M`` and this speed allow begins a new path.
 """
 
 
@@ -51,8 +51,8 @@ class Flow:
 class View:
     """The values to show at one moment; unknown or outdated ones are None or empty.
 
-    ``steers``: whether another node receives the commands sent here; ``lacks``: what the robot's
-    board cannot do, of ``imu``, ``start`` and ``pause``.
+    ``steers``: whether another node receives the commands sent here; ``lacks``: those of ``imu``,
+    ``start`` and ``pause`` that the robot's board does not have.
     """
 
     driver: str
@@ -157,7 +157,7 @@ class Model:
         self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
 
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
-        """Store a ``cmd_vel``, which does not show that the driver is running."""
+        """Store a ``cmd_vel``. It does not show that the driver runs: other nodes publish it."""
         self._commanded = twist, now_s
 
     def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:

@@ -31,7 +31,7 @@ class Picture:
 def draw_path(
     points: Iterable[tuple[float, float]], columns: int, rows: int, robot: Pose | None = None
 ) -> Picture:
-    """Draw the path from above, x to the right, y up, as large as it fits; the robot is an arrow.
+    """Draw the path from above, x to the right, y up, as large as possible; the robot is an arrow.
 
     Points that are not finite, or a million metres away, are left out.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steer by keys, with a dead man's rule. Knows keys and times; no terminal, no ROS, no clock.
+"""Steer by keys, with a dead man's switch. Knows keys and times; no terminal, no ROS, no clock.
 
 A terminal reports that a key is pressed, repeats it while it is held, and does not report its
 release. So a key moves the robot for a short time only, and holding the key renews that time.
@@ -19,11 +19,13 @@ Most keyboards repeat after 0.25 s to 0.6 s.
 REPEAT_S: Final = 0.3
 """Time for which a repeated key moves the robot, in s; several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
-"""Time between calls, in s, above which the program was suspended; older keys are discarded."""
+"""Time between two calls of ``command``, in s, that shows that the program was suspended; older
+keys are then discarded."""
 DEAF_S: Final = 0.3
-"""Time after a suspension, in s, in which keys do not steer, while pending keys are read."""
+"""Time after a suspension, in s, in which keys do not steer, because older keys are still read."""
 ZEROS: Final = 5
-"""Number of zero commands after a motion; then none follow, as others may want to drive."""
+"""Number of zero commands after a motion. Then nothing is published: other nodes may want to
+drive."""
 LEVELS: Final = 10
 NOTHING: Final = ("", -math.inf)
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)

@@ -81,7 +81,7 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """Return a line for each status that is not OK, and one for all others, with levels."""
+    """Return a line for each status that is not OK, and one line for all that are, with levels."""
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)
@@ -112,8 +112,8 @@ def report(view: View) -> str:
 
 
 def as_json(view: View, troubles: Iterable[str]) -> str:
-    """Return the view as JSON. As JSON has no NaN, non-finite values are null, and in
-    ``troubles``."""
+    """Return the view as JSON. JSON cannot express NaN: a non-finite value is null, and
+    ``troubles`` names it."""
     inertial = {
         "imu": {
             "linear_acceleration_mps2": _finite(view.force_mps2),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Receive ``cmd_vel`` of any node, and publish the commands of a dead man. Knows ROS alone."""
+"""Receive ``cmd_vel`` of any node, and publish the commands of a dead man. Knows only ROS."""
 
 import time
 from collections.abc import Callable

@@ -25,7 +25,7 @@ NEWS_EVERY: Final = 2000
 """Number of messages between two reports of progress."""
 
 Progress = Callable[[int, int], None]
-"""A function that receives the number of messages read so far, and of all messages."""
+"""A function that receives the number of messages read so far, and the number of all messages."""
 
 
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:

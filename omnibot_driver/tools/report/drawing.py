@@ -25,7 +25,7 @@ POINTS: Final = 3000
 
 
 def new_figure(height_in: float) -> Figure:
-    """A new figure with the common width."""
+    """Return a new figure with the common width."""
     return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
 
 
@@ -53,7 +53,7 @@ def legend_below(axes: Axes) -> None:
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return the minimum and maximum of each stretch, in order.
+    """Return a shorter line: the minimum and maximum of each of its stretches, in order.
 
     Lines of at most ``POINTS`` points are returned unchanged.
     """

@@ -104,7 +104,7 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Diagnostics",
-            f"/diagnostics is of several robots, on {ports}; all are listed here.",
+            f"/diagnostics has data of several robots, on {ports}; all are listed here.",
         )
     troubles = [
         status

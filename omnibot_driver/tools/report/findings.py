@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The findings of a report: a level, a sentence with its number, and advice."""
+"""The findings of a report: each has a level, a sentence with a measured value, and advice."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One sentence with its number; ``advice`` is empty if no action is needed."""
+    """One sentence with a measured value; ``advice`` is empty if no action is needed."""
 
     level: Level
     subject: str

@@ -56,7 +56,7 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """Return the parameters that correct wrong speeds; a base with two wheels has other ones."""
+    """Return the parameters that correct wrong speeds; they differ for a base with two wheels."""
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"
@@ -84,7 +84,7 @@ def wheel_name(joint: str) -> str:
 
 
 def shown(log: Log) -> list[Pair]:
-    """Return the pairs to show; without any, the measurements of odom."""
+    """Return the pairs to show; if there are none, the measurements of odom."""
     return pairs(log) or [twists(log)]
 
 
@@ -94,7 +94,10 @@ def _sampled(series: Series) -> Series:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How commands were followed: after ``lag_s``, with a ``gain`` per axis (NaN: not known)."""
+    """The robot's response to commands: its delay and, for each axis, its gain and rms error.
+
+    A gain is measured divided by commanded motion; it is NaN if it is not known.
+    """
 
     lag_s: float
     gains: Array
@@ -102,7 +105,7 @@ class Answer:
 
 
 def answer(pair: Pair, usable: Mask) -> Answer | None:
-    """Return the lag that explains the measurements best, and the gains; None without commands."""
+    """Return the response, with the lag that fits the measurements best; None without commands."""
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
     best_s, least = 0.0, np.inf
@@ -161,8 +164,8 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
-    """Return commanded and measured speed of a rim in m/s, and the first measurement's times in
-    s."""
+    """Return the commanded and the measured speed of a rim in m/s, and the times of the first
+    pair's measurements in s."""
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
     times_s = found[0].measured.stamp_s

@@ -16,7 +16,7 @@ WITHOUT = {
 
 
 def judge(log: Log) -> list[Finding]:
-    """Return all findings by level; those of one level stay in the order of the subjects."""
+    """Return all findings by level; findings of one level stay in the order of the subjects."""
     return sorted(_all(log), key=lambda finding: -finding.level)
 
 

@@ -22,14 +22,14 @@ from omnibot_driver.tools.report.robots import Topics, choose, find
 LOOK_ROUND_S: Final = 2.0
 """Time to look for robots, in s.
 
-It does not end when a robot is found, because there may be others.
+The search does not end when a robot is found, because there may be others.
 """
 DISCOVERY_S: Final = 5.0
 DEPTH: Final = 1000
 COMMANDS: Final = ("cmd_vel", "wheel_cmd")
 
 Progress = Callable[[int, int], None]
-"""A function that receives the seconds listened so far, and their total."""
+"""A function that receives the seconds listened so far, and the seconds to listen in all."""
 
 
 def listen(
@@ -106,7 +106,7 @@ def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str)
     latched = role in EVENTS and role != DIAGNOSTICS
     qos = QoSProfile(
         depth=DEPTH,
-        # A commander may publish as best effort; such a subscription receives both.
+        # A commander may publish as best effort; a best-effort subscription receives every kind.
         reliability=ReliabilityPolicy.BEST_EFFORT
         if role in COMMANDS
         else ReliabilityPolicy.RELIABLE,
@@ -114,7 +114,7 @@ def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str)
     )
     hear = partial(_hear, recorder, role, kind)
 
-    # rclpy passes a message's info to a callback that has two arguments of its own.
+    # rclpy passes a message's info only to a callback that has two parameters.
     def heard(message: Any, info: Any) -> None:
         hear(message, info)
 

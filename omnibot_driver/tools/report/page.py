@@ -28,7 +28,8 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         plots.timeline,
         lambda log: len(log.states) + len(log.diagnostics),
         "Bands over time. Diagnostics: green is OK, yellow WARN, red ERROR, grey STALE. Red shading"
-        " in the pictures below is a latched e-stop, other shading a state that does not run.",
+        " in the pictures below is a latched e-stop, other shading is a state in which the board"
+        " does not run.",
     ),
     (
         "path",

@@ -39,7 +39,8 @@ LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""Range of the drawn times, in 99 % quantiles; larger values are drawn at its edge."""
+"""Range of the axis of times, in multiples of their 99 % quantile; larger values are drawn at its
+edge."""
 
 
 def path(log: Log) -> Figure:
@@ -163,7 +164,7 @@ def spectra(log: Log) -> Figure:
 
 
 def timing(log: Log) -> Figure:
-    """Draw intervals of timestamps, and arrival delays above the least one.
+    """Draw intervals of timestamps, and arrival delays above the smallest one.
 
     Both are drawn over time and as histograms.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Convert messages to columns; those of rosbags and of rclpy have the same fields."""
+"""Convert messages to columns; messages of rosbags and of rclpy have the same fields."""
 
 import math
 from array import array
@@ -17,7 +17,7 @@ from omnibot_driver.tools.report.log import Log, Series, Span, Status
 
 NO_STAMP: Final = -1
 WHEEL: Final = "wheel"
-"""Part of the name of every driven wheel's joint, and of no other."""
+"""Part of the name of every driven wheel's joint; no other joint has it in its name."""
 DIAGNOSTICS: Final = "/diagnostics"
 
 Row = tuple[float, ...]
@@ -134,13 +134,13 @@ class Recorder:
         self.count += 1
 
     def _rates(self, message: Any) -> Row:
-        """Return the rates of the wheels, by the names and order of the first message."""
+        """Return the rates of the wheels that the first message names, in its order."""
         self._wheels = self._wheels or tuple(name for name in message.name if WHEEL in name)
         rates = dict(zip(message.name, message.velocity, strict=False))
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
-        """Return all messages in the order of arrival, as a log; there must have been one."""
+        """Return all messages in the order of arrival, as a log; at least one must exist."""
         times = [
             *(time for column in self._columns.values() for time in column.arrived_ns),
             *(time for events in self._events.values() for time, _ in events),

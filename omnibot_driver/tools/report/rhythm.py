@@ -35,8 +35,8 @@ RECOVERY_S: Final = 0.75
 class Stream:
     """What is expected of a topic's timing.
 
-    ``lost``: keys of the driver's counts of lost messages; ``rates``: keys of the expected rates in
-    its diagnostics, the best first.
+    Keys in the driver's diagnostics: ``lost`` for the counts of lost messages, ``rates`` for the
+    expected rates, the best first.
     """
 
     name: str
@@ -83,7 +83,8 @@ class FrameSchedule:
 
     ``steps_s``: steps between successive timestamps, from ``at_s`` on; ``period_s``: their median.
     Gaps: where they begin, how long they are, how many messages are missing; gaps that the driver's
-    state explains are left out. Leaps: wide steps that were taken back, so nothing is missing.
+    state explains are left out. Leaps: wide steps that later short steps
+    compensate, so nothing is missing.
     ``late_s``: arrival after the timestamp, at ``arrived_s``.
     """
 
@@ -144,7 +145,7 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each wide step, the end of the rows that show whether it was taken back."""
+    """Return, for each wide step, the end of the rows that may compensate it."""
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
     return ends
@@ -263,7 +264,8 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
             "Timing",
             f"{stream.name} arrives {middle_s:.3g} s after its stamp (median), and never sooner"
             f" than {least_s:.3g} s.",
-            "The recorder's clock is not the driver's: synchronise them (chrony), or record there.",
+            "The clocks of recorder and driver differ: synchronise them (chrony), or record on the"
+            " robot.",
         )
     over_s, most_s = mean_s - least_s, float(np.quantile(rhythm.late_s, 0.99)) - least_s
     late = over_s > LATE_S

@@ -13,7 +13,7 @@ PROOF: Final = ("imu/data_raw", "odom", "state")
 """Topics that identify a robot: its namespace must have at least one of them."""
 
 Topics = dict[str, str]
-"""The role of each topic."""
+"""The role of each topic, by the name of the topic."""
 
 
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:

@@ -3,7 +3,7 @@
 """Repair files of bags that were never finished, in a copy.
 
 An mcap (mcap.dev/spec) is a sequence of records: an operation of one byte, a length of eight bytes,
-and that many bytes of content. Then comes an index, without which it can be read as well. The
+and that many bytes of content. An index follows; the records can also be read without it. The
 latest changes of an sqlite3 database are in a separate file beside it.
 """
 

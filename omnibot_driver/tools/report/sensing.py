@@ -25,7 +25,7 @@ REST_S: Final = 0.5
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
-"""Rate, in rad/s, above which the robot turns if odometry is missing.
+"""Rate, in rad/s, above which the robot is taken to turn if odometry is missing.
 
 A constant rate above it might also be a bias, but such a bias is rare.
 """
@@ -34,7 +34,7 @@ LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
-"""Fraction of an odometry step for which gyro data must have been received to compare both."""
+"""Fraction of an odometry step for which gyro data is needed to compare gyro and odometry."""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
 """Frequency in Hz below which a vibration is regarded as caused by driving."""
@@ -49,7 +49,7 @@ def rate_hz(imu: Series) -> float:
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """Return which readings are at rest, by the odometry, or else by blocks of the IMU."""
+    """Return which readings are at rest, by odometry or, without it, by blocks of IMU readings."""
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
         unheard = np.diff(odom.stamp_s) > SHORT_GAP_S
@@ -76,7 +76,7 @@ def at_rest(log: Log, imu: Series) -> Mask:
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Amplitude spectral densities per √Hz at these frequencies: gyro (n, 3) and force (n, 3)."""
+    """Amplitude spectral densities per √Hz at n frequencies: columns 0-2 gyro, 3-5 force."""
 
     frequency_hz: Array
     density: Array
@@ -190,7 +190,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
     )
     if abs(bias[axis]) > LARGEST_BIAS_RADPS:
         yield Finding(
-            Level.WARN, "IMU", f"{figure}.", "Call ~/calibrate_gyro while the robot stands."
+            Level.WARN, "IMU", f"{figure}.", "Call ~/calibrate_gyro while the robot stands still."
         )
     else:
         yield Finding(Level.GOOD, "IMU", f"{figure}.")
@@ -199,7 +199,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
     """Return the ratio of gyro z to the odometry's yaw, and the angle turned in all, in rad.
 
-    Only steps in which both were received are evaluated.
+    Only steps in which both gyro and odometry were received are evaluated.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:
@@ -239,7 +239,7 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "IMU",
-            f"{figure}, in the same sense: the sensor stands upright.",
+            f"{figure}, in the same direction: the sensor is mounted upright.",
             "The description has it upside down: set imu_rpy there.",
         )
     else:
@@ -257,7 +257,7 @@ def _vibration(imu: Series, rest: Mask) -> Iterator[Finding]:
     width_hz = float(moved.frequency_hz[1] - moved.frequency_hz[0])
     rms = float(np.sqrt(power.sum() * width_hz))
     figure = (
-        f"In motion it shakes by {rms:.2f} m/s² rms above {VIBRATION_HZ:g} Hz,"
+        f"In motion the robot shakes by {rms:.2f} m/s² rms above {VIBRATION_HZ:g} Hz,"
         f" most at {moved.frequency_hz[above][power.argmax()]:.1f} Hz"
     )
     if rms > STRONG_VIBRATION_MPS2:

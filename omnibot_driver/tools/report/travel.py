@@ -15,10 +15,10 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in m/s, m/s and rad/s above which the robot moves."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""Largest difference between a pose and the pose that the twist leads to, in rad.
+"""Largest difference, in rad, between a pose and the pose that the twist leads to.
 
-``LEAP_M`` is the same in m; more is a leap. The driver corrects by no more in a step
-(fastest_linear_speed and so on).
+``LEAP_M`` is the same in m. A larger difference is a leap: the driver never corrects odom by more
+than this in one step (fastest_linear_speed limits it).
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
@@ -35,8 +35,8 @@ def moving(odom: Series) -> Mask:
 class Steps:
     """The steps from each message of odom to the next.
 
-    ``way_m`` and ``turned_rad`` are 0 for leaps. In a leap the pose differs from what the twist
-    leads to, by ``off_m`` and ``off_rad``. ``reset``: leaps to zero.
+    ``way_m`` and ``turned_rad`` are 0 for leaps. In a leap the pose differs from the
+    pose that the twist leads to, by ``off_m`` and ``off_rad``. ``reset``: leaps to zero.
     """
 
     way_m: Array
@@ -105,7 +105,8 @@ def _leaps(odom: Series, found: Steps) -> Iterator[Finding]:
             Level.NOTE,
             "Odometry",
             f"The pose began again at zero {counted(int(found.reset.sum()), 'time')}, first at"
-            f" {at_s[found.reset][0]:.1f} s: ~/reset_odometry, or another driver.",
+            f" {at_s[found.reset][0]:.1f} s: ~/reset_odometry was called, or"
+            " another driver was started.",
         )
     leap = found.leap & ~found.reset
     if not leap.any():
