@@ -44,7 +44,7 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
         os.close(descriptor)
 
 
-def test_who_prints_more_than_nobody_reads_is_not_held_up() -> None:
+def test_output_that_is_not_read_does_not_block_the_program() -> None:
     """The output exceeds all buffers between program and reader."""
     program = """
 import contextlib, os

@@ -44,7 +44,7 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
     assert os.listdir(tmp_path) == []
 
 
-def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
+def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """The sentence names the unknown board and lists those that exist."""

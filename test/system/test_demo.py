@@ -256,7 +256,7 @@ def test_every_board_has_a_demo(name: str) -> None:
     assert capability.title
 
 
-def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
+def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """The message comes before anything is started."""

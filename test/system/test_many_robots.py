@@ -105,7 +105,7 @@ def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
     assert [message.data for message in third.estop_active] == [False]
 
 
-def test_two_of_the_same_name_are_told_of_each_other() -> None:
+def test_two_drivers_of_one_name_report_each_other() -> None:
     """Both drivers report it, whichever started first."""
     with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
         for driver in (first, second):

@@ -127,7 +127,7 @@ def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
         walk("+00", "0-0", "00+")
 
 
-def test_who_keeps_answering_what_cannot_be_is_sent_to_read_on() -> None:
+def test_repeated_contradictory_answers_refer_to_the_documentation() -> None:
     """After three contradictory answers the tool ends and refers to the documentation."""
     with pytest.raises(ToolError, match=r"wheel B was seen to turn.*docs/commissioning.md"):
         walk("000", "+++", "0-0")
