@@ -27,7 +27,7 @@ RESTART_S: Final = 1.0
 HANGS_AFTER: Final = 50
 """Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
-"""Number of killed guards that have not ended yet, at which the driver stops starting new ones."""
+"""Number of killed guards that have not ended yet at which the driver starts no further guard."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
 """Longest wait for a killed guard to end, in s. A guard that takes longer is in an

@@ -65,7 +65,7 @@ class StallDetector:
         """Note that the watchdog's thread runs; ``wall_ns`` is the time of day in ns."""
         if self._begun:
             self._begun = False
-            if now >= self._over_at + LATEST_S:  # else those of the last stall may still arrive
+            if now >= self._over_at + LATEST_S:  # else commands from then may still arrive
                 self._from_ns = _ns(self._passed_at - LATEST_S)
             self._over_at = now
             self._until_ns = _ns(now + SETTLE_S)

@@ -19,8 +19,8 @@ class Capability:
     """The abilities of a board that drives by ``cmd_vel`` and has ``odom``.
 
     ``title`` is its name in "A simulated ... drives". ``imu``: whether it has ``imu/data_raw``.
-    ``sideways``: whether it can move along y as well. ``ports``: for each address that the
-    simulator prints, the driver's parameter for it; empty where another address implies it.
+    ``sideways``: whether it can move along y as well. ``ports``: the driver's parameter for each
+    address that the simulator prints; empty if another address implies this one.
     ``real``: arguments that a driver needs for the real robot; ``page``: the board's document.
     """
 

@@ -24,7 +24,7 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the leg to be on, and the velocity along it in the robot's own axes.
+    """Return the present leg, and the velocity along it in the robot's own axes.
 
     A leg is a side of the square. Legs are counted from 0 without end: +x, +y, -x, -y in the
     odometry frame. On legs 0, 2, ... the robot turns by 90° to the left, and on legs 1, 3, ...
@@ -54,7 +54,7 @@ def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
-    """Return the leg to be on, the distance along it, and the robot's offset to its left, in m."""
+    """Return the present leg, the distance along it, and the robot's offset to its left, in m."""
     turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
     along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
     return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)

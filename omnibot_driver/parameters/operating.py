@@ -167,8 +167,8 @@ FRAMES: Final = (
         "frame_prefix",
         "",
         "",
-        "Prefix of every frame name, including the slash, such as robot1/. The parameter of this"
-        " name of robot_state_publisher works in the same way.",
+        "Prefix of every frame name, including the slash, such as robot1/. The parameter"
+        " frame_prefix of robot_state_publisher works in the same way.",
         fixed=True,
     ),
     Parameter(

@@ -24,17 +24,18 @@ DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
 """Time in which a command is valid, in s: the driver's ``cmd_vel_timeout``."""
 SILENT_S: Final = 3.0
-"""Time, in s, after which diagnostics are outdated, and a driver that sends nothing is silent.
+"""Age of diagnostics, in s, above which they are outdated. They are published every second.
 
-Diagnostics are published every second.
+A driver that has sent nothing for this time is regarded as silent.
 """
 STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""Largest speed of the robot, in m/s, that is assumed to detect a reset of the odometry.
+"""Largest speed, in m/s, that is regarded as motion of the robot.
 
-A pose that is further away than ``JUMP_M`` and this speed allow begins a new path.
+A pose that is further away than ``JUMP_M`` and this speed allow shows a reset of the odometry, and
+begins a new path.
 """
 
 

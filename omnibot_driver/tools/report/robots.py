@@ -33,7 +33,7 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return, by role that this topic may have, the namespace and whether the type fits."""
+    """Return, for each role that this topic may have, its namespace and whether its type fits."""
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
         if topic.endswith(f"/{role}"):
