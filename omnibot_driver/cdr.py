@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements serialised to CDR as rclpy does it, and velocity commands parsed from CDR.
+"""Serialise measurements to CDR as rclpy does, and parse velocity commands from CDR.
 
 No ROS message objects are made for this. CDR, the format in which DDS serialises messages, aligns
 every number to its own size, like a C struct on a 64-bit machine, so Python's ``struct`` with
@@ -30,7 +30,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
-"""The encapsulation header; alignment is counted from the byte after it."""
+"""The encapsulation header of little-endian CDR; alignment is counted from the byte after it."""
 STAMP: Final = "iI"
 TWIST: Final = struct.Struct("<4s6d").unpack_from
 NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)

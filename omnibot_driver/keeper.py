@@ -3,7 +3,7 @@
 """The driver's side of `guard.py`: keeps a guard process beside an open port.
 
 This module starts the process, sends it heartbeats, replaces it when it dies, and ends it. It knows
-no threads and no board; its user calls ``beat`` from the thread that must stay alive.
+no threads and no board; its user calls ``beat`` from the thread that the guard must watch.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ RESTART_S: Final = 1.0
 HANGS_AFTER: Final = 50
 """Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
-"""Number of killed guards that have not ended yet at which the driver starts no further guard."""
+"""While this number of killed guards have not ended yet, the driver starts no further guard."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
 """Longest wait for a killed guard to end, in s. A guard that takes longer is in an

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Calls that several threads queue, made in the order of the events that caused them.
+"""Calls that several threads queue, and that are made in the order of the events behind them.
 
 A thread puts a call while it holds the lock under which the event occurred, and delivers after it
 has released that lock, so a slow listener delays no command. One thread delivers at a time; another
@@ -29,14 +29,14 @@ class Outbox:
         self._closed = False
 
     def put(self, delivery: Delivery) -> None:
-        """Queue the next call, without blocking; the caller's lock gives the order."""
+        """Queue the next call, without blocking; the lock that the caller holds gives the order."""
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
         """Return whether the caller may deliver directly; this is cheaper than ``put`` and
         ``deliver``.
 
-        Hold the lock under which the event occurred during this call. If it returns True,
+        During this call, hold the lock under which the event occurred. If it returns True,
         ``release`` must follow.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)

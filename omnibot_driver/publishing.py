@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Publication of the session's events: measurements and states on topics, news in the log.
+"""Publication of the session's events: measurements and states on topics, notices in the log.
 
 Calls come one at a time, in the order of the events (`outbox.py` ensures that), so the state that
 is published last is the present one. Measurements come from the link's reader.

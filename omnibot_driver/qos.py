@@ -7,9 +7,10 @@ from typing import Final
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""A value that a later subscriber receives too."""
+"""Quality of service of a value that later subscribers also receive."""
 DEEP: Final = QoSProfile(depth=1000)
-"""Messages and calls of which none may be lost while the driver is busy.
+"""Quality of service of messages and calls that must not be lost while the driver is busy.
 
-A queue of 10, as is usual, loses the older ones: a released button would wipe out its press.
+A queue of 10, as is usual, drops the oldest ones: the messages of a released button would displace
+the message of its press.
 """

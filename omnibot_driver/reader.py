@@ -32,8 +32,9 @@ class Reader:
     """The work of the reader thread, ``serve``, and its counts.
 
     ``opener`` and the arguments after it are those of ``Link``. ``trouble`` is the reason why the
-    port, or one of its lines, is not open. ``opened`` counts openings, ``received_bytes`` bytes,
-    and ``overruns`` the kernel's losses on this port (None without a count).
+    port, or one of its lines, is not open. ``opened`` counts the openings of the port,
+    ``received_bytes`` counts bytes, and ``overruns`` counts the kernel's losses on this port (None
+    if the kernel has no count).
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The services under the node's name. Those that wait for the board block no other callback."""
+"""The services under the node's name. None of them blocks other callbacks while it waits."""
 
 import threading
 from collections.abc import Callable

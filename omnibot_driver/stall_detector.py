@@ -42,7 +42,7 @@ class StallDetector:
     ``outlived_by`` is never True while ``begun`` would report a stall.
 
     All times are kept by the steady clock, so a step of the time of day does not change them. Each
-    call of ``passed`` measures the difference of the two clocks.
+    call of ``passed`` measures the difference between the two clocks.
     """
 
     def __init__(self) -> None:

@@ -42,7 +42,8 @@ KNOWN_AFTER: Final = 10
 that, all may have been delayed; the estimated send time of the next message may be too late."""
 
 Differences = tuple[float, float]
-"""Our clock minus a sender's when its message arrived, in s: time of day, and steady clock."""
+"""Our clock at a message's arrival minus the sender's clock at its sending, in s: by our time of
+day, and by our steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +168,7 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """Return the excess over the smallest difference and its drift, in s; may be negative."""
+        """Return the excess over the smallest difference plus its drift, in s; may be negative."""
         drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
         return difference_s - self._least_s - drift_s
 

@@ -27,7 +27,8 @@ PROFILES: Final = {
 DEFAULT: Final = "omnibot"
 
 Publish = Callable[[Any, int], None]
-"""Function that publishes a value of the board's own kind; its stamp is in ns of ROS time."""
+"""Function that publishes a value of a type that only this board has; the stamp is in ns of ROS
+time."""
 
 
 class Profile(Protocol):

@@ -86,7 +86,7 @@ LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """All parameters of one board by section, and the checks between them."""
+    """All parameters of one board by section, and the checks of several values together."""
 
     board: str
     sections: Mapping[str, Sequence[Parameter]]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Import the libraries that the tools need beyond the driver's, or say how to install them."""
+"""Import libraries that only the tools need, or say how to install them."""
 
 from importlib import import_module
 from types import ModuleType

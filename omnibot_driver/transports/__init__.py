@@ -20,7 +20,7 @@ NONE_MISSING: Final[Mapping[int, str]] = {}
 
 
 class LinesChanged(Exception):
-    """One of several lines was lost or reopened; ``Transport.missing`` has those missing now."""
+    """One of several lines was lost or reopened; ``Transport.missing`` has the missing lines."""
 
 
 class Transport(Protocol):
@@ -46,7 +46,7 @@ class Transport(Protocol):
         """Number of times the kernel has lost bytes since the opening; None without a counter."""
 
     def read(self) -> Packet:
-        """Wait for a packet and return it; after a while without any, return one without bytes.
+        """Wait for a packet and return it; after a while without any, return an empty packet.
 
         Raises LinkError when the line is lost, and LinesChanged when one of several lines is lost
         or open again.
@@ -55,7 +55,7 @@ class Transport(Protocol):
     def write(self, packets: Packets) -> None:
         """Write all packets. On LinkError, what was written but not yet sent is discarded.
 
-        Packets for a missing one of several lines are discarded.
+        Packets for a missing line are discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:

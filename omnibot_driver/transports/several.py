@@ -20,7 +20,8 @@ from omnibot_driver.transports.wake_up import WakeUp
 
 FULL: Final = f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
 RETRY_S: Final = 0.5
-"""Time between two attempts to open a missing line, in s; they do not disturb the other lines."""
+"""Time between two attempts to open a missing line, in s. The attempts do not disturb the other
+lines."""
 
 
 class ByteLine(Transport, Protocol):

@@ -2,9 +2,9 @@
 
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
-A packet is one datagram. Only datagrams from the address that is written to are received. A host
-that is absent, or on which nothing listens, is treated as a silent board and not as an error. The
-host may answer again later, so the sockets stay open.
+A packet is one datagram. The sockets receive datagrams only from the address to which they write. A
+host that is absent, or on which nothing listens, is treated as a silent board and not as an error.
+The host may answer again later, so the sockets stay open.
 """
 
 import contextlib
@@ -149,7 +149,7 @@ class UdpPorts:
 
 
 def _is_silence(error: OSError) -> bool:
-    """Return whether the error means that the other side is absent, as while it restarts."""
+    """Return whether the error means that the other side is absent, perhaps during a restart."""
     return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
 
 

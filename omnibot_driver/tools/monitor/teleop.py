@@ -60,7 +60,7 @@ class DeadMan:
     def press(self, key: str, now_s: float) -> bool:
         """Use a pressed key; return whether it is a steering key.
 
-        A key that was pending in a suspension does not move the robot.
+        A key that was pressed during a suspension does not move the robot.
         """
         if key not in MOTIONS:
             return False

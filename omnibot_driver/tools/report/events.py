@@ -98,7 +98,7 @@ def _estop(log: Log) -> Iterator[Finding]:
 
 
 def _diagnostics(log: Log) -> Iterator[Finding]:
-    """Judge each status by its worst message, and how often that message was sent."""
+    """Report the worst message of each status, and how often this message was sent."""
     if log.diagnostics and not log.alone:
         ports = ", ".join(sorted({status.hardware_id for status in log.diagnostics}))
         yield Finding(

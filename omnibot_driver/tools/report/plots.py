@@ -114,7 +114,7 @@ def velocities(log: Log) -> Figure:
 
 
 def inertia(log: Log) -> Figure:
-    """Draw angular velocity, and specific force less its medians, in the sensor's axes."""
+    """Draw angular velocity, and specific force minus its medians, in the sensor's axes."""
     figure = new_figure(5.0)
     rows = figure.subplots(2, 1, sharex=True)
     imu = log.imu.only(log.imu.finite)

@@ -134,7 +134,7 @@ class Recorder:
         self.count += 1
 
     def _rates(self, message: Any) -> Row:
-        """Return the rates of the wheels that the first message names, in its order."""
+        """Return the wheel rates, in the order in which the first message names the wheels."""
         self._wheels = self._wheels or tuple(name for name in message.name if WHEEL in name)
         rates = dict(zip(message.name, message.velocity, strict=False))
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)

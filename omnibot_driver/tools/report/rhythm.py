@@ -33,7 +33,7 @@ RECOVERY_S: Final = 0.75
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What is expected of a topic's timing.
+    """The expected timing of a topic.
 
     Keys in the driver's diagnostics: ``lost`` for the counts of lost messages, ``rates`` for the
     expected rates, the best first.

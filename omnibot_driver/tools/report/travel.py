@@ -12,7 +12,7 @@ from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 
 MOVING: Final = (0.005, 0.005, 0.01)
-"""Speeds in m/s, m/s and rad/s above which the robot moves."""
+"""Speeds of x, y and yaw, in m/s, m/s and rad/s, above which the robot is regarded as moving."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
 """Largest difference, in rad, between a pose and the pose that the twist leads to.
