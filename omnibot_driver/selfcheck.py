@@ -73,7 +73,7 @@ def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
     if names.count(name) < 2:
         return ""
     return (
-        f"another node has the name {name}, and both obey the same commands; end one, or start it"
+        f"another node has the name {name}, and both obey the same commands; end one, or start one"
         " in its own namespace (--ros-args -r __ns:=/robot2)"
     )
 

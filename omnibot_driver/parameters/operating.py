@@ -175,8 +175,8 @@ FRAMES: Final = (
         "publish_tf",
         True,
         "",
-        "Publish the transform from odom_frame to base_frame on /tf. Set it to false if an EKF"
-        " publishes it.",
+        "Publish the transform from odom_frame to base_frame on /tf. Set publish_tf to false"
+        " if an EKF publishes this transform.",
         fixed=True,
     ),
 )

@@ -80,8 +80,8 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "Largest spike of one accelerometer axis that the driver publishes. It rejects a larger"
-        " spike if this lasts one reading and has the size of a flipped bit.",
+        "Largest spike of one accelerometer axis that the driver publishes. The driver rejects"
+        " a larger spike that lasts one reading, if its size is that of a flipped bit.",
         low=0.1,
         high=1000.0,
     ),

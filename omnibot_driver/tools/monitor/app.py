@@ -68,8 +68,8 @@ class Release(ModalScreen[bool]):
     def compose(self) -> ComposeResult:
         """Build the question."""
         yield Static(
-            "Release the e-stop?\n\nIs everybody clear of the robot?\nIt stays stopped until the"
-            " next command.\n\ny releases, any other key does not",
+            "Release the e-stop?\n\nIs everybody clear of the robot?\nThe robot stays stopped"
+            " until the next command.\n\ny releases, any other key does not",
             markup=False,
         )
 

@@ -45,7 +45,7 @@ def _states(log: Log) -> Iterator[Finding]:
             "State",
             f"The board was out of reach {counted(len(lost), 'time')}, first at"
             f" {lost[0].begin_s:.1f} s. In all: {told}.",
-            "Unless you reset it or pulled the cable: check cable, hub and the board's power.",
+            "If you did not reset it or pull the cable, check cable, hub and the board's power.",
         )
     elif "imu_only" in lengths:
         yield Finding(

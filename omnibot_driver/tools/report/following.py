@@ -240,7 +240,7 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
         yield Finding(Level.GOOD, "Commands", f"{figure}.")
         return
     if any(found.gains[axis] < -TOLERANCE for axis in off):
-        advice = "It moves the wrong way: set axis_signs (docs/commissioning.md)."
+        advice = "The robot moves the wrong way: set axis_signs (docs/commissioning.md)."
     else:
         scales = sorted({pair.scales[axis] for axis in off})
         advice = (
@@ -264,8 +264,8 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
             Level.BAD,
             "E-stop",
             f"The robot moved while the e-stop was latched, first at {stopped[0].begin_s:.1f} s.",
-            "Unless it was pushed: use the switch in the power line, and do not drive it before you"
-            " know why.",
+            "If it was not pushed, use the switch in the power line, and do not drive it before you"
+            " know the cause.",
         )
     elif untold:
         yield Finding(

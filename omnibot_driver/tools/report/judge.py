@@ -32,7 +32,7 @@ def _all(log: Log) -> Iterator[Finding]:
                 Level.BAD,
                 "Recording",
                 f"No message of {topic}: {consequence}.",
-                "Record it as well (ros2 bag record --all), while the state is nominal.",
+                "Record this topic as well (ros2 bag record --all), while the state is nominal.",
             )
     others = [topic for topic in log.absent if topic in ("state", "estop_active", "/diagnostics")]
     if others:

@@ -58,7 +58,7 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "Spectrum of the IMU",
         plots.spectra,
         lambda log: int(log.imu.finite.sum()) // 100,
-        "Noise at rest should be flat; peaks in motion are rollers, axles and motors.",
+        "Noise at rest should be flat; peaks in motion come from rollers, axles and motors.",
     ),
     (
         "timing",

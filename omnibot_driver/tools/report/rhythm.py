@@ -233,8 +233,8 @@ def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     counted_lost = grown(log, stream.lost)
     if counted_lost is None:
         advice = (
-            "Record /diagnostics of this robot alone: it shows whether the line or the recorder"
-            " lost them."
+            "Record /diagnostics of this robot alone. They show whether the line or the recorder"
+            " lost the messages."
         )
     elif counted_lost == 0:
         advice = (

@@ -56,10 +56,10 @@ def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tupl
         name = "/" + wanted.strip("/")
         if name not in robots:
             raise ToolError(
-                f"{where} has no robot in the namespace {name}; choose one of these by --namespace:"
+                f"{where} has no robot in the namespace {name}; choose one with --namespace:"
                 f" {names}"
             )
         return name, robots[name]
     if len(robots) > 1:
-        raise ToolError(f"{where} has several robots: choose one with --namespace, of {names}")
+        raise ToolError(f"{where} has several robots; choose one with --namespace: {names}")
     return next(iter(robots.items()))

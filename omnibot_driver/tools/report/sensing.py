@@ -122,7 +122,7 @@ def judge(log: Log) -> Iterator[Finding]:
             "IMU",
             f"The {' and the '.join(stuck)} sent identical readings {STUCK_READINGS} times or more"
             " in a row.",
-            "Switch the board off and on; if it stays so, the sensor is broken.",
+            "Switch the board off and on; if this continues, the sensor is broken.",
         )
     rest = at_rest(log, imu)
     if rest.sum() >= LEAST_REST_S * rate_hz(imu):
@@ -155,13 +155,13 @@ def _gravity(force: Array) -> Iterator[Finding]:
         yield Finding(Level.GOOD, "IMU", f"{figure}.")
     elif error < ACCEL_TOLERANCE:
         yield Finding(
-            Level.NOTE, "IMU", f"{figure}.", "Set accel_bias: the accelerometer is off by a little."
+            Level.NOTE, "IMU", f"{figure}.", "Set accel_bias: the accelerometer is slightly off."
         )
     else:
         factor = STANDARD_GRAVITY / max(norm, 1e-3)
         likely = [g for g in (2, 4, 8) if abs(factor / g - 1) < 0.1 or abs(factor * g - 1) < 0.1]
         advice = (
-            f"Set accel_range to {factor:.3g} times what it is."
+            f"Set accel_range to {factor:.3g} times its present value."
             if likely
             else "Check accel_range and accel_bias; a shaken or falling robot is not at rest."
         )
@@ -240,7 +240,7 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
             Level.NOTE,
             "IMU",
             f"{figure}, in the same direction: the sensor is mounted upright.",
-            "The description has it upside down: set imu_rpy there.",
+            "The robot's description has the sensor upside down: set imu_rpy in the description.",
         )
     else:
         yield Finding(Level.GOOD, "IMU", f"{figure}; the sensor hangs upside down, as described.")
