@@ -90,7 +90,7 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
     """With ``--namespace`` only the topics of the chosen robot are read."""
     one, other = Drive(SECONDS, "/robot1"), Drive(SECONDS, "/fleet/robot2", seed=2)
     bag = write(tmp_path / "bag", [one, other])
-    with pytest.raises(ToolError, match=r"--namespace, of /fleet/robot2, /robot1"):
+    with pytest.raises(ToolError, match=r"--namespace: /fleet/robot2, /robot1"):
         log_of(bag)
     with pytest.raises(ToolError, match=r"no robot in the namespace /robot3; choose .* /fleet"):
         log_of(bag, "robot3")

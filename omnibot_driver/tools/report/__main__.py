@@ -26,8 +26,8 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="report",
         description="Report on a drive: a page with pictures, and a verdict in words.",
-        epilog="Exit codes: 0 with a report, 3 if it finds that something is wrong, 1 with a message"
-        " if there is nothing to report on, 2 on wrong usage. See docs/tools/report.md.",
+        epilog="Exit codes: 0 with a report, 3 if it finds something wrong, 1 with a message if"
+        " there is nothing to report on, 2 on wrong usage. See docs/tools/report.md.",
     )
     parser.add_argument("bag", nargs="?", type=Path, help="folder of a rosbag2, or a file of it")
     parser.add_argument(
