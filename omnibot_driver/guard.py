@@ -5,8 +5,8 @@
 It shares the driver's open lines (serial ports or connected sockets), and receives a heartbeat on
 its standard input. When the heartbeat ceases, or the driver has ended, the guard repeats the stop
 command for a second, or until the heartbeat returns. If the last heartbeat said that the e-stop is
-latched, it repeats the emergency stop instead. It knows no board, and imports very little, so that
-it is small and starts quickly.
+latched, it repeats the emergency stop instead. It works with any board, and imports very little, so
+that it is small and starts quickly.
 
 `keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each argument lists the bytes to
 write and their descriptors, in order, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. When these commands

@@ -2,8 +2,8 @@
 
 """The driver's side of `guard.py`: keeps a guard process beside an open port.
 
-This module starts the process, sends it heartbeats, replaces it when it dies, and ends it. It knows
-no threads and no board; its user calls ``beat`` from the thread that the guard must watch.
+This module starts the process, sends it heartbeats, replaces it when it dies, and ends it. It must
+not know threads or boards; its user calls ``beat`` from the thread that the guard must watch.
 """
 
 import contextlib

@@ -3,7 +3,7 @@
 """Advice on settings of the computer and of other nodes that disturb the driver.
 
 This module checks the adapter of an open port, the clock, nodes of the same name and publishers of
-another type. It reads sysfs, and knows no pyserial, no ROS and no board. Obstacles to opening a
+another type. It reads sysfs, and does not use pyserial, ROS or a board. Obstacles to opening a
 port, such as its permissions, are reported by ``transports``.
 """
 

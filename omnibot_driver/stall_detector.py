@@ -4,8 +4,8 @@
 
 During a stall the watchdog does not run either, and commands keep arriving. When the process runs
 again, commands that were sent meanwhile must not be obeyed. Callers pass the time of
-``boot_time_s``, and the watchdog's thread calls ``passed`` to show that it runs. This module knows
-no threads and no commands.
+``boot_time_s``, and the watchdog's thread calls ``passed`` to show that it runs. This module must
+not know threads or commands.
 """
 
 import math

@@ -17,8 +17,8 @@ difference among these messages becomes its offset. A real delay that lasts as l
 distinguished from this case.
 
 The middleware numbers the messages of each sender. It does not report who sent a message. But a
-message whose number is not above a sender's last number comes from another sender. This module
-reads no clock and knows no ROS.
+message whose number is not above a sender's last number comes from another sender. This module does
+not read a clock, and does not use ROS.
 """
 
 import math

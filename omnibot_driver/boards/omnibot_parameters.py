@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters that the OmniBot has and other boards need not have. Knows no ROS."""
+"""The parameters that the OmniBot has and other boards need not have. Does not use ROS."""
 
 from collections.abc import Mapping
 from typing import Any, Final

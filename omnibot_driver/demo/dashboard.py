@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The tool ``monitor`` on the demo's terminal, if possible. Knows processes, no ROS."""
+"""The tool ``monitor`` on the demo's terminal, if possible. Knows processes, but not ROS."""
 
 import subprocess
 import sys

@@ -6,8 +6,8 @@ A row has a name, a default, a unit, a range and a meaning. A board's table cons
 rows that it can use and of its own. From a table the node declares and checks its parameters, and
 ``make docs`` writes config/<board>.yaml and docs/parameters.md. A new common row goes into
 ``operating`` or ``robot``; a row of a single board goes into the module beside that board's
-profile. This package knows no ROS and no board; types are plain Python's. A wrong value raises a
-ParameterError that names the parameter and the allowed values.
+profile. This package does not use ROS or a board; its types are plain Python types. A wrong value
+raises a ParameterError that names the parameter and the allowed values.
 """
 
 from omnibot_driver.parameters.parameter import Parameter, Value

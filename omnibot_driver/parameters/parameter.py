@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One parameter: name, default, unit, range, meaning, and the check of a value. Knows no ROS."""
+"""One parameter: name, default, unit, range, meaning, and the check of a value. Without ROS."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -2,8 +2,8 @@
 
 """The table of one board's parameters: the common ones that it can use, and its own.
 
-This module knows no ROS, and no board by name. A board's profile makes its table from the board's
-traits and from the rows that it adds.
+This module does not use ROS, and does not name any board. A board's profile makes its table from
+the board's traits and from the rows that it adds.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence

@@ -2,7 +2,7 @@
 
 """Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
-They know descriptors and bytes, but no threads and no board. Every failure is a LinkError whose
+They know descriptors and bytes, but not threads or boards. Every failure is a LinkError whose
 text says what to do.
 """
 

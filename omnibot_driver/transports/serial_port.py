@@ -3,7 +3,7 @@
 """One open serial port or pyserial URL: the only module that knows pyserial.
 
 It reads and writes bytes and turns every failure into a LinkError whose sentence says what to do.
-It knows no threads and no board.
+It must not know threads or boards.
 """
 
 import contextlib

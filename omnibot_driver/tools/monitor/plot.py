@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Draw pictures from characters: a path in Braille, a row of bars. Knows no colours and no ROS."""
+"""Draw pictures from characters: a path in Braille, a row of bars. Does not use colours or ROS."""
 
 import math
 from collections.abc import Iterable, Sequence

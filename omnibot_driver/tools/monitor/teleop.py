@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steer by keys, with a dead man's switch. Knows keys and times; no terminal, no ROS, no clock.
+"""Steer by keys, with a dead man's switch. Knows keys and times only.
 
 A terminal reports that a key is pressed, repeats it while it is held, and does not report its
 release. So a key moves the robot for a short time only, and holding the key renews that time.
