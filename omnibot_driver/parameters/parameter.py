@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One parameter: name, default, unit, range, meaning, and the check of a value. Without ROS."""
+"""One parameter: its name, default, unit, range and meaning, and the check of its values."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
