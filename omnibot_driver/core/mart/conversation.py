@@ -172,11 +172,15 @@ class Conversation:
         return ((request.word.channel, request.data),)
 
     def give_up(self, now: float) -> Word | None:
-        """Stop waiting for the pending request; return its command, or None without a request."""
+        """Stop waiting for the pending request; return its command, or None without a request.
+
+        The reply to a controlled move is not late then: the stop of the move waits for it.
+        """
         if self.pending is None:
             return None
         word = self.pending.word
-        self._owes_until(word, self.pending.sent_s)
+        if word.kind is not Kind.MOVE:
+            self._owes_until(word, self.pending.sent_s)
         self.pending = None
         return word
 

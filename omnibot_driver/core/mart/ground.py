@@ -164,7 +164,9 @@ class Ground:
             most_s += self.imu.word.takes_s
         elif self.state not in (State.STILL, *ROLLING):
             most_s = ABSENT_BUSY_S
-        if now - self.heard_s > most_s and self.state not in (State.MOVING, State.SERVING):
+        in_move = self._stopping is not None and self._stopping.move is not None
+        busy = in_move or self.state in (State.MOVING, State.SERVING)
+        if now - self.heard_s > most_s and not busy:
             self._appears(now)
         self.heard_s = now
 

@@ -121,7 +121,7 @@ class Hearing(Measuring):
             elif reply.form is Form.DECIMAL:
                 self._turned(reply.number, answer.when, now)
         elif word.kind is Kind.MOVE:
-            self._moved(reply, now)
+            self._moved(reply, now, sure=not answer.when.doubtful)
         elif word is words.SSP:
             if not self._turns.answered(reply):
                 self._once(SETTING_REFUSED)

@@ -42,9 +42,14 @@ class Moves(Asking):
         self._move.begin(request)
         return request
 
-    def _moved(self, reply: Ok | Fail, now: float) -> None:
-        """Evaluate the reply that ends a controlled move."""
+    def _moved(self, reply: Ok | Fail, now: float, *, sure: bool) -> None:
+        """Evaluate the reply that ends a controlled move.
+
+        ``sure``: the reply is certainly that to this move.
+        """
         motion = self.motion
+        if sure and isinstance(reply, Ok):
+            self.odometry.wheel.started()
         if motion is Motion.STRAIGHT:
             self.odometry.doubt.end_straight()
         self.jobs.moved(reply, now)

@@ -11,7 +11,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.commands.actuator import Wanted
-from omnibot_driver.core.commands.orders import EmergencyStop
+from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.ground import (
     ESTOP_REPEAT_S,
@@ -19,7 +19,7 @@ from omnibot_driver.core.mart.ground import (
     STARTS_UP_S,
 )
 from omnibot_driver.core.mart.hearing import Hearing
-from omnibot_driver.core.mart.required_motion import is_standstill
+from omnibot_driver.core.mart.required_motion import is_standstill, moving_order
 from omnibot_driver.core.mart.states import (
     HALTS,
     LAST_HALTS,
@@ -60,7 +60,8 @@ class Pilot(Hearing):
                 "a motion command or a stop arrived; end the commands, then call again"
             )
         if wanted is not self._wanted:
-            self._move = None
+            if not self._is_same_goal(wanted, now):
+                self._move = None
             if is_standstill(self._wanted) or is_standstill(wanted):
                 self._blocked = Motion.NONE
         self._wanted = wanted
@@ -68,6 +69,12 @@ class Pilot(Hearing):
             self.proof.stopped(now)
             self._estop_said_s = now - ESTOP_REPEAT_S
         self._next_s = -math.inf
+
+    def _is_same_goal(self, wanted: Wanted, now: float) -> bool:
+        """Return whether the command repeats the goal to which the robot drives."""
+        move, order = self._move, moving_order(wanted, now)
+        repeats = move is not None and isinstance(order, GoTo) and order.place == move.place
+        return repeats and move is not None and not move.given_up
 
     @property
     def stop_words(self) -> tuple[Word, ...]:

@@ -154,6 +154,7 @@ class Stopping:
         if not isinstance(reply, Ok | Fail):
             return False
         self.result = reply
+        self.began = isinstance(reply, Ok) or None
         return True
 
 

@@ -185,6 +185,9 @@ class Stops(Ground, ABC):
         result, motion = stopping.result, stopping.motion
         if result is None and motion is not Motion.UNKNOWN and not self.conversation.disturbed(now):
             result = stopping.doubtful_result  # a repeated stop has found nothing to stop
+        if stopping.move is not None and result is None:
+            for form in stopping.move.forms:
+                self.conversation.owes(form, now)  # the reply to the move
         if stopping.began:
             self.odometry.wheel.started()
         elif stopping.began is False and not self.conversation.doubles(now):
@@ -260,6 +263,10 @@ class Stops(Ground, ABC):
         return self._send(said, now) + self._greet(now)
 
     @abstractmethod
+    def _learn_standing(self) -> None:
+        """Learn that the motors need more units than those of the present motion to turn."""
+
+    @abstractmethod
     def _ask_what_moves(self, now: float) -> None:
         """Begin to find out which motion is in progress, after the stop port was used."""
 
@@ -284,6 +291,8 @@ class Stops(Ground, ABC):
             self._notice(f"an obstacle has ended the move ({reply.reason})", halt=False)
         elif reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
+        elif reply.reason == words.NO_START and motion not in (Motion.STRAIGHT, Motion.TURN):
+            self._learn_standing()
         elif reply.reason == words.IMU_LOST:
             self.imu.lost()
             self._notice(self.health.refusal, halt=True)

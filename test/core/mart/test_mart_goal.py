@@ -13,6 +13,7 @@ from omnibot_driver.core.mart import MartSettings
 from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, STRETCH, Move, Surplus, next_move
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.words import MCR, TB, TF
+from omnibot_driver.simulator.mart import Firmware
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -37,6 +38,65 @@ def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, s
         assert move.said < MOST_MOVES
         assert pose.way_to(goal).way_m < 0.1
         assert abs(math.remainder(pose.yaw_rad - goal.yaw_rad, math.tau)) < math.radians(8)
+
+
+def end(bench: MartBench) -> None:
+    """Wait until the robot has been at rest for 3 s."""
+    bench.run(1.0)
+    for _ in range(20):
+        bench.until_it_stands(60.0)
+        bench.run(3.0)
+        if bench.robot.stands:
+            return
+
+
+@pytest.mark.parametrize("firmware", ["documented", "firmware"])
+@pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
+def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
+    """The encoder count of a move is often the same as that of the move before."""
+    bench, goal = MartBench(firmware).ready(), Pose()
+    for _ in range(10):
+        goal = goal.moved(step)
+        bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
+        end(bench)
+        assert bench.error.way_m < 0.1
+        assert abs(math.remainder(bench.error.yaw_rad, math.tau)) < 0.15
+        assert bench.truth.way_to(goal).way_m < 0.2
+
+
+@pytest.mark.parametrize("every_s", [2.0, 1.0, 0.2])
+def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: float) -> None:
+    """``ros2 topic pub`` repeats its message once a second."""
+    once, repeated = MartBench().ready(), MartBench().ready()
+    for _ in range(round(30.0 / every_s)):
+        repeated.go_to(1.0, 0.5, 0.0)
+        repeated.run(every_s)
+    once.go_to(1.0, 0.5, 0.0)
+    end(once)
+    end(repeated)
+    moves = [
+        [data for data in bench.said() if data[:2] in (b"TF", b"MC")] for bench in (once, repeated)
+    ]
+    assert moves[0] == moves[1]
+    assert repeated.truth.way_to(Pose(1.0, 0.5, 0.0)).way_m < 0.1
+
+
+@pytest.mark.parametrize("firmware", ["documented", "firmware"])
+def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
+    firmware: Firmware,
+) -> None:
+    """The move's own reply shows that it has stopped; the server was not restarted."""
+    bench = MartBench(firmware).ready()
+    assert bench.job(Job.LOG).success
+    bench.go_to(2.0, 0.0, 0.0)
+    bench.run(3.0)
+    since, from_s = len(bench.written), bench.now
+    bench.go_to(0.0, 1.0, 0.0)
+    bench.run_until(lambda: any(data[:2] == b"MC" for data in bench.said(since)), 10.0)
+    assert bench.now - from_s < 1.6
+    assert not bench.board._pilot.jobs.log_may_be_lost
+    end(bench)
+    assert bench.error.way_m < 0.1
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
