@@ -137,6 +137,11 @@ class MartBoard(Board):
         self._mode = Mode.UNKNOWN
         self._pilot.fell_silent()
 
+    def flush(self, now: float) -> list[Reading]:
+        """End the present job, as the port is closed; return the readings and its result."""
+        self._pilot.jobs.cancel("the port was lost meanwhile; call again once it is back")
+        return self._pilot.take()
+
     def elapse(self, now: float) -> list[Reading]:
         """Return the odometry that is due, and NOTHING_MEASURED while a silence is expected."""
         readings = self._pilot.take()

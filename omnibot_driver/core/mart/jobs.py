@@ -209,17 +209,20 @@ class Jobs:
     def cancel(self, why: str) -> None:
         """End the job as failed, for the reason ``why``."""
         if self.job is not None:
-            self._finish(False, why)
+            self._finish(False, f"{why}; {COPY}" if self.ended and self._waiting else why)
 
     def _close_file(self) -> None:
         came = sum(map(len, self._pieces))
         whole = [piece for piece in self._pieces if len(piece) == PIECE]
+        swapped = any(len(piece) < PIECE for piece in self._pieces[:-1])
         again = COPY if self.ended else "call again"
         if came < self._size:
             lost = math.ceil((self._size - came) / PIECE)
             self._finish(False, f"{lost} pieces of {self._name} were lost; {again}")
         elif came > self._size or len(set(whole)) < len(whole):
             self._finish(False, f"pieces of {self._name} came twice; {again}")
+        elif swapped:
+            self._finish(False, f"pieces of {self._name} came in another order; {again}")
         else:
             content = b"".join(self._pieces)
             ended = "; the server has ended and must be started again" if self.ended else ""

@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.moment import Moment
-from omnibot_driver.core.mart.relative_heading import MOST_RAD
+from omnibot_driver.core.mart.relative_heading import MOST_RAD, OLD_RAD
 from omnibot_driver.core.mart.replies import Fail, signed
 from omnibot_driver.core.mart.starts import Starts
 from omnibot_driver.core.mart.states import Motion, State
@@ -40,10 +40,10 @@ class Measuring(Starts):
         elif word is words.RMRA:
             if answer.when.is_uncertain and self.health.is_voltage(reply.number):
                 return
-            was_zero = self.odometry.heading.is_zero
+            before_rad = self.odometry.heading.angle_rad
             changed = self._turned(reply.number, answer.when, now)
-            if self.odometry.heading.is_zero and not was_zero:
-                self.health.outlived = False  # the server has been restarted
+            if self._shows_restart(before_rad):
+                self.health.outlived = False
                 self.jobs.forget_log()
             elif reply.number and self._started_s < self.appeared_s <= answer.when.from_s:
                 self.jobs.log_may_be_lost = False  # a restarted server reports zero until RM
@@ -56,6 +56,18 @@ class Measuring(Starts):
             uncertain = answer.when.is_uncertain
             self.readings += self.health.measured(word, reply, now, uncertain=uncertain)
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
+
+    def _shows_restart(self, before_rad: float | None) -> bool:
+        """Return whether the present heading shows that the server was restarted.
+
+        It is exactly zero before the first RM of a server, but also at the start of each RM, and
+        whenever it changes its sign. ``before_rad``: the previous heading, or None.
+        """
+        if self.state is not State.STILL or not self.odometry.heading.is_zero:
+            return False
+        if before_rad is None:
+            return self._started_s < self.appeared_s
+        return abs(before_rad) > OLD_RAD
 
     def _turned(self, degrees: float, when: Moment, now: float) -> bool:
         """Process a reported heading; return whether it is plausible and has changed."""

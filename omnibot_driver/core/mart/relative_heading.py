@@ -55,6 +55,11 @@ class RelativeHeading:
         return self._angle_rad is not None
 
     @property
+    def angle_rad(self) -> float | None:
+        """The last heading in rad, or None if it is not known."""
+        return self._angle_rad
+
+    @property
     def is_zero(self) -> bool:
         """Whether the heading is exactly zero, as before the first RM of a server."""
         return self._angle_rad == 0.0

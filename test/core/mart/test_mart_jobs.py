@@ -14,6 +14,7 @@ from omnibot_driver.boards.mart_clock import clock_fields
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.goal import docking_inches
 from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.readings import JobDone
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
 
@@ -147,6 +148,58 @@ def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None
     done = bench.job(Job.LAST_MOVE)
     assert not done.success
     assert ("lost" if spoil == "lose" else "twice") in done.message
+
+
+def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
+    """It is the only piece whose place is known, as it is shorter than the others."""
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    inner = bench.robot.advance
+
+    def advance() -> list[tuple[int, bytes]]:
+        return sorted(inner(), key=lambda packet: len(packet[1]) == 512)
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
+    done = bench.job(Job.LAST_MOVE)
+    assert not done.success
+    assert "order" in done.message
+
+
+@pytest.mark.parametrize("job", [Job.BIAS, Job.LAST_MOVE])
+def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
+    """Its caller gets an answer, even if the port does not come back."""
+    bench = MartBench().ready()
+    bench.board.ask(job, "token", bench.now)
+    bench.run(0.02)
+    bench.close()
+    (done,) = bench.extras(JobDone)
+    assert not done.success
+    assert "port" in done.message
+
+
+def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
+    """A second call would not get the file: the controller must be started again."""
+    bench = MartBench().ready()
+    assert bench.job(Job.LOG).success
+    bench.board.ask(Job.LOG_FILE, "token", bench.now)
+    bench.run_until(lambda: b"EXIT" in bench.said(), 5.0)
+    bench.try_command(0.0, 0.0)
+    bench.run(0.1)
+    done = bench.extras(JobDone)[-1]
+    assert not done.success
+    assert "copy the file from the controller" in done.message
+
+
+@pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
+def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
+    """The heading of a straight drive is often exactly zero, as after a restart."""
+    for seed in range(6):
+        bench = MartBench(firmware, seed=seed).ready()
+        assert bench.job(Job.LOG).success
+        bench.command(0.3, 0.0, 2.0)
+        bench.run(3.0)
+        assert bench.job(Job.LOG_FILE).success, seed
 
 
 def test_only_a_log_that_was_started_ends_the_server() -> None:
