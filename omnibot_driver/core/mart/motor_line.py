@@ -73,6 +73,10 @@ class MotorLine:
         noise = NOISE + NOISE_PART * units
         return self._learned and self.speed(units) > SURE * math.hypot(math.sqrt(variance), noise)
 
+    def restore(self, before: "MotorLine") -> None:
+        """Return to the state of ``before``, which is a copy of this line."""
+        self.__dict__.update(before.__dict__)
+
     def rescale(self, factor: float) -> None:
         """Multiply the learned speeds by ``factor``, as the nominal units have changed."""
         if self._learned and factor != 1.0:

@@ -19,6 +19,7 @@ UNEQUAL: Final = 0.04
 """Standard deviation of the ratio of the two motors' speeds at equal units."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
 """Largest relative difference of the two motors' gains that is used for predictions."""
+Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Fewest units at which the motors are compared; below, a line's error has too much effect."""
 
@@ -58,7 +59,7 @@ class Motors:
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the units for a turn at ``rate_radps``, as ``units`` have given ``seen_radps``."""
-        lines = copy.copy(self._right_line), copy.copy(self._left_line)
+        lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
         return _units(lines, self._spin_speed(rate_radps))
 
@@ -67,8 +68,17 @@ class Motors:
         if abs(rate_radps) > SLOWEST_TURN_RADPS:
             _learn_spin(self._lines, units, self._spin_speed(rate_radps))
 
+    def lines(self) -> Lines:
+        """Return a copy of what is known of the right and the left motor."""
+        return copy.copy(self._right_line), copy.copy(self._left_line)
+
+    def restore(self, lines: Lines) -> None:
+        """Forget what was learned since ``lines`` were copied."""
+        for line, before in zip(self._lines, lines, strict=True):
+            line.restore(before)
+
     @property
-    def _lines(self) -> tuple[MotorLine, MotorLine]:
+    def _lines(self) -> Lines:
         return self._right_line, self._left_line
 
     def _spin_speed(self, rate_radps: float) -> float:
@@ -101,14 +111,17 @@ class Motors:
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
 
 
-def _units(lines: tuple[MotorLine, MotorLine], speed: float) -> int:
+def _units(lines: Lines, speed: float) -> int:
     return max(2, min(MOST_UNITS, round(sum(line.units(speed) for line in lines) / 2)))
 
 
-def _learn_spin(lines: tuple[MotorLine, MotorLine], units: int, speed: float) -> None:
-    error = speed - sum(line.speed(units) for line in lines) / 2
-    for line in lines:
-        line.learn(units, line.speed(units) + error)
+def _learn_spin(lines: Lines, units: int, speed: float) -> None:
+    """Learn the mean speed of both motors; it shows nothing of the ratio of their speeds."""
+    right, left = lines
+    error = speed - (right.speed(units) + left.speed(units)) / 2
+    slope, offset = right.slope, right.offset
+    right.learn(units, right.speed(units) + error)
+    left.move(right.slope - slope, right.offset - offset)
 
 
 def _nominal_units_per_count(settings: MartSettings) -> float:

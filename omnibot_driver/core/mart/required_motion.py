@@ -23,6 +23,11 @@ def is_standstill(wanted: Wanted) -> bool:
     return wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero
 
 
+def is_ramped(wanted: Wanted) -> bool:
+    """Return whether an acceleration limit still changes the speeds of the command."""
+    return not (wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.settled)
+
+
 def moving_order(wanted: Wanted, now: float) -> Drive | GoTo | None:
     """Return the order of a command for this time, or None if it requires no motion."""
     if wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero:

@@ -221,13 +221,14 @@ class SpeedLoop(Motors):
         held_radps = rate_radps + HOLD_PER_S * self._error_rad
         right_mps, left_mps = self.sides(speed_mps, self._direction * held_radps)
         most = MOST_BACKWARD if self._direction < 0.0 and self._is_slow else MOST_CHANGE
-        steps = []
-        for side, rim_mps in ((self._right, right_mps), (self._left, left_mps)):
-            wanted = side.wanted_units(rim_mps / self.per_unit_mps)
-            steps.append(max(-most, min(most, wanted - side.units)))
-        right, left = steps
-        if self._right.units + right <= 0 and self._left.units + left <= 0:
-            return None
+        sides = (self._right, right_mps), (self._left, left_mps)
+        wanted = [side.wanted_units(mps / self.per_unit_mps) for side, mps in sides]
+        if not any(wanted):  # zero units on both sides would end the motion
+            wanted = [int(mps == max(right_mps, left_mps)) for _, mps in sides]
+        right, left = (
+            max(-most, min(most, units - side.units))
+            for units, (side, _) in zip(wanted, sides, strict=True)
+        )
         return (right, left) if right or left else None
 
     def changed(self, right: int, left: int, now: float) -> None:

@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.motors import Lines
 from omnibot_driver.core.mart.odometry import SLOWING_S, MartOdometry
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.settings import MartSettings
@@ -32,6 +33,9 @@ as LEAST_LESSON, so that the next turn has at most 1.7 times the units.
 """
 EVEN: Final = 0.15
 """Largest change of the rate, relative to its mean, with which a turn shows the motors' speed."""
+HINDERED, TOO_FAST = 0.8, 1.12
+"""Parts of the commanded rate. After a turn slower than the first, a turn that is faster than the
+second shows that something held the robot in the slow turn, so its lesson is false."""
 SAME, CORRECTIONS = 0.2, 2
 """Largest relative difference of rates that are regarded as equal; most corrections of a rate."""
 STEADY: Final = 0.03
@@ -74,6 +78,7 @@ class SpotTurns:
         self.units = 0
         self.seen_radps = self._rate_radps = self._corrected_radps = 0.0
         self._corrections, self._has_learned = 0, False
+        self._before_slow: Lines | None = None
         self._wanted_radps, self._wanted_s = 0.0, -math.inf
         self._set_units: int | None = None
         self._set_s = -math.inf
@@ -215,5 +220,18 @@ class SpotTurns:
         if abs(spun_rad) > TOLD_RAD:
             whole_rad = abs(spun_rad + rate_radps * (uncounted_s + SLOWING_S))
             rate_radps *= abs(math.radians(degrees)) / whole_rad
+        self._undo_false_lesson(abs(rate_radps / self._rate_radps))
         self._loop.spun(self.units, self._lesson(rate_radps))
         self._has_learned = True
+
+    def _undo_false_lesson(self, part: float) -> None:
+        """Forget the lesson of a slow turn if this turn shows that the robot was held in it.
+
+        ``part``: rate of this turn as a part of the commanded one. Both lessons together would fit
+        motors with a dead zone that they do not have.
+        """
+        if self._before_slow is not None and part > TOO_FAST:
+            self._loop.restore(self._before_slow)
+            self._before_slow = None
+        elif part < HINDERED:
+            self._before_slow = self._loop.lines()

@@ -10,9 +10,13 @@ from statistics import mean
 import pytest
 from mart_bench import MartBench, steer_along
 
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.mart import MartSettings
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import BatteryReading, DockedReading, SonarReading
+from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
@@ -108,7 +112,59 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
         bench.command(0.0, 0.5, 0.1)
         fastest_radps = max(fastest_radps, bench.robot.board.facts["yaw_rate_radps"])
     assert fastest_radps < (0.6 if learned else 0.9)
-    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.2)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.05)
+
+
+@pytest.mark.parametrize("unequal", [0.05, -0.05])
+def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
+    """It shows the mean speed of both motors; a straight drive backward follows."""
+    settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
+    bench = MartBench(
+        "source", settings=settings, volts=23.3, motor_inequality=unequal, dead_zone_units=4.0
+    ).ready()
+    for vx, yaw_rate in ((-0.25, 0.0), (0.0, 0.3), (0.0, 0.4)):
+        bench.command(vx, yaw_rate, 4.0)
+        bench.command(0.0, 0.0, 1.0)
+    bench.command(-0.2, 0.0, 2.0)
+    from_rad, from_m = bench.server.chassis.yaw_rad, bench.server.chassis.way_m
+    bench.command(-0.2, 0.0, 3.0)
+    assert bench.server.chassis.way_m - from_m == pytest.approx(0.6, rel=0.035)
+    assert abs(bench.server.chassis.yaw_rad - from_rad) < 3.0 * 0.03
+
+
+@pytest.mark.parametrize("dead_units", [0.0, 3.0])
+def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units: float) -> None:
+    """The server cannot change the rate of a turn, so none is begun with a lower one."""
+    bench = MartBench(dead_zone_units=dead_units).ready()
+    ramp = SessionSettings(
+        limits=SpeedLimits(angular_radps2=0.3),
+        commands=CommandSettings(),
+        odometry=OdometrySettings(),
+    )
+    bench.session.configure(ramp, bench.now, board=MartSettings())
+    bench.command(0.0, 0.5, 5.0)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.06)
+    assert bench.notices == []
+
+
+def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
+    """The first units do not turn the motors, which teaches how many they need."""
+    bench = MartBench(dead_zone_units=3.0).ready()
+    for step in range(60):
+        bench.command(0.0, min(0.5, 0.03 * step), 0.1)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.06)
+    assert bench.notices == []
+
+
+def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
+    """With none, RM would end; the robot must not keep its former speed either."""
+    fast = 0.05
+    bench = MartBench(
+        settings=MartSettings(speed_per_unit=fast), speed_mps_per_unit=fast, volts=25.0
+    ).ready()
+    bench.command(0.3, 0.0, 3.0)
+    bench.command(0.02, 0.0, 2.0)
+    assert 0.0 < bench.robot.board.facts["speed_mps"] < 0.08
 
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
