@@ -19,10 +19,10 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Run the subcommand; return 0 if it succeeds, 1 if it finds nothing.
+    """Run the subcommand; return 0 if it succeeds, 1 if it fails.
 
-    Return 2 on wrong usage, 130 when interrupted. With 1, a sentence on stderr gives the reason.
-    ``read`` asks the user a question and returns the answer.
+    Return 2 on wrong usage, 130 when interrupted. On a failure, stderr shows the reason. ``read``
+    asks the user a question and returns the answer.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)
@@ -75,7 +75,7 @@ def _calibrate(
         for note in result.notes:
             console.say(note)
         if result.parameters:
-            console.say(f"Written: {output}\nThe driver loads it at its start with")
+            console.say(f"Written: {output}\nTo load the file, start the driver with")
             console.line(f"  -p calibration_file:={output.absolute()}")
         if arguments.apply:
             robot.apply(result.parameters)

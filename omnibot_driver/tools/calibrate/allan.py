@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Allan deviation of a sensor at rest, and the noise terms that fit it. Pure.
+"""The Allan deviation of a sensor at rest, and the noise terms that fit it. Pure calculation.
 
-Overlapping estimator: NIST Special Publication 1065; noise terms and the deviation of an estimate:
-IEEE Std 952-1997, annex C.
+The overlapping estimator is that of NIST Special Publication 1065. The noise terms and the standard
+deviation of an estimate are those of IEEE Std 952-1997, annex C.
 """
 
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ from omnibot_driver.tools.calibrate.log import Column
 FEWEST_CLUSTERS: Final = 9
 """Least number of averages from which a deviation is computed.
 
-The longest averaging time is therefore a ninth of the rest.
+The longest averaging time is therefore one ninth of the recorded time.
 """
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 60.0
-"""Least length of a rest, in s, for which the wandering of a bias is fitted."""
+"""Shortest recording at rest, in s, to which the random walk of a bias is fitted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Allan:
-    """An Allan deviation with its standard deviation ``sigma``, in the readings' unit.
+    """Allan deviations and their standard deviations ``sigma``, in the unit of the readings.
 
-    ``tau_s``: the averaging times in s. All have the shape (n,).
+    ``tau_s``: averaging times, in s. All arrays have the shape (n,).
     """
 
     tau_s: Column
@@ -38,10 +38,10 @@ class Allan:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Noise of readings with unit U.
+    """Noise terms of a sensor whose readings have the unit U.
 
-    ``density`` in U/√Hz (random walk of the integral), with its ``sigma``; ``instability`` in U,
-    the flicker floor; ``walk`` in U/√s, the random walk of the bias.
+    ``density``: white noise in U/√Hz, with its standard deviation ``sigma``; ``instability``: bias
+    instability (flicker noise) in U; ``walk``: random walk of the bias in U/√s.
     """
 
     density: float
@@ -56,9 +56,9 @@ class Noise:
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Return the Allan deviation of (n,) evenly spaced readings.
+    """Return the Allan deviations of evenly spaced readings of shape (n,).
 
-    The averaging times are a quarter octave apart.
+    Successive averaging times are a quarter of an octave apart.
     """
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS
@@ -76,7 +76,10 @@ def allan(readings: Column, period_s: float) -> Allan:
 
 
 def noise(curve: Allan) -> Noise:
-    """Return the noise terms that fit the curve best; for a short rest only white noise."""
+    """Return the noise terms that fit the curve best.
+
+    A recording shorter than ``WALK_FROM_S`` is fitted with white noise only.
+    """
     tau_s, variance = curve.tau_s, curve.deviation**2
     terms = [1 / tau_s]
     if tau_s[-1] * FEWEST_CLUSTERS >= WALK_FROM_S:

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The command line. Must not import the calibrations' libraries: ``--help`` works without them."""
+"""The command line.
+
+Must not import the libraries of the calibrations, because ``--help`` works without them.
+"""
 
 import argparse
 import math
@@ -29,12 +32,15 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller that it can model"),
 }
-"""By subcommand: parameters of which the driver must have at least one, and the words for the user
-if it has none."""
+"""Requirements by subcommand.
+
+The driver must have at least one of the parameters. If it has none, the text names for the user
+what the board lacks.
+"""
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
-    """Raise ToolError if the board of a driver with these parameters cannot do this subcommand."""
+    """Raise ToolError if the driver's parameters show that its board lacks what is needed."""
     wanted, thing = NEEDS[subcommand]
     if not any(parameter in parameters for parameter in wanted):
         raise ToolError(
@@ -50,8 +56,8 @@ def command_line() -> argparse.ArgumentParser:
         description="Measures values for the driver's parameters, with uncertainties.",
     )
     parser.epilog = (
-        "WHAT --help lists the options. ROS's own arguments follow --ros-args. Exit codes: 0"
-        " with a result, 1 with a message if nothing was found, 2 on wrong usage, 130 when"
+        "`calibrate WHAT --help` lists the options. Give ROS arguments after --ros-args. Exit"
+        " codes: 0 with a result, 1 with a message on failure, 2 on wrong usage, 130 when"
         " interrupted. See docs/tools/calibrate.md."
     )
     subparsers = parser.add_subparsers(dest="subcommand", required=True, metavar="WHAT")
@@ -61,23 +67,24 @@ def command_line() -> argparse.ArgumentParser:
         subparser.add_argument(
             "--yes",
             action="store_true",
-            help="answer yes to every question",
+            help="answer yes to every yes-or-no question",
         )
         subparser.add_argument(
             "--output",
             metavar="FILE",
-            help="YAML file to write into (default: the driver's calibration_file, else"
-            " omnibot_calibration.yaml here)",
+            help="YAML file for the results (default: the driver's calibration_file; without one,"
+            " omnibot_calibration.yaml in this folder)",
         )
         subparser.add_argument(
             "--plot",
             metavar="FILE",
-            help=f"picture, or a folder for it (default: calibrate_{name}.png here)",
+            help=f"file or folder for the picture (default: calibrate_{name}.png in this folder)",
         )
         subparser.add_argument(
             "--apply",
             action="store_true",
-            help="also set the results in the running driver, where they may change while it runs",
+            help="also set the results in the running driver, except for parameters that it reads"
+            " only at its start",
         )
         subparser.add_argument(
             "--namespace",
@@ -95,7 +102,7 @@ def _commission(parser: argparse.ArgumentParser) -> None:
         choices=PARTS,
         default=PARTS,
         metavar="PART",
-        help=f"some of {', '.join(PARTS)} (default: all)",
+        help=f"parts to run, any of {', '.join(PARTS)} (default: all)",
     )
 
 
@@ -111,7 +118,7 @@ def _imu(parser: argparse.ArgumentParser) -> None:
         type=_positive,
         default=STANDARD_GRAVITY,
         metavar="M/S²",
-        help="gravity where you are (default %(default)s)",
+        help="gravity at your place (default %(default)s)",
     )
 
 
@@ -134,7 +141,7 @@ def _scale(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=_positive, default=2.0, help="seconds at each speed (default %(default)s)"
     )
-    _by_tape(parser.add_argument_group("for boards without linear_scale"))
+    _by_tape(parser.add_argument_group("for boards without angular_scale"))
 
 
 def _by_tape(parser: argparse._ActionsContainer) -> None:
@@ -176,19 +183,23 @@ def _geometry(parser: argparse.ArgumentParser) -> None:
         help="highest yaw rate, rad/s (default %(default)s)",
     )
     parser.add_argument(
-        "--without-squares", action="store_true", help="lines and turns only: faster, less certain"
+        "--without-squares",
+        action="store_true",
+        help="drive only lines and turns: faster, but less accurate",
     )
 
 
 def _step(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--wheels", default=WHEELS, help=f"some of {WHEELS} (default: all)")
+    parser.add_argument(
+        "--wheels", default=WHEELS, help=f"wheels to measure, such as AB (default {WHEELS})"
+    )
     parser.add_argument(
         "--speeds",
         type=float,
         nargs=2,
         default=(4.0, 12.0),
         metavar=("SLOW", "FAST"),
-        help="two speeds of a wheel, in rad/s (default 4 12)",
+        help="the two speeds between which a wheel alternates, in rad/s (default 4 12)",
     )
     parser.add_argument(
         "--hold", type=_positive, default=1.5, help="seconds at each speed (default 1.5)"
@@ -197,7 +208,7 @@ def _step(parser: argparse.ArgumentParser) -> None:
         "--steps",
         type=_whole,
         default=8,
-        help="number of steps, up and down together, in each direction (default 8)",
+        help="number of steps in each direction, speeding up and slowing down (default 8)",
     )
     parser.add_argument(
         "--gains",
@@ -209,18 +220,18 @@ def _step(parser: argparse.ArgumentParser) -> None:
     tuning = parser.add_argument_group("for boards whose gains are parameters")
     for name, default, words in (
         ("records", 24, "number of recorded starts at full duty"),
-        ("responses", 3, "number of recorded steps of the set-point with the same gains"),
-        ("samples", 120, "number of ticks of each wheel in a record"),
+        ("responses", 3, "number of recorded steps of the set-point for each set of gains"),
+        ("samples", 120, "number of encoder ticks of each wheel in a record"),
     ):
         tuning.add_argument(
             f"--{name}", type=_whole, default=default, help=f"{words} (default %(default)s)"
         )
     for name, value, words in (
-        ("overshoot", 5.0, "largest overshoot of a step, %%"),
-        ("band", 5.0, "band around the set-point in which a step has settled, %%"),
+        ("overshoot", 5.0, "largest allowed overshoot of a step, %%"),
+        ("band", 5.0, "largest deviation from the final speed once a step has settled, %%"),
         ("destination", 50.0, "set-point of the step, %% of the speed at full duty"),
         ("settling", 2.0, "time in which a step should settle, s"),
-        ("phase-margin", 60.0, "smallest phase margin, degrees"),
+        ("phase-margin", 60.0, "smallest allowed phase margin, degrees"),
         ("control-frequency", 11.0, "rate of the controller in the firmware, Hz"),
     ):
         tuning.add_argument(
@@ -229,7 +240,7 @@ def _step(parser: argparse.ArgumentParser) -> None:
     tuning.add_argument(
         "--gain-optimum",
         action="store_true",
-        help="seek the fastest gains without a phase margin: Td is 0",
+        help="find the fastest gains with Td = 0, without a limit on the phase margin",
     )
 
 
@@ -247,7 +258,7 @@ def _positive(text: str) -> float:
 def _whole(text: str) -> int:
     """Parse a whole number of at least 1, or raise argparse's error."""
     if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
     return int(text)
 
 
@@ -269,8 +280,7 @@ SUBCOMMANDS: Final = {
         _geometry,
     ),
     "step": (
-        "each wheel's response to a step; computes its motor and better gains; wheels off the"
-        " ground",
+        "step response and motor of each wheel, and better gains; wheels off the ground",
         _step,
     ),
 }

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the running driver, and call its parameters and services. Must not know motions."""
+"""Find the running driver, use its parameters and call its services. Must not know motions."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -26,8 +26,8 @@ ANSWER_WITHIN_S: Final = 12.0
 class Client:
     """A ROS client of one running driver.
 
-    ``driver`` is the full name of the driver's node. ``parameters`` are its values by name;
-    ``table`` describes them.
+    ``driver``: the full name of the driver's node; ``parameters``: values of the driver's
+    parameters, by name; ``table``: their descriptions.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -50,16 +50,17 @@ class Client:
         if not (others := running_drivers(self._node)):
             raise ToolError(
                 "no driver is running: start one (ros2 run omnibot_driver driver), or set"
-                " ROS_DOMAIN_ID as it is where the driver runs"
+                " ROS_DOMAIN_ID to the value that the driver uses"
             )
         own = self._namespace()
         place = f"in the namespace {own}" if own else "without a namespace"
         raise ToolError(
-            f"no driver is running {place}, but {', '.join(others)}: choose by --namespace"
+            f"no driver is running {place}, but elsewhere: {', '.join(others)}; choose one with"
+            " --namespace"
         )
 
     def _require_alone(self) -> None:
-        """Raise ToolError if another driver has the same namespace: both would obey commands."""
+        """Raise ToolError if two drivers share the namespace, as both would obey commands."""
         here = [
             name
             for name in self._here()
@@ -102,7 +103,7 @@ class Client:
         }
 
     def set_parameters(self, values: Mapping[str, Value]) -> None:
-        """Set parameters of the running driver. Raises ToolError with the reason of a refusal."""
+        """Set parameters of the running driver. Raises ToolError if the driver refuses one."""
         messages = [
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
         ]
@@ -122,9 +123,10 @@ class Client:
             self.set_parameters(changeable)
 
     def call(self, service: str, on: bool | None = None) -> str:
-        """Call a service of the driver, with ``on`` as the data of a SetBool; return its message.
+        """Call a service of the driver; return the message of its response.
 
-        Raises ToolError where the driver reports a failure.
+        ``on``: the data of a SetBool, or None for a Trigger. Raises ToolError if the driver reports
+        a failure.
         """
         kind = Trigger if on is None else SetBool
         request = Trigger.Request() if on is None else SetBool.Request(data=on)

@@ -2,8 +2,9 @@
 
 """``calibrate commission``: a guided procedure that finds how motors and IMU are oriented.
 
-What can be measured is taken from the board's data. The user is asked how the wheels really turn,
-and to hold the robot. A contradictory answer is explained, and the question repeated.
+The procedure uses the board's data where they are sufficient. It asks the user how the wheels
+really turn, and to hold the robot in several postures. If an answer contradicts the command or
+another answer, the procedure explains why and repeats the question.
 """
 
 import argparse
@@ -53,7 +54,10 @@ WHEEL_RADPS: Final = 2.0
 """Speed of a wheel while its direction is shown to the user, in rad/s (docs/commissioning.md)."""
 AXIS_SPEEDS: Final[tuple[Vector3, ...]] = ((0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3))
 SLOW_LSB: Final = 4
-"""Value of Vx in the board's units, 0.06 m/s by default; whole, to be doubled exactly."""
+"""Value of Vx for the slow drive, in the board's units (0.06 m/s by default).
+
+The fast drive is commanded with exactly twice this number.
+"""
 TURN_RADPS: Final = 0.5
 TURN_RAD: Final = 1.6
 HELD_S: Final = 1.5
@@ -64,13 +68,13 @@ T = TypeVar("T")
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Run the selected parts. Raises ToolError if an answer stays contradictory."""
+    """Run the selected parts. Raises ToolError if repeated answers remain contradictory."""
     walk = Walk(robot, console)
     found = Found(before=robot.parameters)
     if "board" in arguments.only or "wheels" in arguments.only:
         console.confirm(
-            "The wheels will turn, slowly, one by one and together. Is the robot on a box, all"
-            " wheels off the ground, somebody at its power switch?"
+            "The wheels will turn slowly, one by one and together. Is the robot on a box, with all"
+            " wheels off the ground, and is somebody at its power switch?"
         )
     if "board" in arguments.only:
         walk.board(found)
@@ -91,20 +95,23 @@ class Walk:
     # Found from the board's data
 
     def board(self, found: Found) -> None:
-        """Find the position of the board's switch and the meaning of the deltas."""
+        """Find the position of the board's mode switch, and the frame of the odometry deltas."""
         say = self._console.say
         slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
-        say("The mode switch: forward slowly, then twice as fast.")
+        say("Checking the mode switch: the wheels drive forward slowly, then twice as fast.")
         slow, fast, found.control_method = self._mode_switch(slow_mps)
         if found.control_method == "position":
             say(
-                f"Commanded {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, the robot moved at"
-                f" {slow.late_mps:.3f} and {fast.late_mps:.3f} m/s in the end: positional"
-                " control."
+                f"The commands were {slow_mps:.3f} m/s, then {2 * slow_mps:.3f} m/s. At their ends"
+                f" the robot moved at {slow.late_mps:.3f} m/s and {fast.late_mps:.3f} m/s, so the"
+                " switch is on positional control."
             )
             return
-        say(f"{slow.speed_mps:.3f} m/s, then {fast.speed_mps:.3f}: velocity control.")
-        say("The deltas: a turn on the spot, then forward once more.")
+        say(
+            f"The robot moved at {slow.speed_mps:.3f} m/s, then at {fast.speed_mps:.3f} m/s, so the"
+            " switch is on velocity control."
+        )
+        say("Checking the odometry deltas: a turn on the spot, then forward once more.")
         seconds = TURN_RAD / TURN_RADPS
         log = self._drive([(seconds, (0.0, 0.0, TURN_RADPS))], obeys=False)
         began_s = log.commands.stamp_s[0]
@@ -116,7 +123,7 @@ class Walk:
                 f"In a turn on the spot the deltas show {turning.speed_mps:.3f} m/s sideways:"
                 f" delta_frame is not {frame}, but {found.delta_frame}."
             )
-            self._obeys = False  # no speed that the driver tells is right
+            self._obeys = False  # the speeds that the driver reports are wrong now
             return
         turned_rad = float(log.odometry.pose[-1, 2] - log.odometry.pose[0, 2])
         log = self._drive([(JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False)
@@ -124,11 +131,11 @@ class Walk:
         again = drift(log.odometry, began_s + SETTLING_S, began_s + JOG_S)
         right = frame == "wheel_counts" or frame_is_right(fast, again, turned_rad)
         found.delta_frame = frame if right else {"earth": "body", "body": "earth"}[frame]
-        verdict = "as set" if right else "because a forward drive then shows another direction"
-        say(f"Turned by {turned_rad:.2f} rad: the deltas are {found.delta_frame}, {verdict}.")
+        verdict = "as set" if right else "because the direction of a forward drive has changed"
+        say(f"After a turn by {turned_rad:.2f} rad: delta_frame is {found.delta_frame}, {verdict}.")
 
     def _mode_switch(self, slow_mps: float) -> tuple[Drift, Drift, ControlMethod]:
-        """Return the motions at ``slow_mps`` and at twice that, and what the board controls."""
+        """Return the motions at ``slow_mps`` and at twice that speed, and the control method."""
         for _ in range(TRIES):
             log = self._drive(
                 [(JOG_S, (slow_mps, 0.0, 0.0)), (JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False
@@ -141,23 +148,24 @@ class Walk:
             if method := control_method(slow, fast, slow_mps):
                 return slow, fast, method
             self._console.say(
-                f"The robot moved at {slow.early_mps:.3f} to {slow.late_mps:.3f} m/s, then at"
-                f" {fast.early_mps:.3f} to {fast.late_mps:.3f}: neither velocity nor positional"
-                " control. Once more."
+                f"The speed changed from {slow.early_mps:.3f} m/s to {slow.late_mps:.3f} m/s in the"
+                f" slow drive, and from {fast.early_mps:.3f} m/s to {fast.late_mps:.3f} m/s in the"
+                " fast one. This is neither velocity nor positional control; trying again."
             )
         raise ToolError(
-            f"the robot held no speed in {TRIES} attempts: reduce the load of this computer, check"
-            " that the wheels turn freely, and begin again"
+            f"the robot did not keep a steady speed in {TRIES} attempts: reduce the load of this"
+            " computer, check that the wheels turn freely, and begin again"
         )
 
     # Found by looking at the wheels
 
     def wheels(self, found: Found) -> None:
-        """Find the order of the wheels and the signs of the axes."""
+        """Check the order of the wheels, and find the signs of the axes."""
         self._console.say(
             "Look at each wheel from outside, towards the robot's centre. By the manual A is front"
-            " right, B front left, C at the back.\nAnswer with three signs, for A, B and C:"
-            " + counter-clockwise, - clockwise, 0 still; such as +00. (r: show it again)"
+            " right, B front left, C at the back.\nAnswer with three signs, for A, B and C: + for"
+            " counter-clockwise, - for clockwise, 0 for still. An example is +00. Answer r to see"
+            " the motion again."
         )
         signs = [self._until_possible(lambda n=wheel: self._wheel(n)) for wheel in range(3)]  # type: ignore[misc]
         a, b, c = signs
@@ -165,8 +173,9 @@ class Walk:
         if len(set(signs)) > 1:
             odd = WHEELS[next(n for n in range(3) if signs.count(signs[n]) == 1)]
             raise ToolError(
-                f"wheel {odd} turns the other way than the two others: no parameter corrects"
-                " a single wheel; check how its motor and encoder are connected, then begin again"
+                f"wheel {odd} turns in the opposite direction to the other two: no parameter"
+                " corrects a single wheel; check how its motor and encoder are connected, then"
+                " begin again"
             )
         if found.control_method == "position":
             self._console.say("The axes cannot be checked with the switch on positional control.")
@@ -181,7 +190,7 @@ class Walk:
         sign = wheel_sign(wheel, seen)
         self._console.say(
             f"Wheel {WHEELS[wheel]} is where it should be"
-            + (" and turns as the manual says." if sign > 0 else ", and turns the other way.")
+            + (" and turns as the manual says." if sign > 0 else ", but turns in reverse.")
         )
         return sign
 
@@ -190,22 +199,22 @@ class Walk:
         sign = axis_sign(axis, seen)
         self._console.say(
             f"+{AXES[axis]} is "
-            + ("right as it is." if sign > 0 else "reversed: its sign in axis_signs changes.")
+            + ("correct." if sign > 0 else "reversed: its sign in axis_signs changes.")
         )
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Repeat a motion until the user's answer is a valid pattern; return that pattern."""
+        """Show a motion, again if the user asks for it; return the pattern that the user saw."""
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
             seen = self._console.ask(
                 "What did A, B, C do?",
                 _understand,
-                "Please answer with three of + - 0, such as +00, or r to see it again.",
+                "Please answer with three signs of + - 0, such as +00, or r to see it again.",
             )
             if seen:
-                self._console.say(f"So: {in_words(seen)}.")
+                self._console.say(f"Your answer means: {in_words(seen)}.")
                 a, b, c = seen
                 return a, b, c
 
@@ -215,26 +224,28 @@ class Walk:
         """Find the mounting of the IMU."""
         console = self._console
         console.say(
-            "\nThe IMU. The motors stay off; hold the robot as you are asked to, and keep it still."
+            "\nNow the IMU. The motors stay off. Hold the robot as asked, and keep it still."
         )
         return self._until_possible(self._postures)
 
     def _postures(self) -> Mounting:
         ask = self._console.wait
-        ask("Put it down level, untouched.")
+        ask("Put the robot down on a level floor, and do not touch it.")
         resting = self._robot.rest(HELD_S).imu
         level = up(resting)
-        ask("Raise its front by about 30°, hold it.")
+        ask("Raise the robot's front by about 30°, and hold it still.")
         nose_up = up(self._robot.rest(HELD_S).imu)
-        ask("Put it down; raise its left side by about 30°, hold it.")
+        ask("Put the robot down. Then raise its left side by about 30°, and hold it still.")
         left_up = up(self._robot.rest(HELD_S).imu)
         found = mounting(level, nose_up, left_up)
         ask(
-            "Put it down. After Enter turn it to the left by hand, by a quarter turn or more,"
-            f" within {TURN_BY_HAND_S:.0f} s."
+            "Put the robot down. After you press Enter, turn it to the left by hand, by a quarter"
+            f" turn or more, within {TURN_BY_HAND_S:.0f} s."
         )
         turn_rad = require_left_turn(self._robot.rest(TURN_BY_HAND_S).imu, bias(resting), level)
-        self._console.say(f"Turned to the left by {turn_rad:.1f} rad: gyro and gravity agree.")
+        self._console.say(
+            f"The gyro measured a turn to the left by {turn_rad:.1f} rad: gyro and gravity agree."
+        )
         return found
 
     # Common to all parts
@@ -266,5 +277,5 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """Return the pattern that an answer describes; an empty pattern asks for a repetition."""
+    """Return the pattern that an answer describes: empty for ``r``, None if it is not valid."""
     return () if answer == "r" else understand(answer)

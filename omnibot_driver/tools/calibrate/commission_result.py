@@ -18,16 +18,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WHEEL_BEARINGS_RAD: Final = (-math.pi / 3, math.pi / 3, math.pi)
-"""Bearings of wheels A, B, C, in rad, from the front to the left (manual, Control equation)."""
+"""Bearings of wheels A, B, C, in rad, counter-clockwise from the front.
+
+Source: manual, "Control equation".
+"""
 SEEN_FROM_ABOVE: Final = 0.3
 COLOURS: Final = {"x": "C3", "y": "C2", "z": "C0"}
 
 
 @dataclass(slots=True)
 class Found:
-    """The results of a commissioning, each None if not found.
+    """The results of a commissioning; a result that was not determined is None.
 
-    ``before``: the driver's parameters before it.
+    ``before``: the driver's parameters before the commissioning.
     """
 
     before: dict[str, Any]
@@ -39,7 +42,7 @@ class Found:
 
 
 def result_of(found: Found) -> Result:
-    """Return the result: parameters for the driver, and the IMU's mounting for the description."""
+    """Return the driver's parameters, and the IMU's mounting for the robot's description."""
     parameters: dict[str, Value] = {}
     for name in ("control_method", "delta_frame", "axis_signs"):
         value = getattr(found, name)
@@ -58,7 +61,7 @@ def result_of(found: Found) -> Result:
         findings += _angles(found.mounting, chosen)
         words = " ".join(f"{angle:.4f}" for angle in angles)
         notes.append(
-            "The driver does not turn the IMU's axes, the robot's description does: start"
+            "The driver does not rotate the IMU's axes; the robot's description does. Start"
             f" description.launch.py with\n  xacro_args:=\"imu_rpy:='{words}'\""
         )
     return Result(
@@ -95,24 +98,25 @@ def _remarks(found: Found) -> list[str]:
         )
     if found.wheel_signs == (-1, -1, -1):
         remarks.append(
-            "All wheels turn the other way than the manual says: axis_signs corrects cmd_vel and"
-            " odom; wheel_cmd and joint_states stay reversed."
+            "All wheels turn in the opposite direction to the manual's. axis_signs corrects cmd_vel"
+            " and odom, but wheel_cmd and joint_states stay reversed."
         )
     if found.axis_signs is not None and mirrored(found.axis_signs):
         remarks.append(
-            "These signs mirror the robot, which no choice of its front explains. If you are sure"
-            " of what you saw, use them for velocities; cmd_pose is refused with them."
+            "These signs mirror the robot. Choosing another side as its front cannot cause that, so"
+            " check your answers. If they are right, use these signs for velocities; the driver"
+            " refuses cmd_pose with them."
         )
     if found.delta_frame not in (None, found.before["delta_frame"]):
         remarks.append(
-            "delta_frame is read at the start: start the driver with this file, then run `calibrate"
-            " commission --only board` to see that it is right."
+            "delta_frame is read at the start of the driver. Restart the driver with this file,"
+            " then run `calibrate commission --only board` to check the new value."
         )
     return remarks
 
 
 def draw(figure: "Figure", found: Found) -> None:
-    """Draw, from above, the axes that the board calls x and y, and those of the IMU."""
+    """Draw a view from above: the board's x and y axes, and the IMU's axes."""
     left, right = figure.subplots(1, 2)
     for axes in (left, right):
         axes.add_artist(Circle((0.0, 0.0), 1.0, fill=False, color="0.7"))

@@ -48,7 +48,7 @@ class Console:
         self.rich.print(text, markup=False)
 
     def line(self, text: str) -> None:
-        """Print one line that is meant to be copied, whatever its length."""
+        """Print one line without wrapping, so that the user can copy it."""
         self.rich.print(text, markup=False, soft_wrap=True)
 
     def confirm(self, question: str) -> None:
@@ -76,7 +76,10 @@ class Console:
             self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
 
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
-        """Ask until ``understand`` accepts the answer; print ``otherwise`` after others."""
+        """Ask until ``understand`` accepts the answer; print ``otherwise`` after a rejected one.
+
+        Return what ``understand`` returned; None means a rejected answer.
+        """
         while (meant := understand(self._answer(f"{question} "))) is None:
             self.say(otherwise)
         return meant
@@ -87,7 +90,7 @@ class Console:
 
     @contextmanager
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Show the progress of a task; the caller reports the completed part, from 0 to 1."""
+        """Show the progress of a task; the caller reports the completed fraction, from 0 to 1."""
         if not self.rich.is_terminal:
             self.say(f"{what} ...")
             yield lambda _part: None
@@ -114,12 +117,15 @@ class Console:
         except EOFError:
             self.say()
             raise ToolError(
-                f"no answer to “{question.strip()}”; run it in a terminal, or pipe the answers in"
+                f"no answer to “{question.strip()}”; use a terminal, or pipe the answers in"
             ) from None
 
 
 def digits(finding: Finding) -> tuple[str, str, str]:
-    """Return value, uncertainty and previous value as text, to two digits of the uncertainty."""
+    """Return value, uncertainty and previous value as text.
+
+    They are rounded to the second significant digit of the uncertainty.
+    """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None
     if sigma and math.isfinite(sigma):

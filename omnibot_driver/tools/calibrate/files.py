@@ -21,7 +21,7 @@ PICTURES = (".png", ".svg", ".pdf")
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
     """Return the given file, else the driver's calibration file, else a file in this folder.
 
-    Raises ToolError if the file cannot be written or holds something else.
+    Raises ToolError if the file cannot be written, or is not a calibration file.
     """
     try:
         path = calibration.locate(given or drivers or DEFAULT)
@@ -31,25 +31,25 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
         raise ToolError(f"{error}; or name another file with --output") from error
     if any(isinstance(part, dict) and "ros__parameters" in part for part in _values(content)):
         raise ToolError(
-            f"{path} is a file of ROS parameters: give --output a file of its own, and have the"
-            " driver load it with the parameter calibration_file"
+            f"{path} is a file of ROS parameters: name another file with --output, and start the"
+            " driver with calibration_file set to that file"
         )
     _require_writable(path)
     return path
 
 
 def picture_file(given: str | None, subcommand: str) -> Path:
-    """Return the picture file; for a folder or None, ``calibrate_<subcommand>.png`` in it or here.
+    """Return the path of the picture.
 
-    Raises ToolError if the file cannot be written, or has another suffix than ``PICTURES``.
+    If ``given`` is a folder or None (this folder), it is ``calibrate_<subcommand>.png`` there.
+    Raises ToolError if the file cannot be written, or if its suffix is not in ``PICTURES``.
     """
     path = Path(given or ".").expanduser()
     if path.is_dir():
         path = path / f"calibrate_{subcommand}.png"
     if path.suffix.lower() not in PICTURES:
         raise ToolError(
-            f"--plot {given} is neither a folder nor a picture that this tool can draw; let it end"
-            " in"
+            f"--plot {given} is neither a folder nor the name of a picture; the name must end in"
             f" {', '.join(PICTURES)}"
         )
     _require_writable(path)
@@ -57,7 +57,7 @@ def picture_file(given: str | None, subcommand: str) -> Path:
 
 
 def save(result: Result, output: Path, table: Table) -> None:
-    """Save the result. Raises ToolError on failure, which leaves the file unchanged."""
+    """Save the result. Raises ToolError on failure; the file is then unchanged."""
     try:
         for name, value in result.parameters.items():
             table.by_name[name].check(value)
@@ -78,7 +78,7 @@ def draw(result: Result, output: Path, picture: Path) -> None:
         result.draw(figure)
         picture.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(picture, dpi=110)
-    except Exception as error:  # any failure here costs only the picture
+    except Exception as error:  # whatever fails here, only the picture is lost
         saved = f"saved to {output}, but " if result.parameters or result.record else ""
         raise ToolError(f"{saved}{picture} is not drawn: {error}") from error
 

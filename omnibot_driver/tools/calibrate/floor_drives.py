@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Make drives on the floor, one after the other, each of which the user measures with a tape.
+"""Drive on the floor several times; the user measures each drive with a tape.
 
 Must not know what is computed from the drives.
 """
@@ -36,13 +36,14 @@ def measured(
     go: Callable[[Drive], Column],
     measure: Callable[[Drive, Column], Measured],
 ) -> list[Measured]:
-    """Make the drives with ``go``, and return what ``measure`` makes of each drive's poses.
+    """Run each drive with ``go``, and return the result of ``measure`` for its poses.
 
-    Raises ToolError.
+    Raises ToolError if the user does not confirm, or if a drive fails.
     """
     console.confirm(
-        f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
-        f" begins, at up to {arguments.speed:g} m/s. Is there enough room?"
+        f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"
+        f" stays within {arguments.side:g} m of its start, forward and to both sides. Is there"
+        " enough room?"
     )
     found = []
     for number, drive in enumerate(drives, 1):
@@ -77,9 +78,10 @@ def driven(
     turn_rad: float,
     seconds: float,
 ) -> Column:
-    """Drive by this law, and return the poses of the odometry. Raises ToolError.
+    """Drive by this law; return the poses of the odometry, (n, 3), in m, m and rad.
 
-    ``turn_rad``: the size of the turn from start to end; ``seconds``: the expected duration.
+    ``turn_rad``: the size of the whole turn from start to end, in rad; ``seconds``: the expected
+    duration. Raises ToolError if the drive fails.
     """
     speed, turning = speeds(robot, arguments)
     bounds = Bounds(
@@ -93,12 +95,12 @@ def driven(
         log = robot.drive(law, bounds, show=lambda s: told(s / seconds))
     path: Column = log.odometry.pose
     if not len(path) or not np.isfinite(path).all():
-        raise ToolError("odom gave no finite poses: see what the driver logs")
+        raise ToolError("odom has no poses, or contains NaN or infinity: see the driver's log")
     return path
 
 
 def turned_past_mark(console: Console) -> float:
-    """Ask how far the robot's front points past its mark; return rad, positive to the left."""
+    """Ask how far the front points past its mark; return the angle in rad, positive to the left."""
     return math.radians(
         console.number(
             "By how much did the robot turn past the mark of its front (left +, right -)",

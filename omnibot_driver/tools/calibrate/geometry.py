@@ -22,20 +22,20 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""Relative difference of a wheel's radius from the mean above which the user is warned."""
+"""The user is warned if the radius of a wheel differs from the mean by more than this fraction."""
 INTRODUCTION: Final = (
     "You need a tape measure, something to mark the floor with, and a plumb or a fixed point"
     " under the robot's centre. Before each drive mark where the centre is and where the front"
-    " points; after it, enter where the robot stands relative to these marks: forward and left"
-    " are positive, back and right are negative. Do not push the robot or correct its course."
+    " points. After the drive, enter where the robot stands relative to these marks: forward and"
+    " left are positive, back and right are negative. Do not push the robot or correct its course."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A drive through ``places``.
+    """A drive through the poses ``places``.
 
-    ``heading``: whether the heading at the end is measured, or else the position.
+    If ``heading`` is true, the user measures the heading at the end, otherwise the position.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Drive:
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Make the drives and compute the geometry. Raises ToolError."""
+    """Run the drives and compute the geometry. Raises ToolError if a drive or the fit fails."""
     if "base_radius" not in robot.parameters:
         return odometry_scale.run(robot, console, arguments)
     console.say(INTRODUCTION)
@@ -81,7 +81,7 @@ def believed(now: Mapping[str, Any]) -> dict[str, float]:
 
 
 def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
-    """Return the drives to make, in order."""
+    """Return the planned drives, in order."""
     angle_rad = math.tau * turns
     number = f"{turns} turns" if turns > 1 else "1 turn"
     drives = [
@@ -131,7 +131,10 @@ def _reading(
 
 
 def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any]) -> Result:
-    """Return the findings for this geometry, to show and write; ``now``: driver's parameters."""
+    """Return the result to show and to save, for the fitted geometry ``found``.
+
+    ``now``: the driver's parameters before the calibration.
+    """
     wheels_sigma, base_sigma = map(float, np.sqrt(np.diag(found.covariance)[:2]))
     factors = {
         "wheel_radius": (found.wheels, wheels_sigma, "m"),
@@ -167,8 +170,8 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     if found.excess > 2.0:
         notes.append(
             f"The readings scatter {found.excess:.1f} times as much as --tape, --angle and"
-            " odom_wheel_drift predict, so the uncertainties are larger by this factor: was one"
-            " misread, or does the robot slip?"
+            " odom_wheel_drift predict, so the uncertainties are larger by this factor: a reading"
+            " may be wrong, or the robot slips."
         )
     return Result(
         findings=findings,
@@ -181,10 +184,10 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
 def misses(
     readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> tuple[float, float]:
-    """Return the mean distance, in m, between the odometry's end and the measured end of a drive.
+    """Return the mean distances, in m, between the ends of the drives by odometry and by tape.
 
-    The first value is with the driver's present geometry, the second with the one found. The driver
-    has one radius for all wheels, so differences between wheels are not used.
+    The first value is for the driver's present geometry, the second for ``found``. The driver has
+    one radius for all wheels, so differences between the wheels are not used.
     """
     before: list[float] = []
     after: list[float] = []

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Draw the drives by the odometry with old and new geometry, and the ends measured by tape.
+    """Draw the path of each drive with the old and the new geometry, and its end by the tape.
 
-    Beside the drives, draw the error of each reading with either geometry, in its standard
-    deviations.
+    Beside the paths, draw the errors of the odometry with both geometries, in standard deviations
+    of the tape reading.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fit the robot's geometry to ends by the odometry and ends measured with a tape. Pure.
+"""Fit the robot's geometry to drives whose ends were measured with a tape. Pure calculation.
 
-Each path of the odometry is converted to how far the wheels rolled, and calculated again with
-wheels and a base of other sizes. The sizes that lead to the measured ends are the result. So any
-mixture of lines, turns and squares will do, as far as it determines the sizes. After J. Borenstein
-and L. Feng, "UMBmark: a benchmark test for measuring odometry errors in mobile robots" (1995), for
-three wheels.
+Each path of the odometry is converted to the distances that the wheels rolled. From these the path
+is computed again with other radii of the wheels and of the base, until the ends fit the tape. Any
+mixture of lines, turns and squares can be used that determines the radii. The method is that of
+J. Borenstein and L. Feng, "UMBmark: a benchmark test for measuring odometry errors in mobile
+robots" (1995), extended to three wheels.
 """
 
 import math
@@ -23,9 +23,9 @@ from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.needs import ToolError
 
 WHEELS_ALIKE: Final = 0.01
-"""Standard deviation of a wheel's radius from the mean that manufacture causes, relative."""
+"""Relative standard deviation of a wheel's radius that manufacturing tolerances cause."""
 UNKNOWN: Final = 0.2
-"""Largest relative deviation of a size from the assumed one; beyond this a reading is a mistake."""
+"""Largest relative deviation of a radius from the assumed one; a larger one means wrong readings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class Reading:
     """One measured drive.
 
     ``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) true pose at the end
-    relative to the start, in m, m and unwrapped rad, NaN if not measured; ``sigma``: (3,) standard
-    deviation of the measurement.
+    relative to the start, in m, m and unwrapped rad, with NaN for values that were not measured;
+    ``sigma``: (3,) standard deviations of ``end``.
     """
 
     name: str
@@ -45,11 +45,12 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Sizes relative to the assumed ones.
+    """Sizes as ratios to the assumed sizes.
 
-    ``wheels``: mean radius; ``base``: base radius; ``unlike``: (3,), relative excess of each wheel
-    over the mean. ``covariance``: (4, 4), of wheels, base and the first two of ``unlike``;
-    ``excess``: ratio of the residuals to the expected ones, at least 1.
+    ``wheels``: mean radius of the wheels; ``base``: base radius; ``unlike``: (3,) relative
+    difference of each wheel's radius from the mean. ``covariance``: (4, 4) covariance matrix of
+    ``wheels``, ``base`` and the first two elements of ``unlike``; ``excess``: ratio of the
+    residuals to the expected ones, at least 1.
     """
 
     wheels: float
@@ -60,7 +61,7 @@ class Geometry:
 
     @property
     def turn(self) -> float:
-        """Ratio of the true turn to the turn that the assumed sizes give."""
+        """Ratio of the true angle of a turn to the angle computed with the assumed sizes."""
         return self.wheels / self.base
 
     @property
@@ -79,9 +80,9 @@ class Geometry:
 def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
     """Return the geometry that explains the readings best.
 
-    ``base_radius_m``: the assumed base radius; ``drift``: standard deviation, in m, of the distance
-    of a wheel after 1 m, caused by slip. Raises ToolError for readings that no such robot can have
-    made.
+    ``base_radius_m``: the assumed base radius; ``drift``: standard deviation, in m, that slip
+    causes in the distance of a wheel after 1 m. Raises ToolError if the fit fails, or if a radius
+    differs from the assumed one by more than ``UNKNOWN``.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -101,8 +102,8 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
     if not found.success or max(abs(wheels - 1), abs(base - 1)) > UNKNOWN:
         raise ToolError(
             "the readings do not fit this robot (wheel or base radius off by more than"
-            f" {UNKNOWN:.0%}): check their signs and units, and that the robot's forward is"
-            " forward, then try again"
+            f" {UNKNOWN:.0%}): check their signs and units, and that a forward command drives the"
+            " robot forward, then try again"
         )
     excess = max(1.0, 2 * found.cost / max(1, count + 3 - 4)) ** 0.5
     covariance = excess**2 * np.linalg.inv(found.jac.T @ found.jac)
@@ -110,10 +111,10 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the (n, 3) poses that the same wheel turns give with other sizes, from the origin on.
+    """Return the (n, 3) poses that the same rotations of the wheels give with other sizes.
 
-    Wheel radii are ``factors`` times as large, (3,) or step by step (n - 1, 3); the base is
-    ``base`` times as large.
+    The new path begins at the origin. ``factors``: ratios of the new to the assumed wheel radii,
+    (3,) or for each step (n - 1, 3); ``base``: ratio of the new to the assumed base radius.
     """
     rims = rims_of(path, base_radius_m) * factors
     body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T
@@ -126,7 +127,7 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
 
 def rims_of(path: Column, base_radius_m: float) -> Column:
-    """Return how far each rim rolled between successive poses, in m: (n - 1, 3)."""
+    """Return the distance that each wheel rolled between successive poses, in m: (n - 1, 3)."""
     steps = np.diff(path, axis=0)
     middle = path[:-1, 2] + steps[:, 2] / 2
     cos, sin = np.cos(middle), np.sin(middle)
@@ -135,13 +136,13 @@ def rims_of(path: Column, base_radius_m: float) -> Column:
 
 
 def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
-    """Return weights with which the measured errors are independent and have unit variance."""
+    """Return the matrix that makes the measured errors independent with unit variance."""
     path = reading.path
     x, y, yaw = np.linalg.inv(_rims(base_radius_m))
     middle = (path[:-1, 2] + path[1:, 2]) / 2
     cos, sin = np.cos(middle)[:, None], np.sin(middle)[:, None]
     left_x, left_y = (path[-1, :2] - path[1:, :2]).T[:, :, None]
-    slopes = np.stack(  # (3, n - 1, 3): the end by how far each rim rolled in each step
+    slopes = np.stack(  # (3, n - 1, 3): derivatives of the end by the distances in each step
         (cos * x - sin * y - left_y * yaw, sin * x + cos * y + left_x * yaw, 0 * cos + yaw)
     )
     variance = drift**2 * np.abs(rims_of(path, base_radius_m))
@@ -152,7 +153,7 @@ def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
 
 
 def _rims(base_radius_m: float) -> Column:
-    """Return the (3, 3) matrix from a body's twist to the speeds of its rims."""
+    """Return the (3, 3) matrix that converts a body twist to the rim speeds of the wheels."""
     wheels = OmniKinematics(1.0, base_radius_m)
     columns = [BodyTwist(1.0, 0.0, 0.0), BodyTwist(0.0, 1.0, 0.0), BodyTwist(0.0, 0.0, 1.0)]
     return np.array([wheels.wheel_rates(column) for column in columns]).T

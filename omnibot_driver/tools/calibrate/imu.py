@@ -23,11 +23,14 @@ COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
 DRAWN: Final = 1000
 """Largest number of readings to draw; more make the file larger, but not the picture clearer."""
 GRAVITY_SIGMA: Final = 0.01
-"""Standard deviation of the local gravity as a user knows it, in m/s²."""
+"""Standard deviation of the local gravity that the user gives, in m/s²."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Record the IMU at rest and evaluate it. Raises ToolError."""
+    """Record the IMU at rest and evaluate the readings.
+
+    Raises ToolError if the robot moves, or if the readings cannot be used.
+    """
     if robot.parameters["auto_gyro_bias"]:
         raise ToolError(
             "auto_gyro_bias is on, so the driver would change the bias during the measurement;"
@@ -54,7 +57,10 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> Result:
-    """Return the findings of a rest, to show and to write; ``now``: the driver's parameters."""
+    """Return the result of a measurement at rest, to show and to save.
+
+    ``now``: the driver's parameters before the calibration.
+    """
     too_long_mps2 = found.gravity_mps2 - gravity_mps2
     accel_bias = too_long_mps2 * found.up
     along_sigma = math.hypot(GRAVITY_SIGMA, float(found.force_sigma.max()))
@@ -117,9 +123,9 @@ def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> R
             **worst,
         },
         notes=[
-            f"{found.readings} readings in {found.readings * found.period_s:.0f} s. Of the"
-            " accelerometer's bias only the part along gravity can be seen at rest. Roll and"
-            " pitch include the slope of the floor; for the robot's description:"
+            f"{found.readings} readings in {found.readings * found.period_s:.0f} s. At rest only"
+            " the part of the accelerometer's bias along gravity can be measured. Roll and pitch"
+            " include the slope of the floor. For the robot's description:"
             f" imu_rpy:='{roll_rad % math.tau:.4f} {pitch_rad:.4f} <yaw>'."
         ],
         draw=lambda figure: draw(figure, found, imu),

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Handle Ctrl-C, a lost SSH session and kill: the request is noted, and `check` raises it.
+"""Handle Ctrl-C, a lost SSH session and kill: a signal is noted, and `check` raises Interrupted.
 
-An exception at an arbitrary place inside ROS would leave the executor in an undefined state. Only
-while a person is asked, a signal raises at once.
+A signal does not raise at once, because an exception inside ROS could leave the executor in an
+undefined state. Only while the program waits for the user's answer does a signal raise at once.
 """
 
 import signal
@@ -23,8 +23,7 @@ class Interrupted(ToolError):
 
 
 class Interruption:
-    """A context that handles the signals of ``SIGNALS``; outside the main thread it handles
-    none."""
+    """A context manager that handles ``SIGNALS``; outside the main thread it does nothing."""
 
     def __init__(self) -> None:
         self._requested = self._asking = self._deferred = False
@@ -45,7 +44,7 @@ class Interruption:
             signal.signal(number, handler)
 
     def check(self) -> None:
-        """Raise Interrupted once a signal was received."""
+        """Raise Interrupted if a signal was received and is not deferred."""
         if self._requested and not self._deferred:
             raise Interrupted("interrupted; the robot is stopped, nothing was written")
 
@@ -59,7 +58,7 @@ class Interruption:
             self._deferred = False
 
     def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
-        """Return a function that reads as ``read`` does, but that a signal interrupts at once."""
+        """Return a function that calls ``read``, and that a signal interrupts at once."""
 
         def ask(question: str) -> str:
             self.check()

@@ -25,14 +25,14 @@ from omnibot_driver.tools.needs import ToolError
 
 IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
-"""Time without data, in s, after which the robot is not driven any further."""
+"""Time without data, in s, after which a motion is stopped."""
 AT_ONCE: Final = 100
-"""Largest number of messages that are read in one go."""
+"""Largest number of pending messages that are read at once."""
 LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Listener(Client):
-    """A client that records the robot's data; ``log``: the current or last motion or rest."""
+    """A client that records the robot's data in ``log``; each motion or rest begins a new log."""
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         super().__init__(node, context, interruption)
@@ -54,8 +54,8 @@ class Listener(Client):
         if not self._wait(lambda: self._states and self._heard_s[first] > 0, FOUND_WITHIN_S):
             state = self._states[-1] if self._states else "unknown"
             raise ToolError(
-                f"{self.driver} sends no {first} (state: {state}): see what it logs, and"
-                " docs/troubleshooting.md"
+                f"{self.driver} publishes nothing on {first} (state: {state}): see the driver's"
+                " log, and docs/troubleshooting.md"
             )
 
     def diagnosed(self, key: str) -> str:
@@ -107,7 +107,7 @@ class Listener(Client):
         self._estop = message.data
 
     def _begin(self, states: Sequence[str]) -> None:
-        """Start a new log with fresh data, since none is received while the user is asked."""
+        """Wait for fresh data, as none are received while the user is asked; start a new log."""
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._wait(lambda: min(self._heard_s.values()) > 0, 1.0)
@@ -122,7 +122,7 @@ class Listener(Client):
             if state not in states:
                 raise ToolError(
                     f"the driver reported the state {state}, but {' or '.join(states)} is needed:"
-                    " see what it logs; ~/start starts a paused board"
+                    " see the driver's log; ~/start starts a paused board"
                 )
         if lost := self._lost():
             raise ToolError(

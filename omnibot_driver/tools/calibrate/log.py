@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A log of what a robot sent and was commanded during one motion or one rest, as columns.
+"""A log of a robot's data and commands during one motion or one rest, as columns.
 
-Times are in seconds by ROS's clock; a measurement's time is that of the board's sampling. Knows no
+Times are in seconds of ROS's clock; the time of a measurement is its sampling time. Must not use
 ROS.
 """
 
@@ -55,7 +55,7 @@ class Commands:
 
 @dataclass(slots=True)
 class Log:
-    """Data received and sent: rows in order of arrival, which are available as columns."""
+    """Received data and sent commands: rows in order of time; the properties return columns."""
 
     imu_rows: list[Row] = field(default_factory=list)
     odometry_rows: list[Row] = field(default_factory=list)

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the meaning of the board's commands and deltas from its own odometry. Pure calculation.
+"""Find the control method and the frame of the deltas from the odometry alone. Pure calculation.
 
-Neither a person nor a measured floor is needed: the odometry is enough, whatever its signs and
-scales.
+No observer and no measured distance are needed. The signs and scales of the odometry may be wrong.
 """
 
 import math
@@ -18,20 +17,22 @@ from omnibot_driver.tools.needs import ToolError
 ControlMethod = Literal["velocity", "position"]
 
 STANDS_PART: Final = 0.1
-"""Fraction of the commanded speed below which the robot is regarded as standing still."""
+"""The robot is regarded as standing still below this fraction of the commanded speed."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""Fraction of its earlier speed below which the robot is regarded as stopping."""
+"""The robot is regarded as stopping below this fraction of its earlier speed."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Range of the ratio of speeds when the command is doubled, with friction and rounding, and the
-largest ratio of equal speeds."""
+"""Range of the speed ratio that means a doubled speed, and largest ratio that means an equal speed.
+
+Both allow for friction and rounding.
+"""
 PURE_TURN: Final = 0.5
 """Largest ratio of sideways motion to rim speed in a turn on the spot.
 
 The ratio is 0 if the deltas are interpreted correctly, else 2 or more.
 """
 ALIKE: Final = 0.35
-"""Fraction of the turned angle by which two directions may differ and still be the same."""
+"""Two directions are regarded as equal if they differ by less than this fraction of the turn."""
 
 
 LEAST_M: Final = 1e-3
@@ -39,9 +40,9 @@ LEAST_M: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Mean velocity by the driver's odometry over some time: in the body's axes, m/s and rad/s.
+    """Mean velocity over a time span by the driver's odometry, in the body's axes.
 
-    ``early_mps`` and ``late_mps`` are the speeds of the two halves of the time.
+    ``early_mps``, ``late_mps``: speeds in the first and in the second half of the time span.
     """
 
     vx_mps: float
@@ -62,7 +63,7 @@ class Drift:
 
 
 def drift(odometry: Odometry, begin_s: float, end_s: float) -> Drift:
-    """Return the mean velocity between two timestamps. Raises ToolError for too little data."""
+    """Return the mean velocity between two timestamps. Raises ToolError if data are missing."""
     within = (odometry.stamp_s >= begin_s) & (odometry.stamp_s < end_s)
     twist = odometry.twist[within]
     if len(twist) < 4:
@@ -84,11 +85,11 @@ def require_motion(odometry: Odometry) -> None:
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod | None:
     """Return whether the board controls velocity or position, from the motion at two commands.
 
-    ``slow``: the motion with the command for ``slow_mps``; ``fast``: with twice that command. A
-    velocity is held, and doubles. In positional control the same command is a place a few
-    millimetres from the origin of the board's frame: the robot drives to that place and stops, or
-    is still on its way at the same speed. Returns None if the motion fits neither, as on a busy
-    computer on which commands arrive late.
+    ``slow``: the motion with the command for ``slow_mps``; ``fast``: the motion with twice that
+    command. In velocity control the speed is constant, and doubles with the command. In positional
+    control the command is a position a few millimetres from the origin of the board's frame: the
+    robot drives there and stops, or is still driving there at the same speed. Returns None if the
+    motion fits neither, for example because a busy computer delayed the commands.
     """
     both = slow, fast
     if any(one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both):
@@ -102,15 +103,16 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod |
 
 
 def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
-    """Return whether the odometry shows a turn on the spot as such, not as a sideways motion."""
+    """Return whether the odometry shows a turn on the spot as a turn, not as sideways motion."""
     return turning.speed_mps < PURE_TURN * base_radius_m * abs(turning.yaw_rate)
 
 
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
-    """Return whether a command moves the body in the same direction before and after this turn.
+    """Return whether the odometry shows the same body direction before and after a turn.
 
-    With the wrong choice between the frames "earth" and "body", the direction turns as well. Raises
-    ToolError if neither is the case.
+    ``before``, ``after``: motions with the same command. With the wrong choice between the frames
+    "earth" and "body", the direction changes by the turn. Raises ToolError if the direction
+    neither stays the same nor changes by the turn.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Move a robot for a calibration: laws, their bounds, and whether the robot obeys.
+"""Motions of a calibration: control laws, their bounds, and a check that the robot follows.
 
-Pure. A law returns the command at a time, given the pose by the odometry; None ends the motion.
+Pure calculation. A law computes the command from the time and from the pose by the odometry.
 """
 
 import math
@@ -19,32 +19,35 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A function from time in s and pose, both since the motion began, to a command.
+"""A function of the time in s and the pose, both relative to the start; it returns a command.
 
-The yaw is unwrapped. The command is in m/s, m/s and rad/s for ``cmd_vel``, in rad/s of wheels A, B,
-C for ``wheel_cmd``; None ends the motion.
+The yaw is unwrapped. The command is in m/s, m/s and rad/s for ``cmd_vel``, and in rad/s of wheels
+A, B, C for ``wheel_cmd``; None ends the motion.
 """
 
 LOOK_S: Final = 1.0
-"""Time after which a robot that has not moved is reported not to obey, in s."""
+"""Interval, in s, in which a robot must follow its command."""
 SLOW_LOOK_S: Final = 3.0
-"""The same time for a board with rare measurements, between which odometry is predicted, in s."""
+"""``LOOK_S`` for a board that measures rarely, so that odometry is predicted in between, in s."""
 OBEYED_PART: Final = 0.2
-"""Fraction of the command below which the measured speed of a robot means standing still."""
+"""The robot is regarded as not moving below this fraction of its command."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Slowest commands that friction cannot hold: m/s and rad/s, or rad/s of a wheel."""
+"""Slower commands are not checked, because friction may hold the robot.
+
+In m/s and rad/s, or in rad/s of a wheel.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """Limits of one motion. Linear in m and m/s, turning in rad and rad/s.
+    """Limits of one motion, in m, m/s, rad and rad/s.
 
     ``speed``, ``turning``: largest commanded speed and yaw rate (for wheels, ``speed`` is that of
     the fastest wheel, in rad/s); ``way``, ``turn``: largest distance and turn from the start, by
     the odometry; ``seconds``: longest duration; ``acceleration``, ``angular_acceleration``: largest
-    change of a command per s (for wheels, ``acceleration`` in rad/s²). If they are infinite,
-    commands change at once.
+    change of a command per s (for wheels, ``acceleration`` in rad/s²). If both accelerations are
+    infinite, commands change at once.
     """
 
     speed: float
@@ -89,7 +92,7 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """Return the command after ``seconds`` of change from ``now`` towards ``wanted``."""
+        """Return the command ``seconds`` after ``now``, on a ramp towards ``wanted``."""
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
             return a, b, c
@@ -102,7 +105,7 @@ class Obedience:
     """Checks at short intervals that the robot roughly follows its commands."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
-        """Watch commands on this topic; the driver's ``parameters`` show what its board has."""
+        """Check commands on this topic; ``parameters``: those of the driver, by name."""
         self._topic = topic
         self._look_s = SLOW_LOOK_S if "odom_rate" in parameters else LOOK_S
         self._has_scales = "linear_scale" in parameters
@@ -110,9 +113,9 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Raise ToolError if the robot has not moved for some time although commanded to.
+        """Raise ToolError if the robot has been commanded to move for some time, but has not moved.
 
-        ``seconds``: since the last call; ``measured`` has the units of ``command``.
+        ``seconds``: time since the last call; ``measured``: velocity, in the units of ``command``.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the IMU's mounting from gravity in three postures and from one turn. Pure calculation.
+"""Find the IMU's mounting from gravity in three postures, and check one turn. Pure calculation.
 
-The postures are level, nose up and left side up. The two tilt angles are unknown, but each is the
-angle between two measured directions of gravity. With them the direction of up in the body is known
-in each posture. The mounting is the rotation that fits the three pairs of directions best (Wahba's
-problem, solved by singular values).
+The postures are level, nose up and left side up. The sensor measures the direction of up in each.
+A tilt angle is the angle between the directions measured level and tilted. With the tilt angles,
+the three directions are also known in the body's axes. The mounting is the rotation that fits the
+three pairs of directions best (Wahba's problem, solved by a singular value decomposition).
 """
 
 import math
@@ -23,24 +23,24 @@ from omnibot_driver.tools.calibrate.seen import Contradiction
 Array = NDArray[np.float64]
 
 STILL_RADPS: Final = 0.1
-"""Largest standard deviation of the rate in a hand-held posture, in rad/s; a hand trembles less."""
+"""Largest standard deviation of the rotation rate, in rad/s, in a posture held by hand."""
 GRAVITY_PART: Final = 0.15
 LEAST_TILT_RAD: Final = math.radians(10)
 MOST_TILT_RAD: Final = math.radians(75)
 SQUARE_RAD: Final = math.radians(35)
-"""Largest deviation from a right angle between two tilts made by hand, in rad."""
+"""Largest deviation, in rad, of the angle between the two tilts from a right angle."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""Largest angle in rad from a right-angled mounting at which a sensor is taken as so mounted."""
+"""A mounting within this angle, in rad, of a right-angled mounting is taken as right-angled."""
 HAND_RAD: Final = math.radians(2)
-"""Least standard deviation of a tilt's direction by hand, in rad, even if tilts agree better."""
+"""Least standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
 """Weight of the level posture relative to a tilted one, as a floor is more exact than a hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """The IMU's mounting: ``rotation`` from the sensor's axes to the body's.
+    """The IMU's mounting: ``rotation`` is the matrix from the sensor's axes to the body's.
 
     ``yaw_sigma_rad``: standard deviation of the yaw, which depends on tilts made by hand;
     ``tilts_rad``: the two angles by which the robot was tilted.
@@ -65,17 +65,23 @@ class Mounting:
 
 
 def up(imu: Imu) -> Array:
-    """Return the direction of up in the sensor's axes, as a unit vector. Raises Contradiction."""
+    """Return the direction of up in the sensor's axes, as a unit vector.
+
+    Raises Contradiction if the sensor moved, or did not measure gravity.
+    """
     if not len(imu.stamp_s):
         raise Contradiction("nothing was measured")
     trembling = float(np.max(np.std(imu.rate_radps, axis=0)))
     force: Array = np.mean(imu.force_mps2, axis=0)
     length = float(np.linalg.norm(force))
     if trembling > STILL_RADPS:
-        raise Contradiction(f"it was not held still (it turned by {trembling:.2f} rad/s rms)")
+        raise Contradiction(
+            f"the robot was not held still (its gyro varied by {trembling:.2f} rad/s rms)"
+        )
     if abs(length / STANDARD_GRAVITY - 1.0) > GRAVITY_PART:
         raise Contradiction(
-            f"{length:.2f} m/s² is not gravity: it was moved, or `accel_range` is wrong"
+            f"the accelerometer measured {length:.2f} m/s², which is not gravity: the robot was"
+            " moved, or `accel_range` is wrong"
         )
     return force / length
 
@@ -86,13 +92,18 @@ def bias(imu: Imu) -> Array:
 
 
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
-    """Return the mounting from three unit vectors that point up. Raises Contradiction."""
+    """Return the mounting from the directions of up in three postures.
+
+    The directions are unit vectors in the sensor's axes. Raises Contradiction if a tilt is too
+    small or too large, or if the two tilts are not at a right angle.
+    """
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)
     square_rad = math.atan2(float(level @ np.cross(forward, left)), float(forward @ left))
     if abs(square_rad - math.pi / 2) > SQUARE_RAD:
         raise Contradiction(
-            f"the two tilts point {math.degrees(square_rad):.0f}° apart instead of 90°: repeat both"
+            f"the angle between the two tilts is {math.degrees(square_rad):.0f}° instead of 90°:"
+            " repeat both"
         )
     body = np.array(
         [
@@ -103,17 +114,20 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     )
     weights = np.diag([LEVEL_WEIGHT, 1.0, 1.0])
     u, _, vt = np.linalg.svd(body.T @ weights @ np.array([level, nose_up, left_up]))
-    rotation = u @ vt  # no mirror image: right-handed are the three in both
+    rotation = u @ vt  # no mirror image: both sets of directions are right-handed
     sigma_rad = math.hypot(abs(square_rad - math.pi / 2) / math.sqrt(2), HAND_RAD)
     return Mounting(rotation, sigma_rad, (nose_rad, left_rad))
 
 
 def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
-    """Return the angle of a turn to the left about the vertical, in rad. Raises Contradiction."""
+    """Return the angle of a turn to the left about the vertical, in rad.
+
+    Raises Contradiction if the turn is too small or to the right.
+    """
     rate = (imu.rate_radps - bias_radps) @ level
     turn_rad = float(np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(imu.stamp_s)))
     if abs(turn_rad) < LEAST_TURN_RAD:
-        raise Contradiction(f"it was turned by {math.degrees(turn_rad):.0f}° only")
+        raise Contradiction(f"the robot was turned by only {math.degrees(turn_rad):.0f}°")
     if turn_rad < 0:
         raise Contradiction(
             f"gyro and gravity show a turn to the right by {-math.degrees(turn_rad):.0f}°: turn the"
@@ -139,8 +153,8 @@ def _tilt(level: Array, tilted: Array, what: str) -> float:
     tilt_rad = math.acos(max(-1.0, min(1.0, float(level @ tilted))))
     if not LEAST_TILT_RAD <= tilt_rad <= MOST_TILT_RAD:
         raise Contradiction(
-            f"with the {what} raised it was tilted by {math.degrees(tilt_rad):.0f}°; raise it by"
-            " 20° to 45°"
+            f"with the {what} raised the robot was tilted by {math.degrees(tilt_rad):.0f}°; raise"
+            f" the {what} by 20° to 45°"
         )
     return tilt_rad
 

@@ -2,8 +2,9 @@
 
 """``calibrate geometry`` and ``scale`` for a base that only drives straight and turns.
 
-A tape measure shows the factors for the odometry, or, if the driver has the parameter, the way for
-each count of the encoder. Must not know the base's wheels.
+The user measures each drive with a tape. The result is the scales of the odometry or, if the driver
+has the parameter ``metres_per_count``, the distance for each encoder count. Must not know the
+base's wheels.
 """
 
 import argparse
@@ -26,27 +27,30 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Number of straight drives; two show whether one was misread."""
+"""Number of straight drives; if one of the two is misread, they disagree."""
 UNLIKE: Final = 4.0
-"""Difference of two ratios, in standard deviations, above which the ratios disagree."""
+"""Two ratios disagree if they differ by more than this number of standard deviations."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""Parameters for the distance per encoder count, and for the motors' units of a speed.
+"""Parameters for the distance per encoder count, and for the motors' units per m/s.
 
-A longer distance per count makes the same speed fewer units of the motors.
+If the distance per count is longer, the same speed needs fewer units of the motors.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
-"""The parameter that the driver measures in these drives, its name in /diagnostics, its error."""
+"""A parameter that the driver measures during the drives.
+
+The values are its name, its name in /diagnostics, and its standard deviation.
+"""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where"
-    " the robot's centre is and where the front points; after it, enter how far it has driven, or"
-    " how far it has turned past its mark. Do not push the robot or correct its course."
+    " the robot's centre is and where the front points. After the drive, enter how far the robot has"
+    " driven, or how far it has turned past its mark. Do not push the robot or correct its course."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A drive of ``wanted`` m straight ahead, or, if ``turns``, of ``wanted`` rad on the spot."""
+    """A drive of ``wanted`` m straight ahead or, if ``turns`` is true, a turn of ``wanted`` rad."""
 
     name: str
     wanted: float
@@ -55,9 +59,9 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """The true motion and the odometry's of one drive, and their ratio; in m or rad.
+    """The motion of one drive by the odometry (``told``) and by the tape (``true``), in m or rad.
 
-    ``sigma``: standard deviation of the true motion.
+    ``sigma``: standard deviation of ``true``. ``value``: the ratio of ``true`` to ``told``.
     """
 
     drive: Drive
@@ -75,7 +79,7 @@ class Ratio:
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Make the drives and find the scales. Raises ToolError."""
+    """Run the drives and compute the scales. Raises ToolError if a drive fails."""
     console.say(INTRODUCTION)
     drives = plan(arguments.side, arguments.turns)
     if COUNT in robot.parameters:
@@ -92,7 +96,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def plan(side_m: float, turns: int) -> list[Drive]:
-    """Return the drives to make, in order."""
+    """Return the planned drives, in order."""
     number, angle_rad = f"{turns} turns" if turns > 1 else "1 turn", math.tau * turns
     return [
         Drive(f"{number} to the left", angle_rad, True),
@@ -137,9 +141,10 @@ def _number(text: str) -> float | None:
 def result(
     ratios: Sequence[Ratio], now: Mapping[str, Any], *, balance: float | None = None
 ) -> Result:
-    """Return the findings of these drives, to show and write.
+    """Return the result of these drives, to show and to save.
 
-    ``now``: the driver's parameters; ``balance``: motor balance that the driver has measured.
+    ``now``: the driver's parameters; ``balance``: the motor balance that the driver measured, or
+    None.
     """
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))
@@ -164,7 +169,7 @@ def result(
         if abs(one.value - other.value) > UNLIKE * math.hypot(one.value_sigma, other.value_sigma):
             notes.append(
                 f"{one.drive.name} and {other.drive.name} differ by"
-                f" {abs(one.value / other.value - 1):.1%}: one was misread, or the robot slips."
+                f" {abs(one.value / other.value - 1):.1%}: a reading is wrong, or the robot slips."
             )
     return Result(
         findings=findings,
@@ -175,7 +180,7 @@ def result(
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """Draw for each drive the ratio of the true motion to the odometry's."""
+    """Draw, for each drive, the ratio of the motion by the tape to the motion by the odometry."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]
