@@ -123,7 +123,7 @@ def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
 
 def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
     """The error names the wheel, as its wiring has to be corrected."""
-    with pytest.raises(ToolError, match="wheel B turns the other way than the two others"):
+    with pytest.raises(ToolError, match="wheel B turns in the opposite direction to the other two"):
         walk("+00", "0-0", "00+")
 
 

@@ -209,7 +209,7 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
         output_file(str(tmp_path / "bad.yaml"), "", PARAMETERS)
     with pytest.raises(ToolError, match="cannot be written"):
         picture_file(str(ros / "picture.png"), "imu")
-    with pytest.raises(ToolError, match=r"let it end in \.png"):
+    with pytest.raises(ToolError, match=r"the name must end in \.png"):
         picture_file(str(tmp_path / "picture.doc"), "imu")
     assert picture_file(str(tmp_path), "imu") == tmp_path / "calibrate_imu.png"
     assert output_file(None, str(tmp_path / "own.yaml"), PARAMETERS) == tmp_path / "own.yaml"

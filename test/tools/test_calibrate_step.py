@@ -63,10 +63,10 @@ def still(answer: str, *words: str) -> None:
     ("words", "complaint"),
     [
         (["--wheels", "D"], "some of ABC"),
-        (["--speeds", "12", "4"], "the first is slower"),
+        (["--speeds", "12", "4"], "the slower one first"),
         (["--speeds", "4", "40"], "max_wheel_speed of 17"),
         (["--speeds", "4", "4.1"], "give the same command"),
-        (["--hold", "0.1"], "0.5 s at least"),
+        (["--hold", "0.1"], "at least 0.5 s"),
     ],
 )
 def test_what_cannot_be_done_is_said_before_anything_moves(

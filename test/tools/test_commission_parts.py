@@ -200,7 +200,7 @@ def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
     assert turned(-0.4) == pytest.approx(0.5 * 3.99)
     with pytest.raises(Contradiction, match="to the right"):
         turned(0.6)
-    with pytest.raises(Contradiction, match="only"):
+    with pytest.raises(Contradiction, match="by only"):
         turned(0.0)
 
 

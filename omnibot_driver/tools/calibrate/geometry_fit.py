@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 WHEELS_ALIKE: Final = 0.01
 """Relative standard deviation of a wheel's radius that manufacturing tolerances cause."""
 UNKNOWN: Final = 0.2
-"""Largest relative deviation of a radius from the assumed one; a larger one means wrong readings."""
+"""Largest relative error of an assumed radius; a larger one means that the readings are wrong."""
 
 
 @dataclass(frozen=True, slots=True)

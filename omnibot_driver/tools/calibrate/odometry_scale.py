@@ -43,8 +43,9 @@ The values are its name, its name in /diagnostics, and its standard deviation.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where"
-    " the robot's centre is and where the front points. After the drive, enter how far the robot has"
-    " driven, or how far it has turned past its mark. Do not push the robot or correct its course."
+    " the robot's centre is and where the front points. After the drive, enter how far the robot"
+    " has driven, or how far it has turned past its mark. Do not push the robot or correct its"
+    " course."
 )
 
 

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulate a wheel under a sampled band-limited PI controller, for a step of its set-point.
+"""Simulate a wheel with a sampled band-limited PI controller after a step of its set-point.
 
-G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) from error in RPM to duty in percent, by the trapezoidal
-rule. The coefficients are for steps of ``NOMINAL_S``, whatever the control period is. The measured
-speed is that of the encoder's last tick, in whole RPM. Vectorised over gains. Knows a plant and
-gains; does not know how they were found.
+The controller is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to the duty in
+percent, discretised by the trapezoidal rule. Its coefficients are computed for the control period
+``NOMINAL_S``, even if the real period differs. The measured speed is that of the encoder's last
+tick, in whole RPM. The calculation is vectorised over gains. Must not know how plant and gains
+were found.
 """
 
 from dataclasses import dataclass
@@ -20,10 +21,12 @@ Array = NDArray[np.float64]
 
 STEP_S: Final = 0.001
 NOMINAL_S: Final = 0.2
-"""Step of the controller in the manual, in s, for which the board calculates its coefficients."""
+"""Control period in the manual, in s, for which the board calculates its coefficients."""
 STALE_S: Final = 0.5
 SENDS_S: Final = 9 * 14 * 10 / 115200
-"""Time in which the public firmware sends its ticks and its odometry: nine lines of 14 characters.
+"""Time, in s, that the public firmware needs to send its ticks and its odometry.
+
+These are nine lines of 14 characters.
 """
 MOST_PERCENT: Final = 100.0
 PHASE_POINTS: Final = 600
@@ -42,9 +45,9 @@ class PiGains:
 class Loop:
     """The control loop of a wheel.
 
-    ``dead_s``: time until a duty affects the speed. ``feed_forward``: percent for each RPM.
-    ``low_pass``: filter coefficient of the set-point, 0 to 1 for each step. ``sends_each_s``:
-    period in which the board sends its ticks.
+    ``dead_s``: dead time from a duty to its effect on the speed. ``feed_forward``: duty in percent
+    for each RPM. ``low_pass``: coefficient of the set-point's low-pass filter, from 0 to 1 (no
+    filter). ``sends_each_s``: period with which the board sends its ticks. Times are in s.
     """
 
     period_s: float
@@ -58,7 +61,7 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Ratio of a time constant as written to the board to the one that takes effect."""
+        """Ratio of a time constant written to the board to the effective time constant."""
         return self.nominal_s / self.period_s
 
 
@@ -73,13 +76,14 @@ def answer(
     begun: Array | float = 0.0,
     sent_s: Array | None = None,
 ) -> Array:
-    """Return the speed in RPM after a step from standstill.
+    """Return the speed in RPM after a step of the set-point from standstill.
 
-    The shape is (samples of STEP_S, *common shape of the following). Gains; ``dead_s``: dead times
-    in place of the loop's; ``begun``: part of the way between two marks that lies behind the wheel
-    at the start; ``sent_s``: when the board sends for the first time (None: it sends nothing). A
-    tick that comes while the board sends is noticed afterwards: its speed is too low, that of the
-    next too high.
+    The first dimension of the result is time, in steps of ``STEP_S``. The others are the common
+    shape of the gains, ``dead_s``, ``begun`` and ``sent_s``. ``dead_s``: dead times to use instead
+    of the loop's; ``begun``: starting position between two marks, as a fraction of their distance;
+    ``sent_s``: time at which the board first sends ticks (None: it sends nothing). The board
+    notices a tick that comes while it sends only afterwards. The speed of this tick is then too
+    low, and the speed of the next tick too high.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
@@ -138,10 +142,10 @@ def answer(
 class Traits:
     """Characteristics of a step response; scalars or arrays.
 
-    ``overshoot``: as a fraction of the final speed, or of the target if that is higher.
+    ``overshoot``: as a fraction of the final speed, or of the target if the target is higher.
     ``settled_s``: time after which the speed stays in the band around its final value; infinite if
-    it does not, or if the final value is not the target.
-    ``error_s``: integral of the absolute error, as a fraction of the target, in s.
+    the speed does not stay there, or if the final value is not the target.
+    ``error_s``: integral of the absolute error divided by the target, in s.
     """
 
     overshoot: Array
@@ -150,7 +154,10 @@ class Traits:
 
 
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
-    """Return the characteristics of a response; its final speed is the mean of the last quarter."""
+    """Return the characteristics of a response.
+
+    ``band``: as a fraction of the final speed, which is the mean of the last quarter.
+    """
     comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
     overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)
     outside = np.abs(rpm - comes_to) > band * np.maximum(comes_to, 1e-9)
@@ -163,10 +170,10 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 
 
 def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Array:
-    """Return the phase margin of the open loop: the distance from -180 degrees where its gain is 1.
+    """Return the phase margin, in degrees: 180 plus the open loop's phase where its gain is 1.
 
-    Delays in the loop: half a control period until a duty acts, and the time of one tick until a
-    speed is measured, as that is the mean over one tick and is on average half a tick old.
+    The loop's delays are its dead time, half a control period until a duty acts, and the time of
+    one tick for the measured speed, which is a mean over one tick and on average half a tick old.
     """
     kp, tn_s, td_s = np.broadcast_arrays(
         *(

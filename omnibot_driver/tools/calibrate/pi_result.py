@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The result of ``calibrate step`` for encoders, plants and controllers: table, file, picture."""
+"""The result of ``calibrate step`` with recorded ticks, for the table, the file and the picture."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""Ratio of the new to the previous error of a step above which the new gains are worse."""
+"""The new gains are regarded as worse if they increase the error of a step by this factor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,9 @@ class Measured:
 
     @property
     def overshoot(self) -> float:
-        """Overshoot of the steps' mean over 0.2 s, as a fraction.
+        """Overshoot of the mean of all steps, as a fraction.
 
-        The peak of noisy samples would be too high.
+        The mean is smoothed over 0.2 s, because the peak of noisy samples would be too high.
         """
         grid_s = np.arange(0.0, min(one.times_s[-1] for one in self.steps), 0.02)
         mean = np.mean([np.interp(grid_s, one.times_s, one.rpm) for one in self.steps], axis=0)
@@ -47,9 +47,9 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Mean integral of the absolute error from the first tick on, relative to the final speed.
+        """Integral of the absolute error divided by the final speed, in s; mean of all steps.
 
-        The unit is s.
+        The integral begins at the first tick.
         """
         errors = []
         for one in self.steps:
@@ -60,7 +60,11 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class WheelTuned:
-    """The result for one wheel; ``loop`` contains the dead time that was found."""
+    """The result for one wheel.
+
+    ``loop``: its control loop, with the fitted dead time; ``before``, ``after``: steps recorded
+    with the previous and with the new gains.
+    """
 
     name: str
     levels: Levels
@@ -80,7 +84,7 @@ class WheelTuned:
 def result_of(
     wheels: Sequence[WheelTuned], goals: Goals, parameters: Mapping[str, float]
 ) -> Result:
-    """Return the result; ``parameters``: those set in the driver now, which the file must keep."""
+    """Return the result; ``parameters``: the values now set in the driver, for the file."""
     return Result(
         findings=[row for wheel in wheels for row in _rows(wheel, goals)],
         parameters=dict(parameters),
@@ -141,23 +145,22 @@ def _recorded(wheel: WheelTuned, goals: Goals) -> dict[str, Any]:
 def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
     predicted = told(wheel.plant, wheel.tuned.gains, wheel.loop, goals)
     remarks = [
-        f"The {wheel.name} wheel: a step to {wheel.tuned.target_rpm:.0f} RPM is predicted to"
-        f" overshoot by {predicted.overshoot:.1%}, and to be in its band after"
-        f" {predicted.settled_s:.2f} s; the measured overshoot is"
-        f" {wheel.after.overshoot:.1%}, and was {wheel.before.overshoot:.1%} with the gains before."
+        f"The {wheel.name} wheel: for a step to {wheel.tuned.target_rpm:.0f} RPM the predicted"
+        f" overshoot is {predicted.overshoot:.1%}, and the predicted settling time is"
+        f" {predicted.settled_s:.2f} s. The measured overshoot is {wheel.after.overshoot:.1%}; with"
+        f" the previous gains it was {wheel.before.overshoot:.1%}."
     ]
     if predicted.settled_s > goals.settled_s:
         remarks.append(
-            f"The {wheel.name} wheel is in its band after {predicted.settled_s:.2f} s, not within"
-            f" the {goals.settled_s:g} s that you asked for: the wheel, or the"
-            f" controller's rate of {1 / wheel.loop.period_s:.0f} Hz, does not allow a faster"
-            " response."
+            f"The {wheel.name} wheel needs {predicted.settled_s:.2f} s to settle, more than the"
+            f" {goals.settled_s:g} s of --settling: the wheel, or the controller's rate of"
+            f" {1 / wheel.loop.period_s:.0f} Hz, does not allow a faster response."
         )
     if wheel.worse:
         remarks.append(
-            f"The {wheel.name} wheel followed a step better with its previous gains (error"
-            f" {wheel.before.error_s:.2f} s of it, now {wheel.after.error_s:.2f} s), so the new"
-            " gains are not kept: allow more overshoot, or take more records. If the driver did"
+            f"The {wheel.name} wheel followed a step better with its previous gains (integrated"
+            f" error {wheel.before.error_s:.2f} s before, {wheel.after.error_s:.2f} s now), so the"
+            " new gains are not kept: allow more overshoot, or take more records. If the driver did"
             " not know the previous gains, restart the driver and the board to restore them."
         )
     return remarks

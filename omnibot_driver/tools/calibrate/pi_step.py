@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step`` for a board that records ticks and takes gains: encoders, plant, controller.
+"""``calibrate step`` for a board that records encoder ticks and accepts gains.
 
-First the wheels make steps of their set-point with the present gains, for comparison. Then they
-turn freely at a constant duty, which shows the levels of their encoders, and start at full duty,
-which shows the plant. Then gains are computed and steps are made with them, ``ROUNDS`` times. The
-steps of each round show the dead time, with which the next round computes its gains. The steps of
-the last round are compared with the first ones.
+1. Record steps of the set-point with the present gains, for comparison.
+2. Record the wheels at a constant duty, and find the corrections of their encoders.
+3. Record starts at full duty, and fit the plant of each wheel.
+4. Compute gains, record steps with these gains, and fit the dead time; do this ``ROUNDS`` times.
+   Each round computes its gains with the dead time of the round before.
+5. Compare the steps of the last round with those of step 1.
 """
 
 import argparse
@@ -35,28 +36,28 @@ from omnibot_driver.tools.needs import ToolError
 FREE_PERCENT: Final = 50.0
 FULL_PERCENT: Final = 100.0
 FIRST_RPM: Final = 30.0
-"""Set-point of the steps that are made before a plant is known, in RPM."""
+"""Set-point, in RPM, of the steps that are recorded before the plants are known."""
 ROUNDS: Final = 3
 WRITTEN_WITHIN_S: Final = 4.0
-"""Longest time for settings to reach the board, in s.
+"""Longest time until settings have reached the board, in s.
 
-They are repeated, because the board acknowledges none.
+The driver sends each setting several times, because the board does not acknowledge them.
 """
 
 QUIET_S: Final = 0.5
-"""Period in which the board sends ticks while it records, in s.
+"""Period, in s, with which the board sends ticks during a record.
 
-The board measures no tick while sending, so it should send as rarely as possible.
+The board does not measure ticks while it sends, so it should send as rarely as possible.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters that are restored after the records."""
 
 Records = dict[str, list[Column]]
-"""Times between ticks in s of each record, by side (left or right)."""
+"""For each side (left or right), the times between ticks of each record, in s."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Record, fit and tune, then measure the result."""
+    """Record the wheels, fit their plants, tune their gains, and measure the effect."""
     goals = Goals(
         overshoot=arguments.overshoot / 100,
         band=arguments.band / 100,
@@ -66,8 +67,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     )
     total = 1 + arguments.records + (1 + ROUNDS) * arguments.responses
     console.confirm(
-        f"Both wheels will turn at up to full duty, {total} times for some seconds."
-        " Is the robot on a box, both wheels off the ground, nothing near them?"
+        f"Both wheels will turn {total} times for some seconds, at up to full duty. Is the robot on"
+        " a box, with both wheels off the ground and nothing near them?"
     )
     names = [*RECORDING, *_names("kp", "tn", "td")]
     names += _names("short_correction", "long_correction")
@@ -88,7 +89,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class _Bench:
-    """A robot that records its wheels; ``show`` gets the number of finished records."""
+    """A robot that records its wheels; it calls ``show`` with the number of finished records."""
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
         self.robot, self._show, self._responses, self._done = robot, show, responses, 0
@@ -167,8 +168,10 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:
-    """Measure the encoders' levels with both corrections at 1, as records contain corrected
-    times."""
+    """Measure the encoders' levels, and set their corrections in the driver.
+
+    During the measurement both corrections are 1, because records contain corrected times.
+    """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})
     free = bench.record("duty_cmd", [FREE_PERCENT] * 2)
@@ -178,12 +181,12 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant: a straight line through the speeds at two duties, from the dead zone on."""
+    """Return the plant; its gain and dead zone come from the speeds at two duties."""
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
         raise ToolError(
-            f"a wheel turns at {free.rpm:.0f} RPM with half duty and at {found.final_rpm:.0f} with"
-            " full duty; check that nothing blocks it, and charge the battery"
+            f"a wheel turns at {free.rpm:.0f} RPM with half duty and at {found.final_rpm:.0f} RPM"
+            " with full duty; check that nothing blocks the wheel, and charge the battery"
         )
     dead_zone = FULL_PERCENT - found.final_rpm / slope
     return Plant(slope, found.slow_s, found.fast_s, float(np.clip(dead_zone, 0.0, 50.0)))
@@ -210,5 +213,5 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 
 
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
-    """Restore the parameters that were set; unset ones keep the new value until the next start."""
+    """Restore these parameters; those that had no value before keep the new one until a restart."""
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

@@ -2,11 +2,11 @@
 
 """Tune a band-limited PI controller for a plant.
 
-Tn compensates the plant's slow time constant. It is written longer than it acts, as the board's
-coefficients are for longer steps than the board makes. Kp (and Td where a phase margin is wanted)
-is chosen among the gains whose overshoot is within the goal: the one with the smallest sum of
-settling time and integral of the error. The dead time of a plant is found afterwards, from a step
-that was made with such gains.
+Tn compensates the plant's slow time constant. The Tn written to the board is longer, because the
+board computes its coefficients for a longer control period than it has. Kp, and Td if a phase
+margin is required, are those with the smallest sum of settling time and integrated error, among
+the gains whose overshoot is within the goal. The dead time of a plant is fitted afterwards, to
+steps recorded with such gains.
 """
 
 from collections.abc import Sequence
@@ -35,23 +35,23 @@ ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
-"""Positions between two marks at which a simulated wheel starts, as fractions of the distance.
+"""Positions between two marks at which a simulated wheel starts, as fractions of their distance.
 
-They decide when ticks come relative to the controller's steps, which changes a response.
+The position decides when ticks come relative to the control periods, which changes the response.
 """
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Times of the board's first sending, as fractions of the period in which it sends ticks.
+"""Times at which the board first sends ticks, as fractions of the period with which it sends them.
 
-They decide which ticks are delayed by sending, which changes a response too.
+The time decides which ticks are noticed late, which changes the response too.
 """
 DISTURBED: Final = 0.02
-"""Extra overshoot allowed for the step that the board's sending of ticks disturbs most."""
+"""Additional overshoot that is allowed while the board sends ticks, which disturbs a step."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
-"""Candidates for Td, as fractions of the nominal control step.
+"""Candidates for Td, as fractions of the nominal control period.
 
-With Td = 0 an oscillation from step to step never decays.
+With Td = 0 an oscillation from one control period to the next never decays.
 """
 
 
@@ -60,9 +60,9 @@ class Goals:
     """The goals of a tuning.
 
     ``overshoot``, ``band``: as fractions of the speed. ``destination``: set-point of the step, as a
-    fraction of the speed at full duty. ``settled_s``: settling time in s above which the user is
-    warned. If ``phase_margin_deg`` is None, the gain optimum is sought: Td = 0, and only the
-    overshoot limits the gain.
+    fraction of the speed at full duty. ``settled_s``: the user is warned if the settling time, in
+    s, is longer. If ``phase_margin_deg`` is None, Td is 0, and only the overshoot limits the gain
+    (gain optimum).
     """
 
     overshoot: float = 0.05
@@ -85,7 +85,7 @@ class Tuned:
 
 
 def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
-    """Return the best gains for this plant. Raises ToolError where no gain meets the goals."""
+    """Return the best gains for this plant. Raises ToolError if no gain meets the goals."""
     target = target_of(plant, goals)
     tds = [0.0] if goals.phase_margin_deg is None else [part * loop.nominal_s for part in TDS]
     low, high = 0.02, 5.0
@@ -97,7 +97,8 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
         found = _foreseen(plant, gains, loop, goals)
         tame = found.overshoot <= goals.overshoot
         tame &= _disturbed(plant, gains, loop, goals) <= goals.overshoot + DISTURBED
-        # Up to the first gain that overshoots too much: far above it, saturation hides it again.
+        # Gains above the first that overshoots too much are not allowed, even if saturation hides
+        # their overshoot.
         allowed = np.isfinite(found.settled_s) & np.logical_and.accumulate(tame, axis=0)
         if goals.phase_margin_deg is not None:
             margin = phase_margin_deg(plant, gains, loop, target)
@@ -111,9 +112,9 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
         low, high, tds = best[0] / scale / factor, best[0] / scale * factor, [best[1]]
     if best is None:
         raise ToolError(
-            f"no gain keeps a step to {target:.0f} RPM within {goals.overshoot:.0%} of overshoot"
-            f" and a band of {goals.band:.0%}: allow more overshoot, or choose another"
-            " --destination"
+            f"no gain meets the goals for a step to {target:.0f} RPM (overshoot up to"
+            f" {goals.overshoot:.0%}, band {goals.band:.0%}): allow more overshoot, or choose"
+            " another --destination"
         )
     return told(plant, PiGains(best[0], tn_s, best[1]), loop, goals)
 
@@ -138,9 +139,9 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 
 
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
-    """Return the predicted traits of a step over all starting points between two marks.
+    """Return the predicted traits of a step: largest overshoot, longest settling, mean error.
 
-    They are the largest overshoot, the longest settling time and the mean error.
+    They are taken over the starting positions in ``BEGUN``.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
@@ -149,7 +150,7 @@ def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
 
 
 def _disturbed(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Array:
-    """Return the largest overshoot of a step while the board sends its ticks."""
+    """Return the largest overshoot of a step if the board sends its ticks during the step."""
     target = target_of(plant, goals)
     begun, sent_s = (one.ravel() for one in np.meshgrid(BEGUN, loop.sends_each_s * SENT))
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=begun, sent_s=sent_s)
@@ -161,13 +162,13 @@ def _apart(gains: PiGains) -> PiGains:
 
 
 Steps = tuple[PiGains, float, Sequence[Column]]
-"""Gains, the set-point in RPM, and the records made with them."""
+"""Gains, a set-point in RPM, and the records of the steps with these gains and set-point."""
 
 
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
     """Return the dead time, in s, that explains the recorded steps of these wheels best.
 
-    It is at least ``LEAST_DEAD_S``, as a value that is too small makes a step overshoot.
+    It is at least ``LEAST_DEAD_S``, because gains for too short a dead time make a step overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)

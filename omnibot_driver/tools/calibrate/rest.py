@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Evaluate an IMU at rest: its biases, its noise, and the direction of up. Pure.
+"""Evaluate an IMU at rest: its biases, its noise, and the direction of up. Pure calculation.
 
-A single rest does not separate an accelerometer's bias from a tilt, nor a tilt of the sensor from
-one of the floor. Only the bias along gravity, whose length is known, can be measured.
+A measurement in one posture cannot separate an accelerometer's bias from a tilt, nor a tilt of the
+sensor from a tilt of the floor. It shows only the bias along gravity, whose magnitude is known.
 """
 
 from collections.abc import Callable
@@ -18,17 +18,18 @@ from omnibot_driver.tools.calibrate.log import Column, Imu, Log
 from omnibot_driver.tools.needs import ToolError
 
 BLOCK_S: Final = 1.0
-"""Length of a block, in s: noise varies within a block, drift from block to block."""
+"""Length of a block, in s: noise is measured within blocks, drift between blocks."""
 FEWEST: Final = 100
 LOST_PART: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """The evaluation of a rest; arrays are of x, y, z of the sensor.
+    """The evaluation of an IMU at rest; arrays have the values of the sensor's x, y and z axes.
 
-    ``bias_radps``: mean rate; ``force_mps2``: mean force; ``…_sigma``: their standard deviations
-    (that of the bias: from its value at the end of the rest); ``…_noise``: rms of one reading.
+    ``bias_radps``: mean rate; ``force_mps2``: mean specific force; ``…_sigma``: standard deviations
+    of the means (the bias as an estimate of its value at the end of the measurement); ``…_noise``:
+    standard deviation of one reading.
     """
 
     bias_radps: Column
@@ -44,28 +45,31 @@ class Rest:
 
     @property
     def up(self) -> Column:
-        """Direction in which the floor pushes the sensor, as a unit vector in the sensor's axes."""
+        """Direction of up, as a unit vector in the sensor's axes."""
         return np.asarray(self.force_mps2 / np.linalg.norm(self.force_mps2))
 
     @property
     def gravity_mps2(self) -> float:
-        """The length of the mean specific force."""
+        """Magnitude of the mean specific force, in m/s²."""
         return float(np.linalg.norm(self.force_mps2))
 
     @property
     def level_rad(self) -> tuple[float, float]:
-        """Roll and pitch of the sensor (fixed-axis angles) if the floor is level."""
+        """Roll and pitch of the sensor on a level floor (fixed-axis angles), in rad."""
         x, y, z = self.force_mps2
         return float(np.arctan2(y, z)), float(np.arctan2(-x, np.hypot(y, z)))
 
     @property
     def level_sigma_rad(self) -> float:
-        """Standard deviation of roll and pitch by noise alone, in rad."""
+        """Standard deviation of roll and pitch that noise alone causes, in rad."""
         return float(self.force_sigma.max() / self.gravity_mps2)
 
 
 def rest(imu: Imu) -> Rest:
-    """Evaluate a rest. Raises ToolError for too few, non-finite or stuck readings, or for gaps."""
+    """Evaluate the readings of an IMU at rest.
+
+    Raises ToolError if the readings are too few, stuck or not finite, or have gaps.
+    """
     rates, forces = imu.rate_radps, imu.force_mps2
     if len(rates) < FEWEST:
         raise ToolError(
@@ -105,10 +109,10 @@ def rest(imu: Imu) -> Rest:
 
 
 def still(bias_radps: Column) -> Callable[[Log], None]:
-    """Return a function to call repeatedly while a log grows.
+    """Return a function that checks a growing log, and raises ToolError if the robot moves.
 
-    It raises ToolError once the robot has moved. ``bias_radps`` is the bias that the driver has
-    already subtracted from the gyro.
+    Call the function repeatedly. ``bias_radps``: the bias that the driver has already subtracted
+    from the gyro's readings.
     """
     seen = [0, 0]
     look = Look()
@@ -134,13 +138,13 @@ def still(bias_radps: Column) -> Callable[[Log], None]:
 
 
 def _within(readings: Column, size: int) -> Column:
-    """Return each axis's standard deviation of a reading within blocks of ``size`` readings."""
+    """Return the standard deviation of readings within blocks of ``size`` readings, by axis."""
     blocks = _blocks(readings, size)
     return np.asarray(np.sqrt(blocks.var(axis=1, ddof=1).mean(axis=0)))
 
 
 def _of_mean(readings: Column, noise: Column, size: int) -> Column:
-    """Return the standard deviation of the mean, from noise or, if larger, from blocks."""
+    """Return the standard deviation of the mean: from the noise or, if larger, from the blocks."""
     means = _blocks(readings, size).mean(axis=1)
     white = noise / np.sqrt(len(readings))
     if len(means) < 5:

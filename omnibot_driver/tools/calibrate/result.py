@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The result of a calibration: values with uncertainties. Knows no terminal, no file, no ROS."""
+"""The result of a calibration: values with uncertainties. Must not use a terminal, files or ROS."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -31,8 +31,8 @@ class Result:
     """The result of a calibration.
 
     ``parameters``: values for the driver to load, by name; ``record``: further content of the file,
-    which the driver ignores; ``notes``: sentences for the user; ``draw``: fills a figure of 9 by 6
-    inches.
+    which the driver ignores; ``notes``: sentences for the user; ``draw``: a function that draws the
+    result into a figure of 9 by 6 inches.
     """
 
     findings: list[Finding]

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot as a calibration uses it: its data are received, and it is moved.
+"""The robot as a calibration uses it: receive its data, and move it.
 
-Must not know what a calibration finds. Every motion goes through `drive` or `record`, and each ends
-with commands to stand still, whatever happens. If this process dies, the driver's watchdog stops
-the robot.
+Must not know what is calibrated. Every motion goes through `drive` or `record`. Both end with stop
+commands, whatever happens. If this process dies, the driver stops the robot after
+``cmd_vel_timeout``.
 """
 
 import math
@@ -37,7 +37,7 @@ STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
 """Time from the request of a record to the first command, in s.
 
-Until then the request is repeated, as lines are lost.
+During this time the driver repeats the request, because lines can be lost.
 """
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
@@ -57,9 +57,10 @@ class Robot(Listener):
         super().__init__(node, context, interruption)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
-        """Number of own commands that were sent and not yet received back.
+        """Number of commands that this node published but has not yet received back.
 
-        A negative count means that another node sent the command.
+        The key is a command's topic and values. A negative number means that another node published
+        the command.
         """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
@@ -80,7 +81,7 @@ class Robot(Listener):
     ) -> Log:
         """Record data for ``seconds`` without commands; return the log.
 
-        ``show`` gets the completed fraction, from 0 to 1.
+        ``show`` is called with the completed fraction, from 0 to 1.
         """
         self._begin(states)
         began_s = now_s = time.monotonic()
@@ -101,20 +102,21 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move as the law says, within the bounds, then stand still; return the log of the motion.
+        """Move the robot by the law, within the bounds, then stop it; return the log of the motion.
 
-        ``show`` gets the seconds since the start. Raises ToolError, after the robot was stopped, on
-        any fault: e-stop, lost data, another commander, no motion. With ``obeys`` false a robot
-        that does not move is accepted. With ``monitored`` false the driver's motion monitor is off;
-        a calibration needs that where it does not know yet how fast or in which direction the robot
-        moves.
+        ``show`` is called with the seconds since the start. On any fault (e-stop, lost data, a
+        command of another node, no motion), stop the robot and raise ToolError. If ``obeys`` is
+        false, a robot that does not move is accepted. If ``monitored`` is false, the driver's
+        motion monitor is off; a calibration needs this if it does not know yet how fast or in which
+        direction the robot moves.
         """
         if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
-                "this needs the board's switch on velocity control and `control_method: velocity`"
+                "this calibration needs the board's switch on velocity control, and"
+                " `control_method: velocity`"
             )
         self._begin(("nominal",))
-        self._unanswered = +self._unanswered  # the last drive's may still come
+        self._unanswered = +self._unanswered  # commands of the last drive may still arrive
         self._foreign = None
         stands = False
         try:
@@ -133,10 +135,11 @@ class Robot(Listener):
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
-        """Let the driver record during this command, then stop; return the path of the record.
+        """Let the driver record the response to this command, then stop the robot.
 
-        The record is requested while the robot is at rest, so that it begins before the motion.
-        Raises ToolError as `drive` does, and with the driver's reason if nothing was recorded.
+        Return the path of the record. The record is requested while the robot is at rest, so that
+        it begins before the motion. Raises ToolError on any fault, as `drive` does, and with the
+        driver's reason if nothing was recorded.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)
@@ -169,13 +172,13 @@ class Robot(Listener):
     def _unmonitored(self) -> Iterator[None]:
         """A context in which the driver's motion monitor is off.
 
-        With wrong settings the monitor would stop the robot.
+        The monitor would stop a robot whose parameters are not calibrated yet.
         """
         before = {"motion_monitor": self.parameters["motion_monitor"]}
         self.set_parameters({"motion_monitor": False})
         try:
             yield
-        except BaseException:  # also after a defect of this program
+        except BaseException:  # also after an error in this program
             with self._interruption.deferred(), suppress(ToolError):
                 self.set_parameters(before)
             raise
@@ -223,7 +226,7 @@ class Robot(Listener):
             self._send(topic, HALT)
             self._hear(PERIOD_S)
             now_s = time.monotonic()
-            stands = all(abs(speed) <= STANDING for speed in self._twist)  # NaN is not standing
+            stands = all(abs(speed) <= STANDING for speed in self._twist)  # NaN is not rest
             standing_since_s = min(standing_since_s, now_s) if stands else math.inf
             if now_s - standing_since_s > STOOD_S:
                 return True

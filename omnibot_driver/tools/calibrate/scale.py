@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 REST_S: Final = 2.0
 ACCELERATION: Final = 1.0
-"""Rate at which commands change, in m/s²; twice as much for turning, in rad/s²."""
+"""Rate at which linear commands change, in m/s²; the rate for turning is twice this, in rad/s²."""
 GYRO_TOLERANCE: Final = 0.03
 """Relative tolerance of the gyro's scale: MPU-6050 product specification, section 6.1."""
 UNLIKE: Final = 4.0
-"""Difference of two scales, in standard deviations, above which the scales disagree."""
+"""Two scales disagree if they differ by more than this number of standard deviations."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Drive at several speeds and find the scales. Raises ToolError."""
+    """Drive at several speeds and compute the scales. Raises ToolError if a drive fails."""
     now = robot.parameters
     if "angular_scale" not in now:
         return odometry_scale.run(robot, console, arguments)
@@ -71,7 +71,10 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
-    """Return the findings from these speeds, to show and write; ``now``: driver's parameters."""
+    """Return the result from these speeds, to show and to save.
+
+    ``now``: the driver's parameters before the calibration.
+    """
     by_axis = [[one for one in found if one.axis == axis] for axis in range(3)]
     if not all(by_axis):
         raise ToolError("not every axis was measured: increase --seconds")
@@ -91,17 +94,18 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
     notes = []
     if abs(x.value - y.value) > UNLIKE * math.hypot(x.sigma, y.sigma):
         notes.append(
-            f"x and y differ by {abs(x.value / y.value - 1):.1%}: wheels slip, or are not alike."
+            f"The scales by x and by y differ by {abs(x.value / y.value - 1):.1%}: the wheels slip,"
+            " or their radii differ."
         )
     if abs(ratio - 1) > GYRO_TOLERANCE + UNLIKE * ratio_sigma:
         notes.append(
             f"Gyro and odometry differ by {abs(ratio - 1):.1%}, more than the gyro's tolerance of"
-            f" {GYRO_TOLERANCE:.0%}: run `calibrate geometry`, load its values, then run this"
-            " again."
+            f" {GYRO_TOLERANCE:.0%}: run `calibrate geometry`, load its values, then run"
+            " `calibrate scale` again."
         )
     notes.append(
-        "These values are correct for the speeds in the present `odom`: if `calibrate geometry`"
-        " changes what `odom` says, run this again after it."
+        "These values are based on the present `odom`. If `calibrate geometry` changes `odom`, run"
+        " `calibrate scale` again afterwards."
     )
     return Result(
         findings=[

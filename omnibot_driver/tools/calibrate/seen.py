@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Interpret what a person saw the wheels do.
+"""Interpret in which directions a person saw the wheels turn. Pure calculation.
 
-Pure. A pattern is the direction of wheels A, B, C seen from outside: 1 counter-clockwise (positive
+A pattern has the directions of wheels A, B and C, seen from outside: 1 counter-clockwise (positive
 in the manual's equations), -1 clockwise, 0 still.
 """
 
@@ -51,7 +51,7 @@ def wanted(axis: int) -> Pattern:
 
 
 def wheel_sign(wheel: int, seen: Pattern) -> int:
-    """Return 1, or -1 for a wheel that turns the other way than the manual says.
+    """Return 1 if the wheel turned in the manual's direction, -1 if it turned in reverse.
 
     Raises Contradiction unless exactly this wheel turned.
     """
@@ -64,7 +64,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
         )
     if len(turned) > 1:
         raise Contradiction(
-            f"wheel {name} alone was commanded, but {in_words(seen)} was seen: one command turns"
+            f"wheel {name} alone was commanded, but you saw {in_words(seen)}: the command turns"
             " only one wheel, so look again"
         )
     if turned != [wheel]:
@@ -78,7 +78,10 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """Return 1 for the axis's pattern, -1 for its reverse. Raises Contradiction for others."""
+    """Return 1 if the pattern is that of a motion along +axis, -1 if it is the reverse.
+
+    Raises Contradiction for any other pattern.
+    """
     expected = wanted(axis)
     if seen == expected:
         return 1
@@ -91,9 +94,9 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 
 
 def mirrored(signs: Sequence[int]) -> bool:
-    """Return whether these signs of the axes make a mirror image.
+    """Return whether these signs of the axes mirror the robot.
 
-    A mirror image cannot be explained by another choice of the robot's front.
+    Choosing another side of the robot as its front cannot cause such signs.
     """
     x, y, yaw = signs
     return x * y != yaw

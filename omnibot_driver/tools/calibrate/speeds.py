@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Compare commanded and measured speeds: what to command, and the scale that fits them. Pure.
+"""Plan commands, measure the speeds that result, and fit the scale. Pure calculation.
 
-The board takes whole counts, so whole counts are commanded, and a measured speed is compared with
-its counts, without a rounding error. A speed is measured as the slope of the odometry's pose, which
-the board keeps right. A twist comes from a single displacement, whose rounding does not average
-out.
+The board takes whole counts, so only whole counts are commanded. A measured speed is compared with
+its counts, so there is no rounding error. A speed is measured as the slope of the odometry's pose,
+in which rounding errors do not accumulate. A twist comes from a single displacement, whose rounding
+error does not average out.
 """
 
 from collections.abc import Sequence
@@ -28,9 +28,9 @@ FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
 """Least standard deviation of a pose, in m and rad, and of a speed over 1 s, in m/s and rad/s."""
 CORRECTED_WITH: Final = 5
-"""Steps of the odometry over which a correction is spread.
+"""Number of odometry steps over which a correction of the pose is spread.
 
-Together they count as one measurement.
+These steps together are regarded as one independent measurement.
 """
 
 
@@ -38,8 +38,8 @@ Together they count as one measurement.
 class Speed:
     """One steady speed along an axis (0, 1, 2: x, y, yaw), in m/s or rad/s.
 
-    ``counts``: as commanded; ``measured``: by the odometry; ``gyro``: yaw rate by the gyro, NaN for
-    x and y.
+    ``counts``: the commanded counts; ``measured``: the speed by the odometry; ``gyro``: the yaw
+    rate by the gyro, NaN for x and y.
     """
 
     axis: int
@@ -81,8 +81,8 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
     """Return the speed for every command in the log that was held long enough.
 
-    ``up``: direction of up in the sensor's axes; ``bias``: of the gyro. Raises ToolError without
-    such a command.
+    ``up``: direction of up in the sensor's axes; ``bias``: the gyro's bias. Raises ToolError if
+    there is no such command.
     """
     odometry, imu = log.odometry, log.imu
     found = []
@@ -110,9 +110,10 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 
 
 def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
-    """Return the scale that fits the speeds best, weighted by uncertainty; speed 0 is 0 counts.
+    """Return the scale that fits the speeds best, weighted by their uncertainties.
 
-    Raises ToolError if the robot moves against its commands.
+    The fitted line goes through the origin. Raises ToolError if the robot moves in the opposite
+    direction to its commands.
     """
     counts = np.array([one.counts for one in found], dtype=float)
     measured = np.array([one.measured if by == "odometry" else one.gyro for one in found])
@@ -122,7 +123,8 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
     per_count = float((weight * counts * measured).sum() / information)
     if per_count <= 0.0:
         raise ToolError(
-            "the robot drives against its commands: set `axis_signs` first (docs/commissioning.md)"
+            "the robot drives in the opposite direction to its commands: set `axis_signs` first"
+            " (docs/commissioning.md)"
         )
     freedom = max(1, len(found) - 1)
     misfit = float((weight * (measured - per_count * counts) ** 2).sum()) / freedom
@@ -131,9 +133,10 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """Return the time spans in which the robot had settled at one command other than zero.
+    """Return the time spans with a settled speed: begin, end, and the command, which is not zero.
 
-    A pause between commands begins a new span, because the driver may have dropped the command.
+    After a pause between commands a new span begins, because the driver may have dropped the
+    command.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -154,7 +157,7 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the distance along this axis of the body, at the mean heading, for each pose."""
+    """Return, for each pose, the distance along this axis of the body at the mean heading."""
     if axis == 2:
         return np.asarray(pose[:, 2])
     heading_rad = pose[:, 2].mean() + axis * np.pi / 2
@@ -162,7 +165,7 @@ def _way(pose: Column, axis: int) -> Column:
 
 
 def _slope(stamp_s: Column, way: Column) -> tuple[float, float]:
-    """Return the slope of distance over time from a straight line, with its standard deviation."""
+    """Return the slope of a line fitted to distance over time, and its standard deviation."""
     off_s = stamp_s - stamp_s.mean()
     speed = float(off_s @ way / (off_s @ off_s))
     left = way - way.mean() - speed * off_s

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step``: find each wheel's step response, its motor, and gains that suit it.
+"""``calibrate step``: measure each wheel's step response, fit its motor, and find better gains.
 
-Each wheel alone alternates between two speeds in one direction, then in the other direction.
+One wheel at a time alternates between two speeds, first in one direction, then in the other.
 """
 
 import argparse
@@ -37,8 +37,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     levels = _levels(robot.parameters, arguments)
     _law, seconds = _to_and_fro(levels, arguments)
     console.confirm(
-        f"Each wheel will turn alone, at up to {levels[1]:.1f} rad/s, {2 * seconds:.0f} s for each."
-        " Is the robot on a box, all wheels off the ground, nothing near them?"
+        f"One wheel at a time will turn at up to {levels[1]:.1f} rad/s, for {2 * seconds:.0f} s"
+        " each. Is the robot on a box, with all wheels off the ground and nothing near them?"
     )
     now = Gains(*arguments.gains) if arguments.gains else MANUAL
     found = []
@@ -80,8 +80,8 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    Each step begins at another place between two deltas. Together they show what happens between
-    deltas.
+    Each step begins at a different time within the period of the deltas. So the steps together also
+    show the response between two deltas.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):
@@ -100,18 +100,18 @@ def _wheels(names: str) -> str:
 
 
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
-    """Return the two speeds rounded to the units on the wire, in rad/s.
+    """Return the two speeds in rad/s, rounded to whole units of the board's command.
 
-    Raises ToolError for speeds that the wire cannot express.
+    Raises ToolError if the speeds are not allowed or round to the same command.
     """
     slow, fast = arguments.speeds
     if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:
         raise ToolError(
-            "--speeds must be two of which the first is slower, up to the driver's max_wheel_speed"
-            f" of {parameters['max_wheel_speed']:g} rad/s"
+            "--speeds must be two speeds, the slower one first, above 0 and up to the driver's"
+            f" max_wheel_speed of {parameters['max_wheel_speed']:g} rad/s"
         )
     if arguments.hold < 0.5 or arguments.steps < 2:
-        raise ToolError("--hold must be 0.5 s at least, --steps 2")
+        raise ToolError("--hold must be at least 0.5 s, and --steps at least 2")
     lsb = parameters["linear_scale"] * parameters["wheel_radius"]
     words = round(slow * lsb), round(fast * lsb)
     if words[0] < 1 or words[1] <= words[0]:

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Draw the picture of ``calibrate step``: measured responses, and those predicted for the gains."""
+"""Draw the picture of ``calibrate step``.
+
+It shows measured responses, and the responses predicted with the present and the better gains.
+"""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
@@ -21,7 +24,7 @@ PREDICTED_TICKS: Final = 60
 
 
 def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: Gains) -> None:
-    """Draw the wheels on the left and the predictions on the right."""
+    """Draw the measured responses on the left, and the predicted ones on the right."""
     halves: Any = figure.subfigures(1, 2)
     left, right = halves
     measured: Any = left.subplots(len(wheels), 1, sharex=True, squeeze=False)
@@ -71,7 +74,7 @@ def _draw_predictions(
 ) -> None:
     """Draw each motor's response with present and better gains.
 
-    ``load`` is in units of the effort that one count per tick needs.
+    ``load``: as a multiple of the effort that a speed of one count per tick needs.
     """
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):

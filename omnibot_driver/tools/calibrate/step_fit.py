@@ -2,9 +2,10 @@
 
 """Fit models with uncertainties to recorded steps of one wheel. Pure calculation.
 
-Time counts from the *onset*: the board's first control tick that could use the command. The ticks
-are known from the timestamps. A command that arrives close to a tick, or is delayed by a busy
-computer, takes effect at another tick than calculated; the recorded step itself then shows which.
+Time 0 of a step is its *onset*: the board's first control tick that could use the command. The
+ticks are known from the timestamps. If a command arrives close to a tick, or a busy computer delays
+the command, it may take effect at another tick than calculated. The recorded step then shows at
+which tick.
 """
 
 import math
@@ -28,16 +29,16 @@ from omnibot_driver.tools.needs import ToolError
 ON_THE_WAY_S: Final = 0.0015
 """Time from publishing a command to its last bit on the line, in s.
 
-It consists of DDS, and 9 bytes at 115200 baud.
+It is the latency of DDS, and the time of 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
-"""Number of deltas before the onset that are evaluated with a step."""
+"""Number of deltas before the onset that belong to a recorded step."""
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
 """Range of corrections of an onset, in ticks: positive is earlier, negative later."""
 UNLIKE: Final = 3.0
-"""Ratio of a step's misfit to the median misfit above which the step is rejected."""
+"""A step is rejected if its misfit is more than this many times the median misfit."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
@@ -51,8 +52,8 @@ class Step:
 
     ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: mean
     rate of each delta, over the four ticks before its end. ``last_radps``: the rate commanded
-    before ``before_radps``, which replaced it ``last_ticks`` before the onset; the response to that
-    change may not have ended.
+    before ``before_radps``. The change between these two was ``last_ticks`` ticks before the onset;
+    the response to this change may not have ended.
     """
 
     before_radps: float
@@ -69,7 +70,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the predicted rates of this step's deltas, in rad/s.
 
-        ``mean`` gives the mean response to a unit step, by the ticks at which a delta ends.
+        ``mean``: a function of the ticks at which deltas end; it returns the mean response of each
+        delta to a unit step.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -100,7 +102,7 @@ class Fit:
 
     @property
     def aic(self) -> float:
-        """Akaike's criterion: of two models of the same steps, the smaller value is preferred."""
+        """Akaike's criterion: the model with the smallest value fits the same steps best."""
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:
@@ -126,7 +128,7 @@ class Fit:
 
 
 def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
-    """Return the steps between two of the rates ``levels`` that were commanded to one wheel.
+    """Return the steps of one wheel in which the command changed between two rates of ``levels``.
 
     Raises ToolError if gaps in the deltas leave no complete step.
     """
@@ -156,7 +158,7 @@ def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[fl
         steps.append(Step(before, after, ends, rates[first:last], last_radps, ticks))
     if not steps:
         raise ToolError(
-            "no step was recorded whole: odometry was lost on the way; see /diagnostics, and try"
+            "no step was recorded completely, because odometry was lost; see /diagnostics, and try"
             " again"
         )
     return steps
@@ -177,7 +179,7 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
     found = least_squares(residuals, model.start, bounds=(model.low, model.high), x_scale="jac")
     freedom = len(rates) - len(found.x)
     if not found.success or freedom <= 0:
-        raise ToolError("the steps do not determine a model of the wheel: repeat more of them")
+        raise ToolError("the steps do not determine a model of the wheel: increase --steps")
     squares = float(np.sum(found.fun**2))
     information = found.jac.T @ found.jac
     covariance = np.linalg.pinv(information) * squares / freedom
@@ -197,7 +199,7 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The preferred of the two fits that assume nothing about the control loop."""
+        """The better, by AIC, of the two fits that assume nothing about the control loop."""
         return min(self.first, self.second, key=lambda fit: fit.aic)
 
     @property
@@ -217,10 +219,10 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps with corrected onsets, as a command may have taken effect late.
+    """Return the steps with corrected onsets, because a command may have taken effect late.
 
-    Each step itself shows its onset. A common shift of all steps would be a delay of the wheel, so
-    the median onset stays.
+    Each onset is moved to the tick at which the step fits the model best. The median onset stays,
+    because a common shift of all steps would be a delay of the wheel.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

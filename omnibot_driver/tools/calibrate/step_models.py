@@ -2,8 +2,9 @@
 
 """Models of step responses as the odometry measures them: averaged over a delta of 40 ms.
 
-Every model gives the angle that a wheel has turned at a time, after a step of 1 in rate at time 0.
-A delta's mean rate is the difference of two such angles, not a sample. Knows no data and no ROS.
+Every model gives the angle that a wheel has turned by a given time, after a unit step of its rate
+at time 0. The mean rate of a delta is not a sample: it is the difference of two such angles,
+divided by the length of the delta. Must not know measured data or ROS.
 """
 
 from collections.abc import Callable
@@ -20,15 +21,15 @@ SPAN_S: Final = DELTA_TICKS * TICK_S
 """
 
 Turned = Callable[[Array, Array], Array]
-"""A function of the parameters without the gain, and of times in s.
+"""A function of a model's parameters without the gain, and of times in s.
 
-Returns the angle turned after a unit step, in s.
+It returns the angle turned after a unit step of the rate (1 rad/s), in rad.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model of a step response, with names, units, a start and bounds of its parameters.
+    """A model of a step response; names, units, starting values and bounds of its parameters.
 
     The first parameter is always the gain.
     """
@@ -42,7 +43,7 @@ class Model:
     turned: Turned
 
     def mean(self, parameters: Array, end_s: Array) -> Array:
-        """Return the mean rate after a unit step over the deltas that end at ``end_s``."""
+        """Return, for each delta that ends at ``end_s``, the mean rate after a unit step."""
         turned = self.turned(parameters, np.concatenate((end_s, end_s - SPAN_S)))
         return np.asarray((turned[: len(end_s)] - turned[len(end_s) :]) / SPAN_S)
 
@@ -61,7 +62,7 @@ def second_order(parameters: Array, time_s: Array) -> Array:
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
-    root = root if abs(root) > 1e-4 else 1e-4  # two equal poles are written as two close ones
+    root = root if abs(root) > 1e-4 else 1e-4  # two close poles replace two equal ones
     poles = omega * (-damping + root), omega * (-damping - root)
     after_s = np.maximum(0.0, time_s - delay_s)
     turned = after_s.astype(complex)
@@ -72,7 +73,7 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 
 
 def motor_in_loop(gains: Gains) -> Turned:
-    """Return the model of a motor in the manual's loop with these gains.
+    """Return the model of a motor in the manual's control loop with these gains.
 
     Its parameters are PWM per count, time constant and delay.
     """
@@ -108,7 +109,7 @@ SECOND_ORDER: Final = Model(
 
 
 def motor_model(gains: Gains) -> Model:
-    """Return the model of a motor in the manual's loop, with these gains in the firmware."""
+    """Return the model of a motor in the manual's control loop; ``gains``: in the firmware."""
     return Model(
         "motor in the manual's loop",
         ("gain", "PWM per count", "motor time constant", "motor delay"),

@@ -11,25 +11,25 @@ from omnibot_driver.tools.calibrate.tuning import Behaviour, behaviour, better_g
 from omnibot_driver.tools.calibrate.wheel_loop import Gains
 
 UNLIKE_ONE: Final = 0.02
-"""Deviation of a gain from 1 above which `calibrate scale` is recommended."""
+"""`calibrate scale` is recommended if a wheel's gain differs from 1 by more than this."""
 QUANTUM_RADPS: Final = 0.05
 """Standard deviation of a delta's rate that quantisation causes, in rad/s.
 
-The steps are those of the encoder and of 0.1 mm on the wire.
+The quantisation is that of the encoder, and of 0.1 mm in the protocol.
 """
 MANY: Final = 1.5
-"""Residuals, in multiples of ``QUANTUM_RADPS``, above which the user is warned.
+"""The user is warned if the residuals exceed this multiple of ``QUANTUM_RADPS``.
 
-With a computer that delayed commands they were 2 such units, and the delay found was 4 ms too long.
+On a computer that delayed commands the multiple was 2, and the fitted delay was 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
-"""Ratio of the motor model's residuals to the second order's above which the model does not fit."""
+"""The motor model does not fit if its residuals exceed this multiple of the second order's."""
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Choose gains and return the result.
+    """Choose better gains and return the result.
 
-    The firmware has the same gains for all wheels.
+    One set of gains is chosen, because the firmware has the same gains for all wheels.
     """
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)
@@ -56,7 +56,7 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
     notes += [
         f"With the present gains, {_told([behaviour(motor, now) for motor in motors])}.",
         f"With the better gains, {_told([behaviour(motor, better) for motor in motors])}.",
-        "No message can set the gains, because they are constants in the firmware.",
+        "The driver cannot set the gains, because they are constants in the firmware.",
     ]
     return Result(
         findings=findings,
@@ -111,19 +111,20 @@ def _remarks(wheel: WheelFound) -> list[str]:
     first, second, motor = wheel.first, wheel.second, wheel.motor_fit
     gain = float(second.values[0])
     remarks = [
-        f"Wheel {wheel.name}: residuals of {first.rms_radps:.3f} rad/s with the first order,"
-        f" {second.rms_radps:.3f} with the second, {motor.rms_radps:.3f} with a motor in the"
-        f" manual's loop; by AIC the {wheel.answer.model.title} fits best."
+        f"Wheel {wheel.name}: the residuals are {first.rms_radps:.3f} rad/s with the model of first"
+        f" order, {second.rms_radps:.3f} with that of second order, and {motor.rms_radps:.3f} with"
+        f" a motor in the manual's loop. Of the first two, {wheel.answer.model.title} fits better"
+        " by AIC."
     ]
     if wheel.left_out:
         remarks.append(
             f"Wheel {wheel.name}: {wheel.left_out} of {wheel.left_out + len(wheel.steps)} steps"
-            " were unlike the others and are left out."
+            " differ from the others and are not used."
         )
     if second.rms_radps > MANY * QUANTUM_RADPS:
         remarks.append(
-            f"Wheel {wheel.name}: it answers differently from step to step, by more than the"
-            f" {QUANTUM_RADPS} rad/s that encoder and line cause. Check that nothing blocks it,"
+            f"Wheel {wheel.name} responds differently from step to step, by more than the"
+            f" {QUANTUM_RADPS} rad/s that quantisation causes. Check that nothing blocks the wheel,"
             " charge the battery, and reduce the load of this computer."
         )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
@@ -134,8 +135,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
         )
     if abs(gain - 1.0) > UNLIKE_ONE:
         remarks.append(
-            f"Wheel {wheel.name}: it turns {gain:.3f} times as fast as commanded, by the board's"
-            " own odometry: `calibrate scale` finds `linear_scale`."
+            f"Wheel {wheel.name} turns {gain:.3f} times as fast as commanded, by the board's own"
+            " odometry: run `calibrate scale` to correct `linear_scale`."
         )
     return remarks
 

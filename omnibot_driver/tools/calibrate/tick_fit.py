@@ -2,10 +2,10 @@
 
 """Fit a plant to the times between ticks of wheels that start at full duty. Pure calculation.
 
-A record begins with the first tick after its request, so it does not contain when the duty was
-applied. It only shows how the times between ticks become shorter, not the dead time. The marks of
-an encoder are fitted as well (``tick_marks``). The plant is of first or second order, from duty to
-speed; the order that explains the record better is taken.
+A record begins with the first tick after its request, so the time at which the duty was applied is
+not known. The record shows how the times between ticks become shorter, but not the dead time. The
+positions of the encoder's marks are fitted as well (``tick_marks``). The plant, from duty to speed,
+is of first or second order, whichever fits the records better.
 """
 
 import math
@@ -27,10 +27,10 @@ FEWEST_TICKS: Final = 30
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """A plant, whose input is duty in percent and whose output is speed in RPM.
+    """A plant: a wheel with the duty in percent as input, and the speed in RPM as output.
 
-    The speed is the gain times the duty beyond ``dead_zone_percent``, through two lags. ``fast_s``
-    is 0 for a first order.
+    The final speed is the gain times the duty above ``dead_zone_percent``. The speed follows with
+    two lags, of which ``fast_s`` is 0 for a plant of first order.
     """
 
     rpm_per_percent: float
@@ -47,7 +47,8 @@ class Plant:
 class PlantFit:
     """The fit of a plant. ``final_rpm``: final speed at the duty of the records.
 
-    ``sigmas`` are scaled by the residuals.
+    ``sigmas``: standard deviations of ``final_rpm``, ``slow_s`` and ``fast_s``, scaled by the
+    residuals.
     """
 
     final_rpm: float
@@ -58,11 +59,11 @@ class PlantFit:
     samples: int
     order: int
     marks: Marks | None = None
-    """The encoder's marks, or None if no error of their places repeats in each turn."""
+    """The encoder's marks, or None if no pattern of position errors repeats with each turn."""
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion: of two fits, the smaller value is preferred."""
+        """Akaike's information criterion: the fit with the smaller value is preferred."""
         return 2 * self.samples * math.log(self.rms) + 2 * self.order
 
 
@@ -78,10 +79,10 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
-    """Fit a plant to ``records``: times between ticks in s, each from standstill at the same duty.
+    """Fit a plant to ``records`` of starts from standstill, all at the same duty.
 
-    The first time of each record is left out, as it contains the standstill. Raises ToolError where
-    records are too short.
+    A record has the times between ticks, in s. Its first time is not used, because it includes the
+    standstill. Raises ToolError if a record is too short.
     """
     intervals = [record[1:] for record in records]
     if not intervals or min(map(len, intervals)) < FEWEST_TICKS:

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the places of an encoder's marks from several records of the same wheel. Pure calculation.
+"""Find the positions of an encoder's marks from several records of a wheel. Pure calculation.
 
-A disc has the same marks in each turn, so their effect on the times between ticks repeats with each
-turn; each record begins at another mark. Knows how far the times differ from those of even marks;
-does not know how the wheel moved.
+The marks on the encoder's disc are not exactly evenly spaced. Their effect on the times between
+ticks repeats with each turn. Each record begins at an unknown mark. The input is how much each time
+differs from that with evenly spaced marks; this module must not know how the wheel moved.
 """
 
 from collections.abc import Sequence
@@ -18,14 +18,13 @@ Column = NDArray[np.float64]
 
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
-"""Largest relative error of a time that is evaluated; a larger error means a missed edge."""
+"""Largest relative error of a time that is used; a larger error means a missed edge."""
 OUTLIER: Final = 4.5
-"""Error of a time, in standard deviations, above which an edge is regarded as late."""
+"""An edge is regarded as late if the error of its time exceeds this many standard deviations."""
 EXPLAINED: Final = 0.4
-"""Fraction of the variance that marks must explain to be accepted.
+"""Least fraction of the variance that fitted marks must explain to be accepted.
 
-By chance they explain a fraction that depends on the number of parameters: less than a fifth with
-three records of two turns.
+With three records of two turns, marks that do not exist explain less than a fifth by chance.
 """
 
 
@@ -33,31 +32,31 @@ three records of two turns.
 class Marks:
     """The marks of an encoder.
 
-    ``steps``: relative excess of each distance between successive marks over the mean distance.
+    ``steps``: relative difference of each distance between successive marks from the mean distance.
     """
 
     steps: Column
 
     @property
     def places(self) -> Column:
-        """Displacement of each mark from its regular place, in ticks."""
+        """Displacement of each mark from its evenly spaced position, in ticks."""
         places = np.concatenate(([0.0], np.cumsum(self.steps)[:-1]))
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the index of the step to which the first of these relative errors belongs."""
+        """Return the index in ``steps`` to which the first of these relative errors belongs."""
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors by these marks in ``count`` times from ``first`` on."""
+        """Return the relative errors that the marks cause in ``count`` times from ``first`` on."""
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
 
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
     """Return the marks that explain the times of these records, or None if no pattern repeats.
 
-    ``rows``: of each record, the relative excess of each time over that of even marks; nan if not
-    known.
+    ``rows``: for each record, the relative difference of each time from that with evenly spaced
+    marks, NaN if not known; ``marks``: number of marks.
     """
     spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
     limit = min(LARGEST, OUTLIER * spread)
@@ -79,7 +78,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the step with which this row begins: that with the best agreement."""
+    """Return the index of the step with which this row begins, by the best agreement."""
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
     turned = np.arange(marks)[:, None] + np.arange(marks)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Read records of the times between a wheel's ticks, and find the levels of its encoder.
+"""Read records of the times between a wheel's ticks, and measure the levels of its encoder.
 
-Pure calculation on columns of a CSV file with the header that the driver writes.
+A record is a CSV file that the driver has written.
 """
 
 import csv
@@ -24,7 +24,7 @@ UNLIKE: Final = 1.5
 SMOOTHED: Final = 4
 """Number of ticks over which a speed is averaged.
 
-A single mark may be displaced, but a sum of intervals has no larger error than one interval.
+A displaced mark causes no larger error in a sum of intervals than in a single interval.
 """
 
 
@@ -42,8 +42,9 @@ def read(path: Path) -> dict[str, Column]:
     for told in columns.values():
         if not told or sum(not one for one in told[1:]) > UNTOLD * len(told):
             raise ToolError(
-                f"the record {path} has ticks that took longer than the board can report, or its"
-                " unit is not known: with a unit of 100 ns wheels have to turn faster than 152 RPM"
+                f"the record {path} has ticks that took longer than the board can report, or the"
+                " unit of its times is not known: with a unit of 100 ns the wheels must turn faster"
+                " than 152 RPM"
             )
     return {
         side: np.array([float(one) if one else np.nan for one in told])
@@ -66,10 +67,11 @@ class Levels:
 
 
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
-    """Return the levels of a wheel that turns freely at a constant duty, with corrections of 1.
+    """Return the corrections of an encoder's levels, from a wheel that turns at a constant duty.
 
-    The two levels alternate; the one with the shorter mean is the short level. After a missed edge
-    the assignment begins anew. Raises ToolError if the ticks are not regular.
+    The record must be made with corrections of 1. The two levels alternate; the one with the
+    shorter mean is the short level. After a missed edge the levels are assigned again. Raises
+    ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)
@@ -80,7 +82,9 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
         ways[0].extend(shorter)
         ways[1].extend(longer)
     if min(map(len, ways)) < 20:
-        raise ToolError("the ticks of the free-spinning record are not regular: record it again")
+        raise ToolError(
+            "the ticks of a wheel at constant duty are not regular: run calibrate again"
+        )
     short_s, long_s = (float(np.mean(one)) for one in ways)
     mean_s = (short_s + long_s) / 2
     spread = max(np.std(one) / np.sqrt(len(one)) for one in ways) / mean_s
@@ -90,7 +94,7 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
 
 
 def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Iterable[Column]:
-    """Yield runs of ten or more regular ticks."""
+    """Yield each sequence of ten or more regular ticks."""
     begin = 0
     for place in range(len(ticks_s) + 1):
         if place == len(ticks_s) or not good[place]:
@@ -108,7 +112,7 @@ class Response:
 
 
 def response(ticks_s: Column, ticks_per_revolution: int) -> Response:
-    """Return the response without the record's first time, which contains the standstill."""
+    """Return the response without the record's first time, which includes the standstill."""
     times_s = ticks_s[1:].copy()
     times_s[~np.isfinite(times_s)] = np.nanmedian(times_s)
     ends_s = np.concatenate(([0.0], np.cumsum(times_s)))

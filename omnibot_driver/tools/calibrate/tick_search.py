@@ -2,7 +2,7 @@
 
 """Fit a plant by least squares to the times between ticks of several starts. Pure calculation.
 
-Knows the motion of a plant, marks and noise; does not know files, nor which order is the right one.
+Knows the motion of a plant, marks and noise. Must not know files, nor which order is chosen.
 """
 
 import math
@@ -20,9 +20,9 @@ from omnibot_driver.tools.calibrate.whitening import correlation, whitener
 Column = NDArray[np.float64]
 
 SIGMA: Final = 0.1
-"""Relative noise of one time while the places of the marks are not known."""
+"""Relative noise of one time between ticks, until the positions of the marks are known."""
 SHARPEST: Final = 0.002
-"""Least relative noise of one time; the board reports times in steps of 0.1 ms."""
+"""Least relative noise of one time between ticks; the board reports times in steps of 0.1 ms."""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
 """Longest sum of both time constants, in s."""
@@ -35,25 +35,25 @@ RATIOS: Final = (0.15, 0.4, 0.8)
 LATEST_S: Final = 2.0
 """Largest time from the start to the first mark, in s."""
 MOST_OFF: Final = 0.4
-"""Largest error of a mark's place, in ticks."""
+"""Largest error of a mark's position, in ticks."""
 LAGS: Final = 60
-"""Number of ticks over which the load is correlated."""
+"""Number of ticks over which a changing load correlates the residuals."""
 MISSED: Final = 0.42
-"""Relative excess of a time and the next time together above which a mark was missed.
+"""A mark was missed if the relative errors of a time and the next time add up to more than this.
 
-If a mark was noticed late instead, the next time is too short by the same amount. (The board's
-clock loses up to 6 ms at a missed mark, so the time is not twice as long.)
+If a mark was only noticed late, the next time is too short by the same amount. (The board's clock
+loses up to 6 ms at a missed mark, so the time is not twice as long.)
 """
 SURE_TICKS: Final = 4
-"""Number of first ticks in which a missed mark is impossible, because the wheel is slow."""
+"""Number of ticks at the start that cannot contain a missed mark, because the wheel is slow."""
 OUTLIER: Final = 5.0
-"""Standard deviations beyond which a time is an outlier."""
+"""A time is an outlier if its error exceeds this many standard deviations."""
 FEWEST_RECORDS: Final = 6
-"""Least number of records from whose scatter the errors can be estimated."""
+"""Least number of records that are needed to estimate errors from the scatter between records."""
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the distance after a step at time 0 with a final speed of 1, in s."""
+    """Return the distance after a step at time 0, divided by the final speed, in s."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(times_s - slow_s * (1 - slow))
@@ -65,8 +65,10 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def constants(values: Column, order: int) -> tuple[float, float]:
-    """Return the slow and the fast time constant from their sum and ratio, which have one
-    optimum."""
+    """Return the slow and the fast time constant, in s.
+
+    The search uses their sum and ratio instead, because it then has only one optimum.
+    """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
     return total / (1 + ratio), total * ratio / (1 + ratio)
@@ -75,10 +77,11 @@ def constants(values: Column, order: int) -> tuple[float, float]:
 class Search:
     """A search for a plant's values. ``intervals``: times between ticks in s, by record.
 
-    Values are the logarithms of the rate in ticks a second and of the sum of both time constants;
-    for a second order also their ratio; then the time in s of each record's first mark; and, where
-    marks are searched, their places in ticks. (The first mark has a time, as just after the start a
-    place is inexact: the way grows with the time's cube.)
+    The values are, in this order: the logarithm of the final rate in ticks per second; the
+    logarithm of the sum of both time constants in s; for a second order, the ratio of the time
+    constants; the time in s of each record's first mark; and, while marks are fitted, the positions
+    of the marks in ticks. (The first mark of a record is given by its time, because the distance
+    just after the start is small: it grows with the cube of the time.)
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
@@ -95,7 +98,7 @@ class Search:
         self._good = np.ones(len(self._measured), dtype=bool)
 
     def roughly(self) -> Column:
-        """Return first values: a plant of second order, with even marks and independent noise."""
+        """Return first values, for second order, evenly spaced marks and independent noise."""
         records = len(self._lengths)
         starts = []
         for total_s in STARTS_S:
@@ -104,18 +107,21 @@ class Search:
         return self._best(starts)
 
     def closely(self, values: Column) -> Column:
-        """Continue the search from several ratios of time constants, because of local optima."""
+        """Continue the search from several ratios of the time constants, to avoid local optima."""
         return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
 
     def first_order(self, values: Column) -> Column:
-        """Continue with a plant of first order from values of a second; ``order`` becomes 1."""
+        """Continue the search with a plant of first order, from values of second order.
+
+        Set ``order`` to 1.
+        """
         self.order = 1
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return the relative excess of each time over that with even marks, by record.
+        """Return how much each time differs from that with evenly spaced marks, by record.
 
-        A distance between marks whose time was not measured separately has nan.
+        The differences are relative. They are NaN beside a missed mark.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -126,7 +132,7 @@ class Search:
         return found
 
     def find_missed(self, values: Column) -> bool:
-        """Find the marks that the board missed, and use them; return whether any were missed."""
+        """Find the marks that the board missed, and count them; return whether any were missed."""
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
             both = row + np.append(row[1:], 0.0)
@@ -152,10 +158,10 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """From now on, weight the residuals by the correlation that they have at these values.
+        """From now on, whiten the residuals by the correlation that they have at these values.
 
-        Where the places of the marks are not known, the correlation is caused by the marks; else by
-        the load.
+        If the positions of the marks are not known, the marks cause the correlation, otherwise the
+        load.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -174,8 +180,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        The covariance comes from all residuals, or from the scatter between records if larger, as a
-        load changes slowly.
+        The covariance comes from all residuals or, if larger, from the scatter between records,
+        because a slowly changing load affects a whole record.
         """
         own = 1 + self.order
         found = self._search(values)
@@ -216,7 +222,7 @@ class Search:
             bounds=(low, high),
             loss="soft_l1",
             x_scale=0.1,
-            tr_solver="lsmr",  # without a decomposition, for which BLAS takes threads
+            tr_solver="lsmr",  # no matrix decomposition, for which BLAS starts threads
             jac_sparsity=self._sparsity(),
             max_nfev=40,
             ftol=1e-7,
@@ -259,7 +265,7 @@ class Search:
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)
         last_s = (max(self._lengths) + 5) / rate + 2 * (slow_s + fast_s)
-        grid_s = last_s * np.linspace(0.0, 1.0, GRID) ** 2  # denser where it starts
+        grid_s = last_s * np.linspace(0.0, 1.0, GRID) ** 2  # denser near the start
         way = rate * turned(grid_s, slow_s, fast_s)
         begins_s = values[1 + order : 1 + order + records]
         if off is None:

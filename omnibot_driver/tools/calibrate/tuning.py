@@ -1,12 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the gains of the manual's law that suit a motor, and predict their effect.
+"""Find gains of the manual's control law that suit a motor, and predict their effect.
 
-Criterion: the response to a step of command, and to a step of load (a floor, a sagging battery, dry
-friction). Each counts half, by its integral of absolute error relative to that with the present
-gains. Limits: Ms <= 1.6, which tolerates an error of a factor 2.6 in gain or of 36° in phase; an
-overshoot of 5 % after a step of command; and one count of the encoder, its smallest step, changes
-the effort by no more than a count of speed needs.
+The criterion is the integral of absolute error after a step of the command, and after a step of
+the load (a floor, a sagging battery, dry friction). Each is divided by its value with the present
+gains, and both have the same weight. The limits are:
+
+- Ms, the peak of the sensitivity, is at most 1.6. This tolerates an error of a factor 2.6 in gain,
+  or of 36° in phase.
+- The overshoot after a step of the command is at most 5 %.
+- One encoder count changes the effort by no more than the effort for a speed of one count per tick.
 """
 
 from collections.abc import Sequence
@@ -30,7 +33,7 @@ LARGEST_MS: Final = 1.6
 LARGEST_OVERSHOOT: Final = 0.05
 HORIZON_TICKS: Final = 400
 SETTLED: Final = 1e-3
-"""Largest relative error at the horizon; with a larger one the loop is not stable."""
+"""Largest relative error of a stable loop after ``HORIZON_TICKS``."""
 CANDIDATES: Final = 24
 """Number of values of each gain in one round."""
 ROUNDS: Final = 3
@@ -42,8 +45,8 @@ class Behaviour:
 
     ``rise_s``: from 10 % to 90 % of a step; ``overshoot``: as a fraction of the step;
     ``command_error_s``: integral of the absolute error after a step of 1; ``load_error_s``: the
-    same for a step of load that equals the effort of one count per tick; ``ms``: robustness, 1 is
-    best; ``stable``: whether the response settles.
+    same integral after a step of load that equals the effort for one count per tick; ``ms``: peak
+    of the sensitivity (1: most robust); ``stable``: whether the response settles.
     """
 
     rise_s: Array
@@ -68,14 +71,15 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
             command_error_s=abs(speed - 1.0).sum(axis=0) * TICK_S,
             load_error_s=abs(loaded).sum(axis=0) * TICK_S,
             ms=sensitivity_peak(motor, gains),
-            stable=wrong < SETTLED,  # also where it is not a number
+            stable=wrong < SETTLED,  # false if it is NaN
         )
 
 
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the gains within the limits that are best for all these motors together.
 
-    A narrowing search finds them. ``now``: the gains with which they are compared.
+    They are found by a grid search that narrows in each round. ``now``: the gains with which the
+    behaviour is compared.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)

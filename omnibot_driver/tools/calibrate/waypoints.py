@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Laws that drive the robot by its odometry from one pose to the next. Pure."""
+"""Control laws that drive the robot by its odometry from pose to pose. Pure calculation."""
 
 import math
 from collections.abc import Sequence

@@ -2,9 +2,9 @@
 
 """Simulate one wheel in the manual's control loop, for small signals.
 
-All speeds are encoder counts per control tick of 10 ms, all efforts PWM steps, all times ticks. The
+Speeds are in encoder counts per control tick of 10 ms, efforts in PWM steps, times in ticks. The
 loop is linear: it describes changes between two speeds in the same direction, where dry friction is
-constant and has no effect. Knows nothing of measuring, radians or ROS.
+constant and has no effect. Must not know measurements, radians or ROS.
 """
 
 from dataclasses import dataclass
@@ -30,8 +30,7 @@ class Motor:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """The gains K_ff, K_VP, K_VI: one number each, or arrays of one shape to compare many at
-    once."""
+    """The gains K_ff, K_VP and K_VI: numbers, or arrays of the same shape for many candidates."""
 
     feed_forward: Any
     proportional: Any
@@ -44,7 +43,7 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The response of a wheel: speed and effort by tick, from the first tick that can respond."""
+    """The response of a wheel: speed and effort at each tick, from the first that can respond."""
 
     speed: Array
     effort: Array
@@ -53,11 +52,11 @@ class Answer:
 def answer(
     motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
 ) -> Answer:
-    """Return the response to a step of commanded speed and, at the same time, a load in PWM steps.
+    """Return the response to simultaneous steps of commanded speed and of load (in PWM steps).
 
     The law is the manual's ("Wheel control") with the feed-forward outside the accumulator: u(k) =
     K_ff v + w(k), w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k). An effort acts from the next
-    tick on, or ``delay_ticks`` later, which need not be whole.
+    tick on, delayed by the motor's ``delay_ticks``, which may be a fraction.
     """
     shape = np.broadcast(gains.feed_forward, gains.proportional, gains.integral).shape
     whole, part = divmod(motor.delay_ticks, 1.0)
@@ -85,7 +84,7 @@ def answer(
 def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
     """Return Ms: the inverse of the smallest distance between the loop's Nyquist curve and -1.
 
-    For a stable loop it is the largest amplification of a disturbance; 1 is best.
+    For a stable loop, Ms is the largest amplification of a disturbance; 1 is best.
     """
     frequency = np.geomspace(1e-3, np.pi, points)
     z = np.exp(1j * frequency)
@@ -104,7 +103,7 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     decay = np.exp(-1.0 / lag)
 
     def way(share: float) -> float:
-        """Return the counts turned in this fraction of a tick from rest, at one count's effort."""
+        """Return the counts turned from rest in this time, in ticks, with one count's effort."""
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 
     risen = [way(1.0 - part), way(2.0 - part) - way(1.0 - part), way(3.0 - part) - way(2.0 - part)]

@@ -12,9 +12,10 @@ Column = NDArray[np.float64]
 
 
 def correlation(rows: Sequence[Column], lags: int) -> Column:
-    """Return the correlation of each residual with the next ones, robust, and fading with the lag.
+    """Return a robust estimate of the autocorrelation of residuals, for lags from 0 to ``lags``.
 
-    With one lag: -0.5 if marks are displaced, 0 if the errors of successive times are independent.
+    With one lag it is -0.5 if marks are displaced, and 0 if the errors of successive times are
+    independent. With more lags it is tapered towards the last one.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -34,9 +35,9 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
 
 def whitener(of_lags: Column, length: int) -> Column:
-    """Return the matrix that makes residuals with this correlation of each lag independent.
+    """Return the matrix that makes residuals with this autocorrelation independent.
 
-    It is the inverse of the Cholesky factor. Its upper left part serves a shorter row.
+    It is the inverse of the Cholesky factor. For a shorter row, use its upper left part.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]
