@@ -42,7 +42,7 @@ def test_a_planted_motor_is_found(
     assert 0.0 < delay_s < 0.035  # planted: 0.01 s; a busy host's time of a command is a tick off
     assert 0 < sigma < 0.004
     assert "wheels off the ground" in robot.questions[0]
-    assert "No message can set the gains" in table
+    assert "The driver cannot set the gains" in table
     assert set(robot.written()) <= set(calibration.RECORDED)
     written = robot.written()["step"]
     found, _ = written["wheels"]["B"]["motor in the manual's loop"]["PWM per count"]
