@@ -26,7 +26,7 @@ def test_every_subject_has_a_row() -> None:
         and ast.unparse(node.func) == "Finding"
         and isinstance(node.args[1], ast.Constant)
     }
-    assert subjects == set(ROWS) - {"Of"}
+    assert subjects == set(ROWS) - {"Subject"}
 
 
 @pytest.mark.parametrize(

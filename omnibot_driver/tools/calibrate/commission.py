@@ -211,7 +211,7 @@ class Walk:
             seen = self._console.ask(
                 "What did A, B, C do?",
                 _understand,
-                "Please answer with three signs of + - 0, such as +00, or r to see it again.",
+                "Please answer with three of + - 0, such as +00, or r to see the motion again.",
             )
             if seen:
                 self._console.say(f"Your answer means: {in_words(seen)}.")

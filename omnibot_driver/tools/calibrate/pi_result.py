@@ -145,8 +145,8 @@ def _recorded(wheel: WheelTuned, goals: Goals) -> dict[str, Any]:
 def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
     predicted = told(wheel.plant, wheel.tuned.gains, wheel.loop, goals)
     remarks = [
-        f"The {wheel.name} wheel: for a step to {wheel.tuned.target_rpm:.0f} RPM the predicted"
-        f" overshoot is {predicted.overshoot:.1%}, and the predicted settling time is"
+        f"The {wheel.name} wheel: a step to {wheel.tuned.target_rpm:.0f} RPM has a predicted"
+        f" overshoot of {predicted.overshoot:.1%}, and a predicted settling time of"
         f" {predicted.settled_s:.2f} s. The measured overshoot is {wheel.after.overshoot:.1%}; with"
         f" the previous gains it was {wheel.before.overshoot:.1%}."
     ]
