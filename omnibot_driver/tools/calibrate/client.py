@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the running driver, use its parameters and call its services. Must not know motions."""
+"""Find the running driver, use its parameters and call its services.
+
+Must not know how the robot moves.
+"""
 
 import time
 from collections.abc import Callable, Mapping, Sequence

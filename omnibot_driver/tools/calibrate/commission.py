@@ -277,5 +277,5 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """Return the pattern that an answer describes: empty for ``r``, None if it is not valid."""
+    """Return the pattern that an answer describes: empty for ``r``, None if not valid."""
     return () if answer == "r" else understand(answer)

@@ -41,7 +41,8 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
 def picture_file(given: str | None, subcommand: str) -> Path:
     """Return the path of the picture.
 
-    If ``given`` is a folder or None (this folder), it is ``calibrate_<subcommand>.png`` there.
+    If ``given`` is a folder or None (this folder), the file is ``calibrate_<subcommand>.png`` in
+    it.
     Raises ToolError if the file cannot be written, or if its suffix is not in ``PICTURES``.
     """
     path = Path(given or ".").expanduser()

@@ -78,7 +78,7 @@ def driven(
     turn_rad: float,
     seconds: float,
 ) -> Column:
-    """Drive by this law; return the poses of the odometry, (n, 3), in m, m and rad.
+    """Drive the robot by this law; return the poses of the odometry, (n, 3), in m, m and rad.
 
     ``turn_rad``: the size of the whole turn from start to end, in rad; ``seconds``: the expected
     duration. Raises ToolError if the drive fails.

@@ -4,7 +4,7 @@
 
 Each path of the odometry is converted to the distances that the wheels rolled. From these the path
 is computed again with other radii of the wheels and of the base, until the ends fit the tape. Any
-mixture of lines, turns and squares can be used that determines the radii. The method is that of
+mixture of lines, turns and squares can be used, if it determines the radii. The method is that of
 J. Borenstein and L. Feng, "UMBmark: a benchmark test for measuring odometry errors in mobile
 robots" (1995), extended to three wheels.
 """
@@ -23,7 +23,7 @@ from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.needs import ToolError
 
 WHEELS_ALIKE: Final = 0.01
-"""Relative standard deviation of a wheel's radius that manufacturing tolerances cause."""
+"""Relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
 UNKNOWN: Final = 0.2
 """Largest relative error of an assumed radius; a larger one means that the readings are wrong."""
 
@@ -80,9 +80,9 @@ class Geometry:
 def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
     """Return the geometry that explains the readings best.
 
-    ``base_radius_m``: the assumed base radius; ``drift``: standard deviation, in m, that slip
-    causes in the distance of a wheel after 1 m. Raises ToolError if the fit fails, or if a radius
-    differs from the assumed one by more than ``UNKNOWN``.
+    ``base_radius_m``: the assumed base radius; ``drift``: standard deviation, in m, of a wheel's
+    distance after 1 m, due to slip. Raises ToolError if the fit fails, or if a radius differs from
+    the assumed one by more than ``UNKNOWN``.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]

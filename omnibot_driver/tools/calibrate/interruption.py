@@ -3,7 +3,7 @@
 """Handle Ctrl-C, a lost SSH session and kill: a signal is noted, and `check` raises Interrupted.
 
 A signal does not raise at once, because an exception inside ROS could leave the executor in an
-undefined state. Only while the program waits for the user's answer does a signal raise at once.
+undefined state. A signal raises at once only while the program waits for the user's answer.
 """
 
 import signal
@@ -58,7 +58,7 @@ class Interruption:
             self._deferred = False
 
     def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
-        """Return a function that calls ``read``, and that a signal interrupts at once."""
+        """Return a function that calls ``read``; a signal interrupts this function at once."""
 
         def ask(question: str) -> str:
             self.check()

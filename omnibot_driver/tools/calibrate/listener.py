@@ -107,7 +107,10 @@ class Listener(Client):
         self._estop = message.data
 
     def _begin(self, states: Sequence[str]) -> None:
-        """Wait for fresh data, as none are received while the user is asked; start a new log."""
+        """Wait for fresh data, then start a new log.
+
+        While the user is asked, no data are received.
+        """
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._wait(lambda: min(self._heard_s.values()) > 0, 1.0)

@@ -28,7 +28,7 @@ A, B, C for ``wheel_cmd``; None ends the motion.
 LOOK_S: Final = 1.0
 """Interval, in s, in which a robot must follow its command."""
 SLOW_LOOK_S: Final = 3.0
-"""``LOOK_S`` for a board that measures rarely, so that odometry is predicted in between, in s."""
+"""``LOOK_S`` for boards that measure so rarely that odometry is predicted in between, in s."""
 OBEYED_PART: Final = 0.2
 """The robot is regarded as not moving below this fraction of its command."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
@@ -92,7 +92,7 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """Return the command ``seconds`` after ``now``, on a ramp towards ``wanted``."""
+        """Return the command ``seconds`` after the command ``now``, on a ramp to ``wanted``."""
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
             return a, b, c

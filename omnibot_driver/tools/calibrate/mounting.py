@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the IMU's mounting from gravity in three postures, and check one turn. Pure calculation.
+"""Find the IMU's mounting from gravity in three postures. Pure calculation.
 
 The postures are level, nose up and left side up. The sensor measures the direction of up in each.
-A tilt angle is the angle between the directions measured level and tilted. With the tilt angles,
-the three directions are also known in the body's axes. The mounting is the rotation that fits the
-three pairs of directions best (Wahba's problem, solved by a singular value decomposition).
+A tilt angle is the angle between the directions measured in the level and in the tilted posture.
+With the tilt angles, the three directions are also known in the body's axes. The mounting is the
+rotation that fits the three pairs of directions best (Wahba's problem, solved by a singular value
+decomposition). A turn to the left then shows whether gyro and gravity agree.
 """
 
 import math
@@ -23,7 +24,7 @@ from omnibot_driver.tools.calibrate.seen import Contradiction
 Array = NDArray[np.float64]
 
 STILL_RADPS: Final = 0.1
-"""Largest standard deviation of the rotation rate, in rad/s, in a posture held by hand."""
+"""Largest standard deviation of the rotation rate, in rad/s, while a hand holds the robot still."""
 GRAVITY_PART: Final = 0.15
 LEAST_TILT_RAD: Final = math.radians(10)
 MOST_TILT_RAD: Final = math.radians(75)

@@ -213,5 +213,5 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 
 
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
-    """Restore these parameters; those that had no value before keep the new one until a restart."""
+    """Restore these parameters; those without a value before keep the new value until a restart."""
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

@@ -45,7 +45,8 @@ SENT: Final = np.arange(0.0, 1.0, 0.125)
 The time decides which ticks are noticed late, which changes the response too.
 """
 DISTURBED: Final = 0.02
-"""Additional overshoot that is allowed while the board sends ticks, which disturbs a step."""
+"""Additional overshoot that is allowed for a step that is disturbed because the board sends ticks.
+"""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
@@ -141,7 +142,7 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
     """Return the predicted traits of a step: largest overshoot, longest settling, mean error.
 
-    They are taken over the starting positions in ``BEGUN``.
+    These are taken over all starting positions in ``BEGUN``.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)

@@ -28,8 +28,8 @@ class Rest:
     """The evaluation of an IMU at rest; arrays have the values of the sensor's x, y and z axes.
 
     ``bias_radps``: mean rate; ``force_mps2``: mean specific force; ``…_sigma``: standard deviations
-    of the means (the bias as an estimate of its value at the end of the measurement); ``…_noise``:
-    standard deviation of one reading.
+    of these means (that of the bias includes its random walk until the end of the measurement);
+    ``…_noise``: standard deviation of one reading.
     """
 
     bias_radps: Column

@@ -59,8 +59,8 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
     turned = [n for n in range(3) if seen[n]]
     if not turned:
         raise Contradiction(
-            f"no wheel was seen to turn, but wheel {name} was commanded: look again, and check"
-            " that the motors have power"
+            f"wheel {name} was commanded, but you saw no wheel turn: look again, and check that"
+            " the motors have power"
         )
     if len(turned) > 1:
         raise Contradiction(
@@ -88,8 +88,8 @@ def axis_sign(axis: int, seen: Pattern) -> int:
     if seen == tuple(-sign for sign in expected):
         return -1
     raise Contradiction(
-        f"for +{AXES[axis]} the wheels turn {in_words(expected)}, or all of them the other way;"
-        f" {in_words(seen)} is neither"
+        f"for +{AXES[axis]} the wheels should turn {in_words(expected)}, or all of them in"
+        f" reverse; you saw {in_words(seen)}, which is neither"
     )
 
 

@@ -102,7 +102,7 @@ class Fit:
 
     @property
     def aic(self) -> float:
-        """Akaike's criterion: the model with the smallest value fits the same steps best."""
+        """Akaike's information criterion: of two fits to the same steps, the smaller is better."""
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:

@@ -56,9 +56,10 @@ def first_order(parameters: Array, time_s: Array) -> Array:
 
 
 def second_order(parameters: Array, time_s: Array) -> Array:
-    """Return the angle turned by (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²), of any damping.
+    """Return the angle turned by the model of second order after a unit step, with any damping.
 
-    The model needs the zero Z: a PI loop with feed-forward around a motor of first order has one.
+    The model is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). It needs the zero Z, because a PI loop
+    with feed-forward around a motor of first order has one.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))

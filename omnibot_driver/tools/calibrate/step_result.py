@@ -129,9 +129,9 @@ def _remarks(wheel: WheelFound) -> list[str]:
         )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
-            f"Wheel {wheel.name}: no motor in the manual's loop explains these steps. Was the"
-            " firmware built with other gains (--gains)? The results for motor and gains are not"
-            " valid."
+            f"Wheel {wheel.name}: no motor in the manual's loop explains these steps, so the"
+            " results for motor and gains are not valid. If the firmware was built with other gains, give"
+            " these gains with --gains."
         )
     if abs(gain - 1.0) > UNLIKE_ONE:
         remarks.append(
@@ -156,7 +156,7 @@ def _told(wheels: list[Behaviour]) -> str:
         for values in ([wheel.overshoot for wheel in wheels], [wheel.ms for wheel in wheels])
     )
     return (
-        f"a step of the command rises within {rise_ms:.0f} ms at most and overshoots by"
-        f" {100 * overshoot:.0f} %; the integrated error is {command_ms:.0f} ms times the step,"
-        f" and {load_ms:.0f} ms times a load; Ms is {ms:.2f}"
+        f"a step of the command has a rise time of at most {rise_ms:.0f} ms and an overshoot of"
+        f" {100 * overshoot:.0f} %; the integrated error is {command_ms:.0f} ms times a step of the"
+        f" command, and {load_ms:.0f} ms times a step of the load; Ms is {ms:.2f}"
     )

@@ -30,7 +30,7 @@ class Plant:
     """A plant: a wheel with the duty in percent as input, and the speed in RPM as output.
 
     The final speed is the gain times the duty above ``dead_zone_percent``. The speed follows with
-    two lags, of which ``fast_s`` is 0 for a plant of first order.
+    the time constants ``slow_s`` and ``fast_s``; ``fast_s`` is 0 for a plant of first order.
     """
 
     rpm_per_percent: float

@@ -3,8 +3,8 @@
 """Find the positions of an encoder's marks from several records of a wheel. Pure calculation.
 
 The marks on the encoder's disc are not exactly evenly spaced. Their effect on the times between
-ticks repeats with each turn. Each record begins at an unknown mark. The input is how much each time
-differs from that with evenly spaced marks; this module must not know how the wheel moved.
+ticks repeats with each turn. Each record begins at an unknown mark. The input is the relative
+difference of each time from the time with evenly spaced marks. Must not know how the wheel moved.
 """
 
 from collections.abc import Sequence

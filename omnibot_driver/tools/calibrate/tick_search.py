@@ -119,9 +119,9 @@ class Search:
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return how much each time differs from that with evenly spaced marks, by record.
+        """Return the relative difference of each time from that with evenly spaced marks.
 
-        The differences are relative. They are NaN beside a missed mark.
+        The result has a row for each record. It has NaN for the two distances beside a missed mark.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):

@@ -103,7 +103,10 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     decay = np.exp(-1.0 / lag)
 
     def way(share: float) -> float:
-        """Return the counts turned from rest in this time, in ticks, with one count's effort."""
+        """Return the counts turned from rest after ``share`` ticks.
+
+        The effort is that for one count per tick.
+        """
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 
     risen = [way(1.0 - part), way(2.0 - part) - way(1.0 - part), way(3.0 - part) - way(2.0 - part)]
