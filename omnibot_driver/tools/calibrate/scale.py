@@ -94,8 +94,8 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
     notes = []
     if abs(x.value - y.value) > UNLIKE * math.hypot(x.sigma, y.sigma):
         notes.append(
-            f"The scales by x and by y differ by {abs(x.value / y.value - 1):.1%}: the wheels slip,"
-            " or their radii differ."
+            f"The scales of x and y differ by {abs(x.value / y.value - 1):.1%}: the wheels slip, or"
+            " their radii differ."
         )
     if abs(ratio - 1) > GYRO_TOLERANCE + UNLIKE * ratio_sigma:
         notes.append(
