@@ -152,7 +152,7 @@ def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[fl
         ends = np.rint((stamp_s[first:last] - reference_s) / TICK_S) - onset
         sooner = changes[number - 1] if number else change
         last_radps = float(told[sooner - 1])
-        if last_radps not in levels:  # from rest, against friction
+        if last_radps not in levels:  # a start from rest, where friction matters
             last_radps = before
         ticks = round((commands.stamp_s[change] - commands.stamp_s[sooner]) / TICK_S)
         steps.append(Step(before, after, ends, rates[first:last], last_radps, ticks))
