@@ -65,6 +65,8 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
         odom_rate_hz=values["odom_rate"],
         spin_speed=values["spin_speed"],
         allow_reverse_goals=values["allow_reverse_goals"],
+        max_speed_mps=values["max_linear_speed"],
+        max_yaw_rate_radps=values["max_angular_speed"],
         wheel_scale=values["odom_wheel_scale"],
         gyro_drift_radps=values["gyro_drift"],
     )

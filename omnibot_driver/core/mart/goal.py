@@ -19,6 +19,8 @@ INCH_M: Final = 0.0254
 NEAR_M: Final = 0.04
 NEAR_RAD: Final = math.radians(2.5)
 SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
+NORMAL_UNITS: Final = 30
+"""Motor units of controlled moves that are not SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 """After ENOUGH_MOVES moves, a distance of ENOUGH_M (m) from the goal is near enough.
 
@@ -116,10 +118,9 @@ class Surplus:
         asked = max(1, round(wanted - surplus))
         return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
 
-    def inches(self, way_m: float) -> tuple[int, bool]:
-        """Return the inches to request for a distance in m, and whether to drive at SLOW speed."""
-        slow = way_m / INCH_M < SLOW_BELOW_IN
-        return max(1, round(way_m / INCH_M / self._stretch[slow])), slow
+    def inches(self, way_m: float, *, slow: bool) -> int:
+        """Return the inches to request for a distance in m."""
+        return max(1, round(way_m / INCH_M / self._stretch[slow]))
 
 
 def docking_inches(longest_m: float) -> int:
@@ -132,13 +133,29 @@ class Move:
     """The progress towards the goal ``place``.
 
     ``said``: number of moves sent so far; ``turns``: number of turns since the last straight move;
-    ``given_up``: whether the goal is finished, or a move has failed.
+    ``given_up``: whether the goal is finished, or a move has failed; ``failed``: the latter.
     """
 
     place: Pose
     said: int = 0
     turns: int = 0
     given_up: bool = False
+    failed: bool = False
+
+    def fail(self) -> None:
+        """Give the goal up, as a move has failed."""
+        self.given_up = self.failed = True
+
+    def repeated(self) -> "Move":
+        """Return the progress after the same goal was commanded again.
+
+        A robot that has come near enough is left where it is.
+        """
+        if not self.given_up:
+            return self
+        if self.failed:
+            return Move(self.place)
+        return Move(self.place, said=ENOUGH_MOVES, turns=self.turns)
 
     def begin(self, request: Request) -> None:
         """Count this move as sent."""
@@ -153,21 +170,26 @@ def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) 
     way = pose.way_to(move.place)
     near_rad = NEAR_RAD * (1.0 + WIDER * move.turns)
     if way.way_m <= (NEAR_M if move.said < ENOUGH_MOVES else ENOUGH_M):
-        return _turn(way.yaw_rad, near_rad, surplus)
+        return _turn(way.yaw_rad, near_rad, settings, surplus)
     bearing_rad = math.atan2(way.y_m, way.x_m)
     backward = settings.allow_reverse_goals and abs(bearing_rad) > math.pi / 2
     if backward:
         bearing_rad = math.remainder(bearing_rad - math.pi, math.tau)
-    if turn := _turn(bearing_rad, max(near_rad, math.atan2(NEAR_M / 2, way.way_m)), surplus):
+    near_rad = max(near_rad, math.atan2(NEAR_M / 2, way.way_m))
+    if turn := _turn(bearing_rad, near_rad, settings, surplus):
         return turn
     word = TB if backward else TF
-    inches, slow = surplus.inches(way.way_m)
-    return word.request(*(("SLOW",) if slow else ()), inches)
+    too_fast = NORMAL_UNITS * settings.speed_per_unit > settings.max_speed_mps
+    slow = too_fast or way.way_m / INCH_M < SLOW_BELOW_IN
+    return word.request(*(("SLOW",) if slow else ()), surplus.inches(way.way_m, slow=slow))
 
 
-def _turn(angle_rad: float, near_rad: float, surplus: Surplus) -> Request | None:
+def _turn(
+    angle_rad: float, near_rad: float, settings: MartSettings, surplus: Surplus
+) -> Request | None:
     wanted = abs(math.degrees(angle_rad))
-    slow = wanted < SLOW_BELOW_DEG
+    normal_radps = 2 * NORMAL_UNITS * settings.speed_per_unit / settings.track_m
+    slow = normal_radps > settings.max_yaw_rate_radps or wanted < SLOW_BELOW_DEG
     degrees = surplus.degrees(wanted, slow=slow)
     if abs(angle_rad) <= near_rad or not degrees:
         return None

@@ -111,7 +111,7 @@ class Measuring(Starts):
         """Discard the goal after a copy of its last move, as the count covers only the copy."""
         if self._move is None or self._move.given_up:
             return
-        self._move.given_up = True
+        self._move.fail()
         self._notice(
             "the network has copied a controlled move, and the driver has stopped the copy; the"
             " driven distance is unknown, so the goal of cmd_pose is discarded: check the network,"

@@ -59,7 +59,7 @@ class Moves(Asking):
             self._moved_by = None  # the move was cut short
             discarded = ""
             if self._move is not None:
-                self._move.given_up = True
+                self._move.fail()
                 discarded = (
                     "; the goal of cmd_pose is discarded: remove the cause, then send it again"
                 )

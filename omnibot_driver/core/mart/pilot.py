@@ -60,8 +60,9 @@ class Pilot(Hearing):
                 "a motion command or a stop arrived; end the commands, then call again"
             )
         if wanted is not self._wanted:
-            if not self._is_same_goal(wanted, now):
-                self._move = None
+            order = moving_order(wanted, now)
+            same = self._move and isinstance(order, GoTo) and order.place == self._move.place
+            self._move = self._move.repeated() if self._move and same else None
             if is_standstill(self._wanted) or is_standstill(wanted):
                 self._blocked = Motion.NONE
         self._wanted = wanted
@@ -69,12 +70,6 @@ class Pilot(Hearing):
             self.proof.stopped(now)
             self._estop_said_s = now - ESTOP_REPEAT_S
         self._next_s = -math.inf
-
-    def _is_same_goal(self, wanted: Wanted, now: float) -> bool:
-        """Return whether the command repeats the goal to which the robot drives."""
-        move, order = self._move, moving_order(wanted, now)
-        repeats = move is not None and isinstance(order, GoTo) and order.place == move.place
-        return repeats and move is not None and not move.given_up
 
     @property
     def stop_words(self) -> tuple[Word, ...]:

@@ -16,7 +16,8 @@ class MartSettings:
     when the robot turns left, else -1; ``network_delay_s``: longest time that a datagram may be on
     its way, in s; ``spin_speed``: whether R and L turn at the commanded speed (set by SSP) or at
     the server's own SLOW speed; ``motor_balance``: speed of the left motor divided by that of the
-    right one, at equal units.
+    right one, at equal units; ``max_speed_mps``, ``max_yaw_rate_radps``: limits of the motions to a
+    goal, as far as the server has a slower motion.
     """
 
     wheel_radius_m: float = 0.0625
@@ -30,5 +31,7 @@ class MartSettings:
     odom_rate_hz: float = 20.0
     spin_speed: Literal["custom", "fixed"] = "custom"
     allow_reverse_goals: bool = False
+    max_speed_mps: float = 0.5
+    max_yaw_rate_radps: float = 0.5
     wheel_scale: float = 0.01
     gyro_drift_radps: float = 0.001

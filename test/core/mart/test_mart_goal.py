@@ -40,6 +40,27 @@ def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, s
         assert abs(math.remainder(pose.yaw_rad - goal.yaw_rad, math.tau)) < math.radians(8)
 
 
+@pytest.mark.parametrize(
+    ("limits", "turn", "way"),
+    [
+        ({}, b"MCL SLOW 90", b"TF 30"),
+        ({"max_yaw_rate_radps": 1.5}, b"MCL 90", b"TF 30"),
+        ({"max_speed_mps": 0.1}, b"MCL SLOW 90", b"TF SLOW 30"),
+    ],
+    ids=["defaults", "a fast turn", "a slow drive"],
+)
+def test_a_move_is_slow_if_the_normal_one_is_faster_than_the_limits(
+    limits: dict[str, float], turn: bytes, way: bytes
+) -> None:
+    """NORMAL is 30 units: 0.26 m/s, and 1.3 rad/s on the spot."""
+    settings, surplus = MartSettings(**limits), Surplus()
+    to_the_left = next_move(Move(Pose(0.0, 1.0, 0.0)), Pose(), settings, surplus)
+    ahead = next_move(Move(Pose(30 * INCH_M * STRETCH, 0.0, 0.0)), Pose(), settings, surplus)
+    assert to_the_left is not None
+    assert ahead is not None
+    assert (to_the_left.data, ahead.data) == (turn, way)
+
+
 def end(bench: MartBench) -> None:
     """Wait until the robot has been at rest for 3 s."""
     bench.run(1.0)
@@ -139,4 +160,4 @@ def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_ends_the_goal()
     bench.run(30.0)
     assert any("the goal of cmd_pose is discarded" in notice for notice in bench.notices)
     assert bench.truth.x_m < 2.4
-    assert bench.board._pilot._surplus.inches(2.0)[0] <= round(2.0 / INCH_M / STRETCH) + 1
+    assert bench.board._pilot._surplus.inches(2.0, slow=False) <= round(2.0 / INCH_M / STRETCH) + 1
