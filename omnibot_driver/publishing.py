@@ -162,11 +162,11 @@ class Publishing:
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
-        """Note that ROS is shutting down; asking ROS at each event would take too much time."""
+        """Record that ROS is shutting down; asking ROS at each event would take too much time."""
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Note whether time is simulated; asking ROS at each event would take a microsecond."""
+        """Record whether time is simulated; asking ROS at each event would take a microsecond."""
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:

@@ -184,7 +184,7 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Note that the pacer, and so the watchdog, is alive; send the guard its heartbeat."""
+        """Record that the pacer, and so the watchdog, is alive; send the guard its heartbeat."""
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)
         self._stall_detector.passed(boot_s, time.time_ns())

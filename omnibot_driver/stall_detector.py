@@ -62,7 +62,7 @@ class StallDetector:
         return length_s
 
     def passed(self, now: float, wall_ns: int) -> None:
-        """Note that the watchdog's thread runs; ``wall_ns`` is the time of day in ns."""
+        """Record that the watchdog's thread runs; ``wall_ns`` is the time of day in ns."""
         if self._begun:
             self._begun = False
             if now >= self._over_at + LATEST_S:  # else commands from then may still arrive

@@ -151,7 +151,7 @@ class _Sender:
         return late_s if late_s >= 0.0 else -CLOCK_RETREATS * late_s
 
     def hear(self, differences_s: Differences, at_s: float, longest_s: float) -> float:
-        """Note a message and return its delay in s."""
+        """Record a message and return its delay in s."""
         self.heard += 1
         return min(
             offset.hear(difference_s, at_s, longest_s)

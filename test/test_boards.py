@@ -95,7 +95,7 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> None:
-    """The driver advises to check the parameter ``baudrate`` by the board's traits."""
+    """The board's traits decide whether the driver advises the user to check ``baudrate``."""
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))
     assert ("baudrate" in profile.PARAMETERS.by_name) is board.traits.baudrate

@@ -170,7 +170,7 @@ class LoisEcuTopics:
         return float(self._values["cmd_vel_timeout"])
 
     def _drive(self, session: Session, message: Float32MultiArray, now: float) -> None:
-        """Command duties in percent, converted to wheel rates by the board's settings."""
+        """Convert the message's duties (percent) to wheel rates, and command these."""
         duties = list(message.data)
         require_finite("duty_cmd", duties)
         if len(duties) != 2:

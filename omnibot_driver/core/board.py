@@ -162,7 +162,7 @@ class Board(Protocol):
         """Forget the mode, as the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
-        """Note that this process stalled, so the guard may have sent the stop commands.
+        """Record that this process stalled, so the guard may have sent the stop commands.
 
         The guard is the process that sends ``last_words`` when this process hangs. Motors other
         than the wheels, such as a brush, may then be off as well.
@@ -214,7 +214,7 @@ class Board(Protocol):
         """
 
     def start_requested(self) -> None:
-        """Note that the user has requested a start; called before ``start``.
+        """Record that the user has requested a start; called before ``start``.
 
         The driver also calls ``start`` by itself, for example after a reconnect.
         """

@@ -144,7 +144,7 @@ class ModeManager:
             self._say(self._board.reset(), now)
 
     def heard_paused(self, now: float, *, continues: bool) -> None:
-        """Note that the board is paused.
+        """Record that the board is paused.
 
         ``continues``: the board was paused before as well, so it has not restarted.
         """
@@ -164,7 +164,7 @@ class ModeManager:
             self._begin(now)  # the board has restarted, and may have missed earlier commands
 
     def heard_reset(self, now: float, remark: str = "") -> None:
-        """Note that the board has obeyed a reset.
+        """Record that the board has obeyed a reset.
 
         ``remark``: a sentence that says what is not proved about the reset; empty if all is proved.
         """
@@ -178,7 +178,7 @@ class ModeManager:
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:
-        """Note that the board sends data and runs."""
+        """Record that the board sends data and runs."""
         data_at, self._data_at = self._data_at, now
         if self.at_rest:
             return
@@ -198,7 +198,7 @@ class ModeManager:
             self._say(self._board.reset(), now)
 
     def heard_nothing(self, now: float) -> None:
-        """Note that the board is silent: it may be rebooting, or disconnected."""
+        """Record that the board is silent: it may be rebooting, or disconnected."""
         if self.phase is Phase.SETTLED and self._wanted is Wanted.RUNNING:
             self._begin(now)
 

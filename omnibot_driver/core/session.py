@@ -167,7 +167,7 @@ class Session:
         self._commands.discard(now)
 
     def overran(self, count: int) -> None:
-        """Note that a port has lost bytes ``count`` times, counted over all connections."""
+        """Record that a port has lost bytes ``count`` times, counted over all connections."""
         self._reporter.overruns = count
 
     def tick(self, now: float) -> None:

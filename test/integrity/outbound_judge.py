@@ -92,7 +92,7 @@ class Judge:
         return other
 
     def write(self, items: Items, start_s: float) -> None:
-        """Note that the first byte of this write is on the line at ``start_s``."""
+        """Record that the first byte of this write is on the line at ``start_s``."""
         self._before, self._now = self._now, items
         if items.moves and not self.driving:
             self.driving = True
@@ -106,7 +106,7 @@ class Judge:
                 self.driving = False
 
     def writes(self, last: Items, frames: int) -> None:
-        """Note several undamaged writes of the same kind as the previous one.
+        """Record several undamaged writes of the same kind as the previous one.
 
         ``last``: the newest of them; ``frames``: their number of control frames.
         """
@@ -115,7 +115,7 @@ class Judge:
             self.score.frames += frames
 
     def frame(self, frame: ControlFrame, at_s: float) -> str:
-        """Note that the board understands a control frame; return the name of its error, or ""."""
+        """Record a control frame that the board understands; return the name of its error, or ""."""
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)
             if not is_motion(frame.mode, frame.values):
@@ -136,7 +136,7 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """Note that a letter acts; return the name of the error, or "".
+        """Record that a letter acts; return the name of the error, or "".
 
         ``at``: place of its byte in the write; negative if the line added the byte.
         """

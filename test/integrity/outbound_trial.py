@@ -272,7 +272,7 @@ class Trial:
         self._changed(at_s)
 
     def _changed(self, at_s: float) -> None:
-        """Note that the visible state of the board may have changed."""
+        """Record that the visible state of the board may have changed."""
         if self._driven_when_due is None and at_s > self._course.scene.still_by_s:
             self._driven_when_due = self._driven
         if self._shows_at_s <= at_s:

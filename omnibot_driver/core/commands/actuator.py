@@ -51,7 +51,7 @@ class Actuator(Protocol):
         """Send ``wanted`` from now on, in place of the previous order."""
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Note that packets of a request, such as start, were sent: they are not a motion order."""
+        """Record that packets of a request, such as start, were sent; they order no motion."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now, possibly none, and regard them as written."""

@@ -51,7 +51,7 @@ class MotionInterlock:
         self.until, self._tripped_at = Until.NOTHING, -math.inf
 
     def release(self) -> None:
-        """Note the release of the e-stop, which ends the refusal on a board without ~/start."""
+        """Record the release of the e-stop, which ends the refusal on a board without ~/start."""
         if self.until is Until.ESTOP:
             self.start()
 
@@ -64,7 +64,7 @@ class MotionInterlock:
         self._commanded_at = now
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
-        """Note a command, and return the reason why it is refused; empty if it is allowed.
+        """Record a command, and return the reason why it is refused; empty if it is allowed.
 
         ``stands``: whether it is a command to stand still, which is always allowed. The pause of
         ``timeout_s`` that ends a refusal begins after the last motion command or ``be_active``.

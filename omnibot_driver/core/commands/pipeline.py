@@ -159,12 +159,12 @@ class CommandPipeline:
         return self.shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Note that packets of a request, such as start, were sent: they are not a motion
+        """Record that packets of a request, such as start, were sent: they are not a motion
         command."""
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Note that the current set-point was sent, so the robot is expected to follow it."""
+        """Record that the current set-point was sent, so the robot is expected to follow it."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -177,7 +177,7 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Note that ``count`` displacements so far were impossible; return notices for the user."""
+        """Record that ``count`` displacements so far were impossible; return the user's notices."""
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
             return []

@@ -92,7 +92,7 @@ class SetpointStream:
             self._fresh_at = self._stop_at
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Note that a request was written, and adapt what to send next.
+        """Record that a request was written, and adapt what to send next.
 
         Packets that begin with Stop on every channel count as a Stop. Any other packets may have
         completed a damaged motion frame on the line, so the set-point is repeated at once.

@@ -55,16 +55,16 @@ class StopProof:
         self._still_s, self._still = 0.0, 0
 
     def moved(self) -> None:
-        """Note that a command to move was sent."""
+        """Record that a command to move was sent."""
         self.begin()
         self.owed = True
 
     def stopped(self, now: float) -> None:
-        """Note that Stop was sent."""
+        """Record that Stop was sent."""
         self._stopped_at = min(self._stopped_at, now)
 
     def paused(self) -> None:
-        """Note that the board is paused, which proves the standstill: its motors are off."""
+        """Record that the board is paused, which proves the standstill: its motors are off."""
         self.proved, self.owed = True, False
 
     @property

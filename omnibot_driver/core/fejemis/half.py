@@ -139,7 +139,7 @@ class Half:
         return self._at.get(keyword, -math.inf)
 
     def note(self, keyword: str, now: float) -> None:
-        """Note that a line of this kind came."""
+        """Record that a line of this kind came."""
         self._at[keyword] = now
 
     def subscribe_again(self) -> None:

@@ -195,7 +195,7 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Note that lines of these kinds came outside (1) or within (-1) a pair."""
+        """Record that lines of these kinds came outside (1) or within (-1) a pair."""
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))
 

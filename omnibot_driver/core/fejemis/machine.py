@@ -20,7 +20,7 @@ BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
 """Period in s at which ``brush 1`` is repeated while the brush is on, as a line may be lost."""
 PACE_S: Final = 0.05
-"""Shortest time between two voltages, or two colours, in s; only the newest is sent."""
+"""Shortest time in s between two lift commands, or two light commands; only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5

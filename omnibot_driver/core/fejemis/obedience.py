@@ -52,7 +52,7 @@ class Obedience:
         self.start_at = math.inf
 
     def pause(self) -> None:
-        """Note a requested pause, and cancel a ``start`` that is due after an e-stop."""
+        """Record a requested pause, and cancel a ``start`` that is due after an e-stop."""
         self.pause_said = True
         self.start_at = math.inf
 

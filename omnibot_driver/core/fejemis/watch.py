@@ -37,11 +37,11 @@ class Watch:
         self._patient_until = -math.inf
 
     def stalled(self) -> None:
-        """Note that this process stalled, which must not make the boards appear silent."""
+        """Record that this process stalled, which must not make the boards appear silent."""
         self._stalled = True
 
     def open(self, now: float) -> None:
-        """Note that the ports are open at ``now``; only the first call counts."""
+        """Record that the ports are open at ``now``; only the first call counts."""
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:

@@ -35,13 +35,13 @@ class BoardKind:
         self._lone_ticks, self._uncounted_m = 0, 0.0
 
     def took_ticks(self, counts: tuple[int, int]) -> None:
-        """Note a group of ticks; ``counts``: ticks of each wheel since the group before."""
+        """Record a group of ticks; ``counts``: ticks of each wheel since the group before."""
         self._lone_ticks += 1
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
 
     def took_odometry(self, *, appended: bool) -> None:
-        """Note a group of odometry; ``appended``: it has the command byte of the ticks."""
+        """Record a group of odometry; ``appended``: it has the command byte of the ticks."""
         motion = self._motion
         if appended and not self.appends:
             self.appends, motion.holds = True, True

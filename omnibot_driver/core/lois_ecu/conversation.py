@@ -234,7 +234,7 @@ class LoisConversation:
         return self._points.driving
 
     def wrote(self, data: bytes, now: float) -> None:
-        """Note that these bytes were sent to the board."""
+        """Record that these bytes were sent to the board."""
         said = self._points.wrote(data, now)
         if said:
             self._stall.wrote(said[-1], now)

@@ -148,7 +148,7 @@ class Assembler:
         return [*found, (now, report)]
 
     def damage(self) -> None:
-        """Note that characters were received that are not a line."""
+        """Record that characters were received that are not a line."""
         if self._code is not None and not self._done:
             self._drop()
         self._record.damage()

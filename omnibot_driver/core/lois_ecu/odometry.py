@@ -128,7 +128,7 @@ class LoisOdometry:
         self._heading_compared = False
 
     def restarted(self, now: float, age_s: float | None) -> None:
-        """Note that the board restarted ``age_s`` ago (None: unknown), and lost its set-point."""
+        """Record that the board restarted ``age_s`` ago (None: unknown), and lost its set-point."""
         self._motion.restart(self._heard_at_s if age_s is None else now - age_s)
         self.connect()
         self._lost_s = self._advanced_s = -math.inf
@@ -138,7 +138,7 @@ class LoisOdometry:
     # Outbound
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Note that a set-point was sent to the board."""
+        """Record that a set-point was sent to the board."""
         if isinstance(command, SetRpm):
             kind: CommandKind = "rpm"
             unit = self._settings.rim_mps_per_rpm
@@ -151,7 +151,7 @@ class LoisOdometry:
             self._may_roll_mps[index] = max(self._may_roll_mps[index], abs(speed_mps))
 
     def halted(self, now: float) -> None:
-        """Note that the board set both set-points to zero by itself, because of its button."""
+        """Record that the board set both set-points to zero by itself, because of its button."""
         self.wrote(SetRpm(0, 0), now)
 
     def stalled(self, wheels: tuple[bool, bool]) -> None:

@@ -161,7 +161,7 @@ class SettingsWriter:
         self._queue_other(at_s, SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
 
     def ticks_came(self, now: float) -> None:
-        """Note that ticks arrived, and compare their measured period with the requested one."""
+        """Record that ticks arrived, and compare their measured period with the requested one."""
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
         if len(self._arrivals) < 4:
@@ -174,7 +174,7 @@ class SettingsWriter:
             self._rounds_left, self._round_at_s = 1, now + away_s
 
     def date_came(self) -> None:
-        """Note that a GPS date arrived, which shows that the board obeys requests."""
+        """Record that a GPS date arrived, which shows that the board obeys requests."""
         if self._rounds and not self._answered:
             self._answered = True
             if self._dates_come_periodically:

@@ -59,7 +59,7 @@ class ReportedSpeed:
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Note the estimated speed for ``duration_s`` in which no speed was reported."""
+        """Record the estimated speed for ``duration_s`` in which no speed was reported."""
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
             self.resting.note(rpm, duration_s)

@@ -35,7 +35,7 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """Note that the reset is repeated, and use the present counts if they prove more.
+        """Record that the reset is repeated, and use the present counts if they prove more.
 
         Counts of wheels at rest prove more than those of wheels that rolled. Counts of wheels that
         still roll prove no more than the first ones.

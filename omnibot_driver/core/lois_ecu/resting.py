@@ -59,7 +59,7 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Note an estimated speed in RPM for ``since_s`` in which no speed was reported."""
+        """Record an estimated speed in RPM for ``since_s`` in which no speed was reported."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 

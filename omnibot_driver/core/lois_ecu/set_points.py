@@ -48,7 +48,7 @@ class SetPoints:
         return self._said is not None and _moves(self._said)
 
     def wrote(self, data: bytes, now: float) -> list[SetRpm | SetDuty]:
-        """Note that these bytes were sent to the board; return the set-points in them."""
+        """Record that these bytes were sent to the board; return the set-points in them."""
         said = outbound.set_points(data, with_sum=self.settings.with_sum)
         for command in said:
             if _moves(command):

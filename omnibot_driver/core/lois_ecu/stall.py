@@ -61,7 +61,7 @@ class StallWatch:
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Note a set-point. A duty bypasses the controller, so it cannot stall a wheel."""
+        """Record a set-point. A duty bypasses the controller, so it cannot stall a wheel."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]

@@ -67,7 +67,7 @@ class WheelModel:
         return bool(self._effects)
 
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
-        """Note that this command was written at ``at_s``."""
+        """Record that this command was written at ``at_s``."""
         if (kind, speed_mps) == self._heard and not (kind == "rpm" and not speed_mps):
             return
         halts = kind == "rpm" and (not speed_mps or speed_mps * self._rpm_mps < 0)

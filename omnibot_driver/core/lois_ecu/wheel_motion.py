@@ -108,7 +108,7 @@ class Wheel:
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:
-        """Note that the controller was reset while the wheel had this speed."""
+        """Record that the controller was reset while the wheel had this speed."""
         self.cut, self.wound_m = True, 0.0
         self.rests = False
         self.rolled_mps, self.rolled_s = speed_mps, 0.0

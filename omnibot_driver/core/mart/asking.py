@@ -86,5 +86,5 @@ class Asking(Stops):
         self._halt(now)
 
     def _unanswered(self, word: Word) -> None:
-        """Note a missing reply: require the server's name again, as the server may be gone."""
+        """Record a missing reply: require the server's name again, as the server may be gone."""
         self._named_s = -math.inf

@@ -251,7 +251,7 @@ class Conductor:
         """Do nothing: ``MartBoard.connect`` has reset the pilot."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the command to carry out by ``wanted``."""
+        """Carry out ``wanted`` from now on, instead of the previous command."""
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:

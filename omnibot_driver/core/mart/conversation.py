@@ -119,11 +119,11 @@ class Conversation:
         return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
 
     def heard(self, form: Form, now: float) -> None:
-        """Note that a reply of this form came; its duplicate may come within ``delay_s``."""
+        """Record that a reply of this form came; its duplicate may come within ``delay_s``."""
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Note that a missing reply has come: this one, unless it is a copy of another reply."""
+        """Record that a missing reply has come: this one, unless it is a copy of another reply."""
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
 
@@ -145,12 +145,12 @@ class Conversation:
         return now < self._doubled_s + DISTURBED_S
 
     def owes(self, form: Form, now: float) -> None:
-        """Note that a reply of this form may still come, within ``delay_s``."""
+        """Record that a reply of this form may still come, within ``delay_s``."""
         until_s = now + self.delay_s
         self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def settle(self, now: float) -> None:
-        """Note that the server has answered the last request.
+        """Record that the server has answered the last request.
 
         Replies to earlier requests then come within ``delay_s`` or are lost.
         """
@@ -174,7 +174,7 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply to a controlled move is not late then: the stop of the move waits for it.
+        A late reply is expected afterwards, except to a controlled move: its stop waits for it.
         """
         if self.pending is None:
             return None
@@ -252,7 +252,7 @@ class Conversation:
         )
 
     def _owes_until(self, word: Word, sent_s: float) -> None:
-        """Note that the reply to ``word``, sent at ``sent_s``, may still come."""
+        """Record that the reply to ``word``, sent at ``sent_s``, may still come."""
         until_s = sent_s + word.takes_s + 2 * self.delay_s
         for form in word.forms:
             self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)

@@ -158,7 +158,7 @@ class Ground:
         return self.odometry.told(now, blind_since_s=self.blind_since_s)
 
     def _hears(self, now: float) -> None:
-        """Note a reply, and whether it is the first one after an absence of the server."""
+        """Record a reply, and whether it is the first one after an absence of the server."""
         most_s = ABSENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         if self.state is State.CHECKING:
             most_s += self.imu.word.takes_s
@@ -171,7 +171,7 @@ class Ground:
         self.heard_s = now
 
     def _appears(self, now: float) -> None:
-        """Note that the server may have been restarted: it then starts up, and has no log."""
+        """Record that the server may have been restarted: it then starts up, and has no log."""
         self.appeared_s = now
         self.jobs.log_may_be_lost = self.jobs.logging
         self.jobs.ended = False

@@ -127,7 +127,7 @@ class Health:
         return any(abs(number - volts) < SAME_V for volts in self._voltages)
 
     def _status(self, bits: int) -> None:
-        """Note the motor board's status, but a nonzero status only when it comes twice in a row.
+        """Record the motor board's status, but a nonzero status only when it comes twice in a row.
 
         A late reply to ENC can look like a status.
         """
@@ -138,30 +138,30 @@ class Health:
             self.status = bits
 
     def encoder_failed(self) -> None:
-        """Note that ENC was answered by ``fail``."""
+        """Record that ENC was answered by ``fail``."""
         self._encoder_fails += 1
 
     def encoder_answers(self) -> None:
-        """Note that ENC was answered by a count."""
+        """Record that ENC was answered by a count."""
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
-        """Note a change of RMRA; HEADING_CHANGES changes prove that RMRA works in this motion."""
+        """Record a change of RMRA; HEADING_CHANGES changes prove that RMRA works in this motion."""
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
 
     def reference_failed(self, now: float) -> None:
-        """Note that RM was answered by a bare ``fail``."""
+        """Record that RM was answered by a bare ``fail``."""
         self.reference_fails += 1
         self._reference_failed_s = now
 
     def reference_answers(self) -> None:
-        """Note that RM was answered by ``ok``."""
+        """Record that RM was answered by ``ok``."""
         self.reference_fails, self._reference_failed_s = 0, -math.inf
 
     def strays(self, now: float) -> None:
-        """Note that the robot moves without a command.
+        """Record that the robot moves without a command.
 
         Soon after an RM that failed, this shows a defect of the server.
         """

@@ -53,11 +53,11 @@ class ImuProof:
         return now <= self._proved_s + PROVED_S
 
     def used(self) -> None:
-        """Note that a motion starts; the next motion needs a new check."""
+        """Record that a motion starts; the next motion needs a new check."""
         self._proved_s = -math.inf
 
     def lost(self) -> None:
-        """Note that a motion has found the IMU dead."""
+        """Record that a motion has found the IMU dead."""
         self.dead = True
 
     @property
@@ -66,7 +66,7 @@ class ImuProof:
         return RESET.request() if self.word is RESET else CHECK.request(0)
 
     def missed(self, now: float) -> None:
-        """Note that a check was not answered; the next one is due after REPEAT_S."""
+        """Record that a check was not answered; the next one is due after REPEAT_S."""
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:

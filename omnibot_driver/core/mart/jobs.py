@@ -74,7 +74,7 @@ class Jobs:
         self._clear()
 
     def forget_log(self) -> None:
-        """Note that the server has no log, as it was restarted."""
+        """Record that the server has no log, as it was restarted."""
         self.logging = self.log_may_be_lost = self.ended = False
 
     def _clear(self) -> None:
@@ -143,7 +143,7 @@ class Jobs:
         return self._request if stands and not self._waiting else None
 
     def sent(self, request: Request, now: float) -> None:
-        """Note that the job's request was sent."""
+        """Record that the job's request was sent."""
         self._waiting = True
         self._tries += 1
         self.moving = request.word in (words.TF, words.TB)

@@ -113,9 +113,9 @@ class Measuring(Starts):
             return
         self._move.fail()
         self._notice(
-            "the network has copied a controlled move, and the driver has stopped the copy; the"
-            " driven distance is unknown, so the goal of cmd_pose is discarded: check the network,"
-            " then send the goal again",
+            "the network delivered a controlled move twice, and the driver has stopped the second"
+            " one; the driven distance is unknown, so the goal of cmd_pose is discarded: check the"
+            " network, then send the goal again",
             halt=True,
         )
 

@@ -55,7 +55,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Note that the motor does not turn with these units.
+        """Record that the motor does not turn with these units.
 
         The offset then is uncertain again: maybe the robot was only held.
         """

@@ -64,7 +64,7 @@ class Polls:
         return sorted(late, key=lambda word: self._at(word, state) + periods[word])
 
     def asked(self, word: Word, now: float) -> None:
-        """Note that the query was sent; a sonar's query also delays the other sonar's."""
+        """Record that the query was sent; a sonar's query also delays the other sonar's."""
         self._asked_s[word] = now
         if word in SONARS:
             for each in SONARS:

@@ -93,7 +93,7 @@ class Reckoning:
         self.speeds.forget()
 
     def begin(self, motion: Motion, now: float) -> None:
-        """Note that a motion was started; its count begins at zero."""
+        """Record that a motion was started; its count begins at zero."""
         self.motion, self.stands = motion, False
         self._began_s, self._stood_s = now, math.inf
         self.slowing_since_s = None
@@ -105,7 +105,7 @@ class Reckoning:
         self.told_rad, self._guessed = None, False
 
     def started(self, now: float, *, sure: bool) -> None:
-        """Note that the server has acknowledged the start.
+        """Record that the server has acknowledged the start.
 
         ``sure``: whether the reply certainly belongs to this start.
         """
@@ -114,16 +114,16 @@ class Reckoning:
         self.heading.changed_s = now
 
     def stopping(self, now: float) -> None:
-        """Note that a stop was sent to the robot."""
+        """Record that a stop was sent to the robot."""
         if self.slowing_since_s is None:
             self.slowing_since_s = now
 
     def stand(self, now: float) -> None:
-        """Note that the robot was stopped; its roll-out is not measured yet."""
+        """Record that the robot was stopped; its roll-out is not measured yet."""
         self.stands, self._stood_s = True, now
 
     def rest(self) -> None:
-        """Note that the motion is over and its roll-out is measured."""
+        """Record that the motion is over and its roll-out is measured."""
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:

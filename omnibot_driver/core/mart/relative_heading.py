@@ -69,7 +69,7 @@ class RelativeHeading:
         self._angle_rad = None
 
     def begin(self, now: float, *, anew: bool) -> None:
-        """Note that a motion was started; ``anew``: whether it resets the heading to zero."""
+        """Record that a motion was started; ``anew``: whether it resets the heading to zero."""
         if anew:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
         self._turned_rad = 0.0
@@ -77,7 +77,7 @@ class RelativeHeading:
         self.changed_s = now
 
     def started(self) -> None:
-        """Note that RM has certainly begun, so that each heading from now on is of this motion."""
+        """Record that RM has certainly begun, so each heading from now on is of this motion."""
         self._before_rad = 0.0
 
     def tell(self, angle_rad: float, when: Moment, stood_s: float) -> bool:

@@ -105,7 +105,7 @@ class SpeedLoop(Motors):
         return max(self._least_units, units)
 
     def started(self) -> None:
-        """Note that the motors have turned after a start; later starts may need fewer units."""
+        """Record that the motors have turned after a start; later starts may need fewer units."""
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
@@ -232,7 +232,7 @@ class SpeedLoop(Motors):
         return (right, left) if right or left else None
 
     def changed(self, right: int, left: int, now: float) -> None:
-        """Note that a change was sent.
+        """Record that a change was sent.
 
         The motors are assumed to obey the change.
         """

@@ -115,11 +115,11 @@ class SpotTurns:
         return not self._refused
 
     def refused(self) -> None:
-        """Note that the server does not support turns with a set speed (CUSTOM)."""
+        """Record that the server does not support turns with a set speed (CUSTOM)."""
         self._refused = True
 
     def forget_setting(self) -> None:
-        """Note that the server may have been restarted, so that it has lost the setting."""
+        """Record that the server may have been restarted, so that it has lost the setting."""
         self._set_units = None
 
     def may_be_forgotten(self, now: float) -> bool:
@@ -127,7 +127,7 @@ class SpotTurns:
         return now - self._set_s > JUST_SET_S
 
     def begin(self, rate_radps: float) -> None:
-        """Note that a turn with this rate begins."""
+        """Record that a turn with this rate begins."""
         self._rate_radps = self._wanted_radps = rate_radps
         self._wanted_s = -math.inf
         if self.is_fixed:

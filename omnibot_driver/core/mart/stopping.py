@@ -130,7 +130,7 @@ class Stopping:
         return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
 
     def doubt(self, reply: Ok) -> None:
-        """Note a reply that may belong to the stop, but may also be late or a copy."""
+        """Record a reply that may belong to the stop, but may also be late or a copy."""
         if reply.form in ANSWERS.get(self.motion, ()):
             self._doubtful.append(reply)
 

@@ -237,7 +237,7 @@ class Stops(Ground, ABC):
             return
         self._lost_told = True
         self.lost += 1
-        why = why or f"the server does not answer the stop of {NAMES[self.motion]}"
+        why = why or f"the server does not answer the command that stops {NAMES[self.motion]}"
         self._notice(
             f"server lost: {why}; motion is refused; cut the motor power if the robot moves, then"
             " restart the server",
@@ -245,7 +245,7 @@ class Stops(Ground, ABC):
         )
 
     def _outlives(self, reply: Reply) -> None:
-        """Note a reply to a stop on the command port that comes after the stop port was used.
+        """Record a reply to a stop on the command port that comes after the stop port was used.
 
         So the server has not been restarted, and its stop port may still wait for the end of the
         motion. It would mistake the start of the next RM for that end. This RM would then never be

@@ -64,18 +64,18 @@ class WheelCount:
         self._same = self._odd = 0
 
     def begin(self) -> None:
-        """Note that a start was sent; the count begins at zero if the start has arrived."""
+        """Record that a start was sent; the count begins at zero if the start has arrived."""
         self._before, self.last = self.last, 0
         self.may_begin_anew = self._begins = True
         self.certain = self._confirmed = False
         self._same = self.maybe = 0
 
     def started(self) -> None:
-        """Note that the server has acknowledged the motion."""
+        """Record that the server has acknowledged the motion."""
         self._confirmed = True
 
     def refused(self) -> None:
-        """Note that the motion did not begin, so the count continues from its last value.
+        """Record that the motion did not begin, so the count continues from its last value.
 
         Ignored if the server has acknowledged the motion.
         """
@@ -87,7 +87,7 @@ class WheelCount:
         self.may_begin_anew = self._unseen = True
 
     def rest(self) -> None:
-        """Note that the motion is over: the next step is measured from the last count received."""
+        """Record that the motion is over; the next step begins at the last count received."""
         self.last, self._begins = self._raw, False
         self.maybe = 0
 

@@ -49,7 +49,7 @@ class StreamStatistics:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
-    """``imu`` plus ``lost_imu`` at the last displacement; None without such a displacement."""
+    """``imu`` plus ``lost_imu`` at the last displacement; None if there is none to count from."""
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:

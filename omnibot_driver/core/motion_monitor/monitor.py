@@ -101,7 +101,7 @@ class MotionMonitor:
         self._stood_s = self._moved_s = self._blocked_s = self._stop_again_s = 0.0
 
     def set_point(self, setpoint: CommandedTwist, now: float) -> None:
-        """Note that ``setpoint`` is commanded from ``now`` on.
+        """Record that ``setpoint`` is commanded from ``now`` on.
 
         None means that the robot goes to a goal, on a path that the board chooses.
         """
@@ -114,7 +114,7 @@ class MotionMonitor:
             self._has_stood = False
 
     def release(self) -> None:
-        """Note a release of the e-stop, after which the board may still hold its own e-stop."""
+        """Record a release of the e-stop, after which the board may still hold its own e-stop."""
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
@@ -136,7 +136,7 @@ class MotionMonitor:
         return self._blame(Fault.BEYOND_LIMITS, now) if driven else Fault.UNCOMMANDED
 
     def disregard_refused(self, count: int) -> None:
-        """Note the number of rejected displacements while the robot is not monitored."""
+        """Record the number of rejected displacements while the robot is not monitored."""
         self._refused = self._refused_before = count
 
     def check(

@@ -52,7 +52,7 @@ class PoseGate:
             self.doubted = self.doubted.moved(chord)
 
     def passed(self, seconds: float) -> None:
-        """Note that ``seconds`` of the board's time have passed."""
+        """Record that ``seconds`` of the board's time have passed."""
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
@@ -72,7 +72,7 @@ class PoseGate:
         return confirmed
 
     def believe(self, board: Pose) -> None:
-        """Note that this pose of the board was accepted."""
+        """Record that this pose of the board was accepted."""
         self.proved, self.doubted, self._unproved_s = board, None, 0.0
 
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:

@@ -59,7 +59,7 @@ class FrameSchedule:
         self._imus = self._lost = 0
 
     def hear(self, kind: Kind, skipped: int) -> int:
-        """Note a received frame of this kind; return how many IMU frames were lost before it.
+        """Record a received frame of this kind; return how many IMU frames were lost before it.
 
         ``skipped``: number of bytes right before the frame that were not a frame. IMU frames lost
         before a pose are returned with the frame after the pose. A delta resets the count of lost
@@ -82,7 +82,7 @@ class FrameSchedule:
         return lost
 
     def hear_imus(self, count: int) -> None:
-        """Note that ``count`` IMU frames were received in a row, without other frames or losses."""
+        """Record ``count`` IMU frames in a row, without other frames or losses between them."""
         self._imus += count
         if self._imus >= self._imus_alone:
             self._cycle, self._next = IMU_ONLY, 0

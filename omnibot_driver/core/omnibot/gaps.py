@@ -69,7 +69,7 @@ class InterFrameGaps:
         self._sharp = self._between = 0
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
-        """Note that ``arrived`` bytes were read at ``now``, ``pause_s`` after the last read, in s.
+        """Record that ``arrived`` bytes were read at ``now``, ``pause_s`` s after the last read.
 
         ``place``: position of the first of these bytes among the bytes held.
         """
@@ -92,7 +92,7 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Note that ``arrived`` bytes, read after a pause of ``pause_s``, are complete frames."""
+        """Record that ``arrived`` bytes, read after a pause of ``pause_s``, are complete frames."""
         if self.stands_out(pause_s, arrived):
             self._trust(sharp=True, between=True)
 

@@ -75,7 +75,7 @@ class Sequence:
         """Before a supposed restart: last count and its time in s; after it: the first count."""
 
     def pause(self) -> None:
-        """Note that the board paused: its next count continues the old one, or restarts."""
+        """Record that the board paused: its next count continues the old one, or restarts."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:

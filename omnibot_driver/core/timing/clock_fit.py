@@ -57,7 +57,7 @@ at phases of the 10 ms tick that are 2 ms apart.
 """
 
 Point = tuple[int, float]
-"""A tick, and a time in s that bounds it."""
+"""The number of a tick, and an upper or lower bound of its time, in s."""
 
 
 class ClockFit:

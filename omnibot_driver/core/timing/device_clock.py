@@ -242,7 +242,7 @@ class DeviceClock:
         return short
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
-        """Note a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
+        """Record a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
 
         If another tick was read just before, the new delay replaces that of the other tick, because
         both had waited to be read.

@@ -37,7 +37,7 @@ class Terminal:
         return self._to_sensor > 0
 
     def heard(self, count: int) -> None:
-        """Note ``count`` characters from the host; the public firmware forwards them."""
+        """Record ``count`` characters from the host; the public firmware forwards them."""
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)
 

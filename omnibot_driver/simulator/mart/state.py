@@ -152,7 +152,7 @@ class ServerState:
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
     def sample_reference(self, *, first: bool) -> None:
-        """Note the time of a sample of RM.
+        """Record the time of a sample of RM.
 
         With ``heading_starts_off``, the first sample of RM is integrated over the time since the
         last sample of the previous RM. That time is huge if the clock was set back meanwhile.

@@ -44,14 +44,14 @@ def _states(log: Log) -> Iterator[Finding]:
             else Level.WARN,
             "State",
             f"The board was out of reach {counted(len(lost), 'time')}, first at"
-            f" {lost[0].begin_s:.1f} s. In all: {told}.",
+            f" {lost[0].begin_s:.1f} s. Time in each state: {told}.",
             "If you did not reset it or pull the cable, check cable, hub and the board's power.",
         )
     elif "imu_only" in lengths:
         yield Finding(
             Level.WARN,
             "State",
-            f"The board ran in IMU-only mode. In all: {told}.",
+            f"The board ran in IMU-only mode. Time in each state: {told}.",
             "For odometry set the board's own mode to nominal and reboot it.",
         )
     else:

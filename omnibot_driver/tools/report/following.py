@@ -273,6 +273,6 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
             "Commands",
             f"The robot moved {counted(len(untold), 'time')} without a command, first at"
             f" {untold[0].begin_s:.1f} s.",
-            "If it was not pushed, nor driven by a topic that was not recorded, see"
-            " docs/safety.md.",
+            "Someone may have pushed it, or a topic that is not in the recording may have"
+            " commanded it. Otherwise see docs/safety.md.",
         )

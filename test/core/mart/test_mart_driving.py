@@ -50,7 +50,7 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
 
 @pytest.mark.parametrize("dead_units", [0.0, 2.0, 6.0])
 def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: float) -> None:
-    """The inner wheel turns at 0.01 m/s to 0.02 m/s; most of its units are below the dead zone.
+    """The inner wheel turns at 0.01 m/s to 0.02 m/s; a dead zone uses up most of its motor command.
 
     The last curve leads backward, where the heading is unknown.
     """

@@ -152,7 +152,7 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 
 
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_ends_the_goal() -> None:
-    """The count covers only the copy, so where the robot is now is not known."""
+    """The encoder count covers only the duplicate move, so the robot's position is not known."""
     bench = MartBench().ready()
     first_distance(bench, 2.0)
     (move,) = [data for data in bench.said() if data.startswith(b"TF")]
