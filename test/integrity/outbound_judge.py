@@ -115,7 +115,7 @@ class Judge:
             self.score.frames += frames
 
     def frame(self, frame: ControlFrame, at_s: float) -> str:
-        """Record a control frame that the board understands; return the name of its error, or ""."""
+        """Record a control frame that the board understands; return its error's name, or ""."""
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)
             if not is_motion(frame.mode, frame.values):

@@ -27,7 +27,7 @@ def make(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def no_python(tmp_path: Path) -> str:
-    """Return the path of an interpreter that always fails, like one without ROS packages on PyPI."""
+    """Return the path of an interpreter that always fails, as one without packages on PyPI."""
     interpreter = tmp_path / "python"
     interpreter.write_text("#!/bin/sh\nexit 1\n")
     interpreter.chmod(0o755)

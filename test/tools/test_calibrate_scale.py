@@ -80,7 +80,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """A pause in the commands may have stopped the robot, so the speed with that pause is left out."""
+    """A pause in the commands may have stopped the robot, so the speed before it is left out."""
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
     middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]

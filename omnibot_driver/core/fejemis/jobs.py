@@ -42,7 +42,7 @@ OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
 
 
 def whole_seconds(delay_s: float) -> int:
-    """Return the delay in whole seconds, at least 1, raised until no digits form an ``UNSEEN`` pair."""
+    """Return the delay in whole seconds, at least 1, whose digits form no ``UNSEEN`` pair."""
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
         seconds += 1

@@ -115,8 +115,10 @@ class Jobs:
         """Begin a job.
 
         Raises RequestRefused while another job is under way, and for a download of a log that was
-        not started.
+        not started. The driver's own job, setting the clock, gives way until it is sent.
         """
+        if self.job is Job.TIME and not self._waiting:
+            self._clear()
         if self.job is not None:
             raise RequestRefused(
                 f"a {self.job.value} is under way; wait for its answer, then call again"

@@ -44,7 +44,7 @@ class Marks:
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the index in ``steps`` of the mark step that caused ``off[0]``, a relative error."""
+        """Return the index in ``steps`` of the step that caused ``off[0]``, a relative error."""
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:

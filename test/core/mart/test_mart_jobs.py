@@ -253,6 +253,15 @@ def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     assert bench.job(Job.LOG_FILE).success
 
 
+def test_the_setting_of_the_clock_gives_way_to_the_users_first_job() -> None:
+    """It waits, as a server that has just appeared may not be complete yet."""
+    bench = MartBench()
+    bench.open()
+    bench.run_until(lambda: bench.board.resting, 30.0)
+    bench.board.ask(Job.TIME, None, bench.now, *clock_fields(0.0, may_set_back=True))
+    assert bench.job(Job.BIAS).success
+
+
 def test_the_clock_is_set_while_the_robot_stands() -> None:
     """TIME gets six numbers, in UTC; it is not sent while the robot is driven."""
     bench = MartBench().ready()

@@ -28,7 +28,7 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
 
 
 class Drive:
-    """A board that drives curves for two seconds before a bit changes; its pose starts far from zero."""
+    """A board that drives curves for two seconds before a bit changes, not from the origin."""
 
     def __init__(self, frame: str = "earth") -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)
