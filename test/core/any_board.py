@@ -2,7 +2,7 @@
 
 """Test bench in simulated time: a session with the simulated robot of any board.
 
-The tests of the motion rules use it.
+The tests of the motion rules use this bench.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ TICK_S = 0.01
 
 
 class Robot(Protocol):
-    """The simulated robot at the other end of the line. ``way_m``: its true way forward, in m."""
+    """Interface of the simulated robots. ``way_m``: true distance driven forward, in m."""
 
     @property
     def stands(self) -> bool: ...
@@ -76,9 +76,9 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    late_s: time in s that the robot loses at a start. The controller integrates for 0.5 s before a
-    wheel turns, and the wheel needs as long again to reach its speed. If 1.2 m are commanded (4 s
-    at 0.3 m/s), the robot drives 0.97 m (firmware) or 0.96 m (documented).
+    ``late_s``: driving time that a start costs, in s. The controller integrates for 0.5 s before a
+    wheel turns, and the wheel then takes another 0.5 s to reach its speed. For a command of 0.3 m/s
+    for 4 s (1.2 m) the robot drives 0.97 m ("firmware") or 0.96 m ("documented").
     """
 
     late_s = 0.75
@@ -111,7 +111,7 @@ def lois_ecu(firmware: str) -> tuple[Board, Any]:
 
 
 class MartRobot:
-    """The simulated MART controller; it makes five ticks in one tick of the bench."""
+    """The simulated MART controller, which makes five ticks in each tick of the bench."""
 
     def __init__(self, firmware: Any) -> None:
         from omnibot_driver.simulator.mart import QUIRKS, MartSettings, SimulatedMart
@@ -141,7 +141,7 @@ def mart(firmware: str) -> tuple[Board, Any]:
 
 
 class FejemisRobot:
-    """The simulated Fejemis; it makes five ticks in one tick of the bench."""
+    """The simulated Fejemis, which makes five ticks in each tick of the bench."""
 
     def __init__(self, sums: bool) -> None:
         from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
@@ -181,16 +181,19 @@ MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }
-"""Functions by name; each makes a new board and its simulated robot."""
+"""Functions by board name; each function makes a new board and its simulated robot."""
 CORE = Path(core.__file__).parent
 BOARDS = [
     name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
 ]
-"""Names of the installed boards: the folder of a board can be removed."""
+"""Names of the boards to test, without the boards whose folders have been removed."""
 
 
 class AnyBench:
-    """A session and a robot. ``hears``: the robot receives data. ``speaks``: it sends data."""
+    """A session connected to a robot.
+
+    ``hears``: the robot receives data; ``speaks``: it sends data.
+    """
 
     def __init__(self, board: Board, robot: Robot) -> None:
         self.robot = robot
@@ -231,7 +234,8 @@ class AnyBench:
             self.settle()
 
     def stall(self, seconds: float) -> None:
-        """Stall the process for a time, then read at once all that has arrived meanwhile."""
+        """Stall the process for ``seconds``, then read at once all data that arrived during the
+        stall."""
         waiting: list[Packet] = []
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S

@@ -31,7 +31,7 @@ def by_velocity(bench: Bench, command: Triple) -> None:
 
 
 def by_wheels(bench: Bench, command: Triple) -> None:
-    """Command the wheel rates that correspond to a twist."""
+    """Command the wheel rates that correspond to the twist ``command``."""
     x, y, yaw = command
     along_x, along_y, turn = math.cos(math.radians(30)) * x, y / 2, 0.143 * yaw
     bench.turn_wheels(
@@ -42,10 +42,8 @@ def by_wheels(bench: Bench, command: Triple) -> None:
 
 
 def goes_astray(bench: Bench, command: Triple) -> bool:
-    """Return whether the robot's twist leaves the range between rest and the command.
-
-    The twist leaves the range at a distance of 0.05 m/s or 0.15 rad/s from it.
-    """
+    """Return whether the twist is 0.05 m/s or 0.15 rad/s outside the range from rest to the
+    command."""
     truth, (x, y, yaw) = bench.board.truth, command
     square = x * x + y * y
     part = (truth.vx_mps * x + truth.vy_mps * y) / square if square else 0.0
@@ -58,7 +56,8 @@ def goes_astray(bench: Bench, command: Triple) -> bool:
 def stopped_after_s(
     bench: Bench, command: Triple, by: Callable[[Bench, Triple], None] = by_velocity
 ) -> float:
-    """Return the board time from the first deviating tick until Stop is written, in s."""
+    """Command the robot; return the board time from its first deviation until Stop is written, in
+    s."""
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick
     while bench.now < begun + 3.0:
@@ -73,9 +72,9 @@ def stopped_after_s(
 
 
 def on_the_wrong_switch(frame: str, delta_period_s: float = 0.04) -> Bench:
-    """Return a bench whose board is on position control, with the driver set to velocity.
+    """Return a bench with the board's switch on position and the driver set to velocity.
 
-    The robot has been driven 3 m from its origin.
+    The board's pose is 3 m from its origin.
     """
     board = BoardSettings(
         running=True,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots that drive on a line that loses frames, until their odometry is right again."""
+"""Drives on a line that loses frames, for tests of the odometry."""
 
 from itertools import pairwise
 
@@ -14,12 +14,13 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""Rounding errors of the deltas since the last pose, in m and rad."""
+"""Largest sum of the rounding errors of the deltas since the last pose, in m and in rad."""
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 
 
 def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "earth") -> Line:
-    """Return a line after two seconds of driving; the board had a pose before."""
+    """Return a line after about two seconds of driving, on a board whose first pose was not zero.
+    """
     board = BoardSettings(seed=seed, frame=frame, running=True, initial_pose=DRIVEN)
     found = Line(board, settings_, seed=seed)
     found.run(2.0 + seed % 5 * PERIOD_S)
@@ -27,7 +28,7 @@ def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "ear
 
 
 def lose(on: Line, seconds: float, *headers: bytes) -> None:
-    """Lose all bytes for ``seconds``, or only frames with the given headers."""
+    """Lose the frames with the given headers for ``seconds``; without headers, lose all frames."""
     on.loses = lambda data, _now: not headers or data[:2] in headers
     on.run(seconds)
     on.loses = loses_nothing
@@ -39,7 +40,7 @@ def settled(on: Line) -> bool:
 
 
 def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Return time difference in s, and difference of poses, of consecutive estimates."""
+    """Return the time step in s and the pose step between consecutive estimates."""
     return [
         (after.stamp_s - before.stamp_s, after.pose - before.pose)
         for before, after in pairwise(estimates)
@@ -47,7 +48,7 @@ def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
 
 
 def attached(settings_: OdometrySettings | None = None) -> Odometry:
-    """Return odometry that has received two poses of a board that is at its origin."""
+    """Return odometry that has received the pose (0, 0, 0) of its board twice."""
     odometry = Odometry(settings_ or OdometrySettings())
     odometry.settle(PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.0, 0.0, 0.0))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated robot, a line that loses frames, and the odometry that receives the others."""
+"""A simulated robot, a line that loses frames, and odometry from the remaining frames."""
 
 import math
 from collections.abc import Callable
@@ -24,7 +24,10 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 
 
 class Line:
-    """A simulated board and odometry; ``loses`` decides by bytes and time which frames are lost."""
+    """A simulated board and odometry.
+
+    ``loses`` decides by a frame's bytes and time if it is lost.
+    """
 
     def __init__(
         self,
@@ -49,7 +52,7 @@ class Line:
         self._speeds = [random.uniform(0.4, 1.6) for _ in range(3)]
 
     def run(self, seconds: float) -> list[OdometryEstimate]:
-        """Run the drive and return the events in order."""
+        """Drive for ``seconds`` and return the new estimates in order."""
         begun = len(self.estimates)
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
@@ -92,12 +95,13 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether commands are sent: a paused board could take a byte of a command for a letter."""
+        """Whether the board is driven; a paused board could take a byte of a command for a letter.
+        """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property
     def error(self) -> Pose:
-        """Difference between odom at its last displacement and the board's own pose."""
+        """Difference of the newest odom pose from the board's own pose."""
         wanted = self.attached.way_to(self.told)
         got = self.estimates[-1].pose
         off = got - wanted

@@ -25,7 +25,7 @@ GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
 
 
 def running(**options: object) -> Bench:
-    """Return a bench with a running board at rest, after the driver has stopped sending."""
+    """Return a bench with a running board at rest, to which the driver no longer sends Stop."""
     bench = Bench(BoardSettings(running=True), **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -39,7 +39,8 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return words and time of each mode 1 frame (base velocity) and Stop written since a mark."""
+    """Return time and words of each Stop and each mode 1 frame (base velocity) written since
+    ``mark``."""
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -49,7 +50,8 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """A base command after wheel commands sends Stop first, then the newest base command."""
+    """When a base command follows wheel commands, Stop is sent first, then the newest base command.
+    """
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)
@@ -70,7 +72,7 @@ def notices(bench: Bench) -> list[str]:
 
 
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
-    """The sideways part neither moves the robot nor slows it down, and NaN in it refuses all."""
+    """The sideways speed is set to zero and the forward speed is kept; NaN sideways is refused."""
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
     bench.session.configure(settings, bench.now)
@@ -88,7 +90,7 @@ def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> N
 
 
 def test_a_velocity_out_of_the_plane_is_said_once(bench: Bench) -> None:
-    """The driver obeys the rest of the command."""
+    """linear.z, angular.x and angular.y are set to zero, and the rest of the command is obeyed."""
     for _ in range(2):
         bench.session.command_twist(BodyTwist(0.4, 0.0, 0.0), bench.now, planar=False)
         bench.settle()
@@ -109,7 +111,7 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """At 1 m/s² a step to 0.3 and 0.4 m/s takes 0.5 s; words are 70 LSB per m/s."""
+    """At 1 m/s² a step to (0.3, 0.4) m/s takes 0.5 s; 1 m/s is 70 LSB on the wire."""
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):
@@ -127,7 +129,8 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """Each new command continues the step that is under way; an order is sent every 18 ms."""
+    """Each new command continues the ramp of the command before it; a set point is due every 18 ms.
+    """
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)
@@ -159,7 +162,7 @@ def test_a_reversal_is_ramped_through_zero() -> None:
 
 
 def test_turning_is_ramped_by_its_own_limit() -> None:
-    """At 2 rad/s² a step to 0.5 rad/s takes 0.25 s."""
+    """At 2 rad/s² a step of the yaw rate to 0.5 rad/s takes 0.25 s."""
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.drive(0.0, 0.0, 0.5)
@@ -218,7 +221,7 @@ def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
 
 
 def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
-    """The sender's clock is a little ahead; the command still expires 0.5 s after its arrival."""
+    """If the sender's clock is slightly ahead, a command still expires 0.5 s after its arrival."""
     bench.drive(0.3, age_s=-0.3)
     bench.run(0.49)
     assert bench.written[-1][1] != STOP
@@ -230,7 +233,7 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """The command before a refused one expires as usual."""
+    """A refused command does not prolong the command before it, which expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

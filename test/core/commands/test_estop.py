@@ -21,7 +21,7 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """Motion stops, and nothing but the manual's E-stop is sent while it is latched."""
+    """The robot stops, commands are refused, and only the e-stop followed by Stop is sent."""
     bench.drive(0.5)
     bench.run(0.1)
     start = len(bench.written)
@@ -38,7 +38,7 @@ def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
 
 
 def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> None:
-    """Only a release ends the e-stop, and the robot then waits for a newer command."""
+    """Only a release ends the e-stop; after the release the robot waits for a newer command."""
     bench.session.estop(True, bench.now)
     bench.settle()
     bench.close()
@@ -63,7 +63,8 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """The e-stop is latched while the port is closed, and the answer to the request says so."""
+    """An e-stop latched on a closed port is answered with a warning and sent when the port opens.
+    """
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
@@ -76,7 +77,7 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_nothing(
     bench: Bench,
 ) -> None:
-    """A hundred commands are refused under the latch, and the release moves nothing."""
+    """The latched e-stop refuses a hundred commands, and its release does not move the robot."""
     estop(bench, True)
     for _ in range(100):
         with pytest.raises(CommandRefused, match="e-stop"):
@@ -90,7 +91,8 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """A board that stays at rest for 1 s although commanded is reported once; a reset helps."""
+    """If a robot ignores commands for 1 s after a release, one notice advises ~/reset, which helps.
+    """
     bench = driving(estop_latches=True)
     estop(bench, True)
     bench.run(1.0)
@@ -119,7 +121,8 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
 
 
 def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
-    """Repeated requests to latch or release the e-stop are not reported again."""
+    """Only the first request to latch the e-stop and the first request to release it are reported.
+    """
     for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
         bench.session.estop(active, bench.now, by=by)
         bench.settle()
@@ -127,7 +130,8 @@ def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) ->
 
 
 def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
-    """The answer warns if data from the board has been missing for a while before the e-stop."""
+    """The answer warns if no data has arrived from the board for 2 s, or if the port is not open.
+    """
     assert estop(bench, True) == "e-stop latched"
     bench.speaks = False
     bench.run(2.0)

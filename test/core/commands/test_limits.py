@@ -25,7 +25,7 @@ ULPS = 1 + 1e-11
 
 
 def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
-    """Return whether two vectors have one direction, to nine digits; zero fits any other."""
+    """Return whether two vectors point the same way, to nine digits; zero fits any direction."""
     largest_a, largest_b = max(map(abs, a)), max(map(abs, b))
     if largest_a < 1e-290 or largest_b < 1e-290:
         return True
@@ -53,7 +53,7 @@ def test_a_shortened_vector_keeps_its_direction_and_the_limit(
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3), limits)
 def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: float) -> None:
-    """A vector within the limit is returned equal bit for bit; only a longer one is shortened."""
+    """A vector within the limit is returned bit for bit; a longer one is shortened to the limit."""
     length = math.hypot(*vector)
     if length <= limit / ULPS:
         assert shorten(vector, limit) == tuple(vector)
@@ -64,7 +64,7 @@ def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: 
 @given(vectors, limits)
 @example([1e308, -1e308], 17.0)
 def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit: float) -> None:
-    """The wheel that exceeds the limit most sets the common factor for all wheels."""
+    """All wheels are slowed by one factor, set by the wheel that exceeds the limit most."""
     slowed = slow(values, limit)
     assert max(map(abs, slowed)) <= limit * ULPS
     assert limit == 0 or same_direction(slowed, values)
@@ -84,7 +84,7 @@ def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: Bo
 
 @given(any_twists)
 def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
-    """A twist within all limits is returned unchanged; any other is reduced to a limit."""
+    """A twist that ``allow`` accepts is returned unchanged; any other twist exceeds a limit."""
     limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
     if limits.allow(twist):
         limited = limits.twist(twist)
@@ -97,7 +97,7 @@ def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
-    """Infinity and NaN are rejected even if all limits are off."""
+    """A twist with infinity or NaN is rejected even if all limits are off."""
     values = [0.0, 0.1, -0.1]
     values[place] = bad
     none = SpeedLimits(linear_mps=math.inf, angular_radps=math.inf)
@@ -106,20 +106,20 @@ def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
 
 
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
-    """3 and 4 m/s become 0.3 and 0.4, not 0.5 and 0.5; the yaw rate is limited separately."""
+    """(3, -4) m/s becomes (0.3, -0.4), not (0.5, -0.5); the yaw rate is limited separately."""
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
     found = (limited.vx_mps, limited.vy_mps, limited.yaw_rate_radps)
     assert found == pytest.approx((0.3, -0.4, 0.1))
 
 
 def test_wheels_are_limited_by_the_fastest() -> None:
-    """At a limit of 17 rad/s, a command of 34 rad/s halves all three."""
+    """At a limit of 17 rad/s, a command of 34 rad/s for one wheel halves the rates of all three."""
     limited = SpeedLimits(wheel_radps=17.0).wheels((34.0, -17.0, 1.0))
     assert limited == pytest.approx((17.0, -8.5, 0.5))
 
 
 def test_a_limit_of_zero_lets_nothing_through() -> None:
-    """The limit holds for linear velocity, yaw rate and wheels."""
+    """A limit of zero makes linear velocity, yaw rate and wheel rates zero."""
     none = SpeedLimits(linear_mps=0.0, angular_radps=0.0, wheel_radps=0.0)
     assert none.twist(BodyTwist(1.0, -1.0, 1.0)) == BodyTwist(0.0, 0.0, 0.0)
     assert none.wheels((1.0, -2.0, 3.0)) == (0.0, 0.0, 0.0)
@@ -128,7 +128,7 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
-    """The infinity or NaN may be in any position; the message says what to fix."""
+    """Infinity and NaN are refused in any position, with a message that names ``cmd_vel``."""
     values = [0.0, 1e308, -1.0]
     values[place] = bad
     with pytest.raises(CommandRefused, match=r"cmd_vel.*NaN or infinity"):
@@ -164,14 +164,14 @@ def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
 
 
 def test_an_acceleration_of_zero_is_not_a_limit() -> None:
-    """The value 0 switches the limit off."""
+    """An acceleration limit of 0 is switched off."""
     wanted = BodyTwist(0.5, -0.5, 0.5)
     assert SpeedLimits().approach(BodyTwist(-0.5, 0.5, -0.5), wanted, 0.0) == wanted
 
 
 @pytest.mark.parametrize("age_s", [0.0, 0.5, -0.5])
 def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
-    """A stamp slightly in the future, within the same limit, is accepted as well."""
+    """With a timeout of 0.5 s, a stamp may be up to 0.5 s old or up to 0.5 s in the future."""
     require_timely("cmd_vel", age_s, 0.5)
 
 
@@ -181,6 +181,7 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """The refusal of a stamped command contains its age, and says which clocks to check."""
+    """The refusal of a stamped command states the age of the stamp and suggests a check of the
+    clocks."""
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Rules by which a robot that did not move as commanded may move again."""
+"""The motion interlock: when a robot may move again after the motion monitor has tripped."""
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
 
@@ -8,7 +8,7 @@ TIMEOUT_S = 0.5
 
 
 def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> bool:
-    """Return whether the interlock accepts a command."""
+    """Return whether the interlock accepts a command at ``now``. ``stands``: a zero command."""
     return not interlock.arrive(now, TIMEOUT_S, stands=stands)
 
 
@@ -20,7 +20,8 @@ def test_motion_is_allowed_until_something_trips() -> None:
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """Each refused command restarts the silence that ends the refusal."""
+    """The refusal ends after a timeout without commands; each refused command restarts the timeout.
+    """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -29,7 +30,7 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """The silence is counted from the last command, not from the trip."""
+    """The refusal ends one timeout after the last command, not one timeout after the trip."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -37,7 +38,7 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """The zero command itself is accepted, and motion is allowed after it."""
+    """A zero command after a trip is accepted, and so is a motion command after it."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -46,7 +47,7 @@ def test_a_zero_command_ends_the_refusal() -> None:
 
 
 def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
-    """Zero commands are still accepted."""
+    """After the second trip, motion is refused until ~/start, but zero commands are accepted."""
     interlock = MotionInterlock()
     interlock.trip(0.0)
     arrives(interlock, 1.0, stands=True)
@@ -60,7 +61,8 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A trip more than a minute after the last one, or after ~/start, counts as a first one."""
+    """A trip counts as a first one if it comes more than a minute after the last trip or after
+    ~/start."""
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)
@@ -72,7 +74,8 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """Release ends the refusal after a second trip; a release before that trip has no effect."""
+    """A release of the e-stop ends the refusal after the second trip, but not after the first trip.
+    """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The motion rule: only a fresh command moves the robot, and only while its data arrives."""
+"""The motion rule: only a fresh command moves the robot, and only while data from the board
+arrives."""
 
 import contextlib
 from collections.abc import Callable
@@ -20,7 +21,7 @@ def bench() -> Bench:
 
 
 def unpause(bench: Bench) -> None:
-    """Pause the board from outside, and resume it before the driver notices."""
+    """Let another program pause the board and resume it before the driver notices."""
     bench.board.receive(b"P")
     bench.run(0.02)
     bench.board.receive(b"P")
@@ -43,7 +44,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """A command from before the interruption stays discarded, whatever the board did with it."""
+    """A command from before the interruption never moves the robot again."""
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)
@@ -58,7 +59,8 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """The board boots and starts within a moment, and its boot notice is lost on the line."""
+    """The board restarts while its data is lost on the line, so only its counters show the restart.
+    """
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -77,7 +79,8 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The command expires before the board has booted; a motion frame may contain an S."""
+    """Commands end before the board has booted: an S inside a motion frame would start the board.
+    """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -92,7 +95,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """No motion follows even if the board misses the request and drives on."""
+    """After a request to pause or reset, no motion frame is sent, even if the board drives on."""
     bench.drive(0.4)
     start = len(bench.written)
     bench.hears = False
@@ -120,7 +123,7 @@ def test_motion_is_refused_without_a_port() -> None:
 
 
 def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
-    """After the timeout, Stop is sent for 1 s; then nothing is sent."""
+    """After the command timeout, Stop is sent for 1 s; then nothing is sent."""
     bench.drive(0.5)
     bench.run(0.4)
     assert not bench.still()
@@ -154,7 +157,8 @@ def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(ben
 
 
 def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
-    """The board may still receive, although it is silent."""
+    """A zero command is sent as Stop even to a silent board, because the board may still receive.
+    """
     bench.speaks = False
     bench.run(1.45)
     start = len(bench.written)
@@ -191,7 +195,7 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """After a stall of the driver the last command is not repeated, and no notice comes."""
+    """After a stall of the driver, the last command is not repeated and nothing is reported."""
     bench.drive(vx=0.3)
     bench.run(0.2)
     mark = len(bench.written)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Scales of the board that change while the robot drives: the current command is converted."""
+"""Changes of the board's scales while the robot drives: the current command is converted."""
 
 from robots import driving
 from session_bench import STOP, Bench, bare
@@ -17,7 +17,8 @@ def last(bench: Bench) -> bytes:
 
 
 def going_to(x_m: float) -> Bench:
-    """Return a board with its switch on position control, driving to a goal ahead."""
+    """Return a bench whose robot drives to a goal ``x_m`` ahead, with its switch on position
+    control."""
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()
     bench.run_until_state("nominal")
@@ -27,7 +28,7 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """0.4 m/s is 28 LSB at 70 LSB per m/s, and 40 LSB at 100; the user need not command again."""
+    """0.4 m/s is 28 LSB at 70 LSB per m/s and 40 LSB at 100; no new command is needed."""
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)
@@ -88,7 +89,8 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """Zeros in mode 1 have another meaning than Stop."""
+    """A speed that the new scale rounds to 0 is sent as Stop; zeros in mode 1 have another meaning.
+    """
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Goals through a session to a simulated board whose switch is set to position control."""
+"""Goals sent through a session to a simulated board whose switch is set to position control."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ ORIGIN = BoardPose()
 def at_position_control(
     initial_pose: BoardPose = ORIGIN, *, imu_only: bool = False, **options: object
 ) -> Bench:
-    """Return a running board with its switch on position; the driver knows the board's pose."""
+    """Return a bench with a running board whose switch is on position control."""
     settings = BoardSettings(
         running=True, control="position", initial_pose=initial_pose, imu_only=imu_only
     )
@@ -48,7 +48,7 @@ def words(bench: Bench) -> list[int]:
 
 
 def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench: Bench) -> None:
-    """The goal is 1 m, -0.5 m and a quarter turn; the board does not acknowledge goals."""
+    """A goal is sent at once and then repeated, because the board does not acknowledge goals."""
     start = len(bench.written)
     bench.go_to(1.0, -0.5, 1.571)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 03 E8 FE 0C 06 23")
@@ -64,7 +64,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
     heading: float, signs: tuple[int, int, int]
 ) -> None:
-    """The driver connects late to a turned robot; the board's axes may be mirrored."""
+    """At the connection the board's pose is not zero; the board's axes may be mirrored."""
     bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
     bench.go_to(0.8, 0.4, 0.9)
     bench.run(8.0)
@@ -76,7 +76,7 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
-    """The board's heading is not wrapped; a goal never turns it back by full turns."""
+    """The board's heading is not wrapped, and a goal never turns the robot back by full turns."""
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
     bench.go_to(0.0, 0.0, 0.4)
@@ -90,7 +90,7 @@ def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(tur
 
 
 def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) -> None:
-    """The driver refuses a goal beyond 16-bit words, instead of sending a different goal."""
+    """A goal beyond the range of 16-bit words is refused, and the previous goal stays active."""
     bench.go_to(0.2, 0.0, 0.0)
     for x in (33.0, 1e300, -1.7e308):
         with pytest.raises(CommandRefused, match="the limits are"):
@@ -108,7 +108,8 @@ def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
 
 
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
-    """The board would take 0.3 m/s for a place 21 mm from its origin."""
+    """With its switch on position, the board would take 0.3 m/s for a goal 21 mm from its origin.
+    """
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
         with pytest.raises(CommandRefused, match="`control_method` is 'position'"):
@@ -117,7 +118,7 @@ def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench
 
 
 def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
-    """The board would take a goal at 1 m for a velocity of 14 m/s."""
+    """With its switch on velocity, the board would take a goal at 1 m for a velocity of 14 m/s."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(1.5)
@@ -136,7 +137,8 @@ def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str,
 
 
 def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
-    """Motion that was lost on the line puts odom and the board's frame off by the same amount."""
+    """A displacement lost on the line does not change the conversion from odom to the board's
+    frame."""
     bench.go_to(1.0, 0.0, 0.0)
     bench.run(0.5)
     bench.speaks = False
@@ -171,7 +173,8 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The robot rests until a newer goal, which is converted with the new board frame."""
+    """After the event the robot rests until a newer goal, which is converted to the board's new
+    frame."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -189,7 +192,8 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """With the switch on position, zeros in mode 1 would mean: drive to the origin."""
+    """A halt on the way to a goal sends Stop; zeros in mode 1 would send the robot to its origin.
+    """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)
@@ -204,7 +208,7 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 def test_a_robot_that_drives_away_from_its_goal_is_stopped(
     goal: tuple[float, float, float],
 ) -> None:
-    """The board's switch is on velocity, although the parameter says position."""
+    """The board's switch is on velocity, although the driver's parameter says position."""
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()
     bench.run(1.5)

@@ -15,7 +15,8 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """The e-stop is sent twice on a new connection, even if it was sent just before."""
+    """On a new connection the e-stop is sent twice, even if it was sent just before the connection.
+    """
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -23,7 +24,8 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """Neither the Stop between two authorities nor the newer command is sent."""
+    """A latched e-stop cancels the Stop and the command that were due after a change of authority.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -33,7 +35,8 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """Stop follows for firmware that ignores mode 10; the first time both frames are sent twice."""
+    """Each e-stop is followed by Stop, for firmware that ignores mode 10; the first pair is sent
+    twice."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
@@ -46,7 +49,7 @@ def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stre
 def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
     stream: Stream,
 ) -> None:
-    """Letters are written at 50 Hz, and the stop is still repeated at 20 Hz."""
+    """While letters are written at 50 Hz, the e-stop is still repeated at 20 Hz."""
     stream.latch(1.0)
     written = 0
     for step in range(1000):
@@ -58,7 +61,8 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A button node may publish at any rate, but other data needs room on the line."""
+    """A node may request e-stops at any rate; only 20 a second are sent, to leave room on the line.
+    """
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
@@ -79,7 +83,7 @@ def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stre
 
 
 def test_a_release_without_a_latch_does_nothing(stream: Stream) -> None:
-    """Releasing twice must not stop a robot that drives again."""
+    """A release without a latched e-stop must not stop a robot that drives."""
     order(stream, GO, 1.0)
     stream.release(1.0)
     assert stream.write(1.0) == GO

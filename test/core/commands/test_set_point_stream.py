@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pacing, repeating and timing out of set points, with arbitrary bytes as frames."""
+"""Pacing, repetition and timeout of set points whose frames are arbitrary bytes."""
 
 import math
 from typing import Any
@@ -21,7 +21,7 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """A test motion whose frame changes at each tick, for a given number of frames."""
+    """A test motion whose frame differs each time, for a given number of frames."""
 
     authority, is_zero = Authority.BASE, False
 
@@ -46,13 +46,14 @@ def stream() -> Stream:
 
 
 def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> None:
-    """The command does not wait for a timer."""
+    """On an idle line a command is sent at once, without waiting for a timer."""
     order(stream, GO, 1.0)
     assert stream.write(1.0) == GO
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """Each additional frame adds bytes that the line can corrupt."""
+    """Only the newest command is sent, because each additional frame adds bytes that may be
+    corrupted."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
@@ -75,7 +76,8 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """Stop is repeated 20 times a second, for 1 s to 5 s; then the line is quiet."""
+    """Stop is repeated 20 times a second for 1 s if the robot is seen at rest, otherwise for 5 s.
+    """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
     stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
@@ -116,7 +118,7 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """The zeros that precede the letter may have completed a frame that was cut."""
+    """The zeros before a letter may complete a cut frame, so the current command is sent again."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.actuator.wrote(packed(b"S"), 1.02)
@@ -124,7 +126,7 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 
 
 def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
-    """After the first Stop, a thousand further requests a second would only fill the line."""
+    """Of a thousand Stop requests in a second, only about a hundred are sent."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
@@ -136,7 +138,7 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """When the motion stops changing, its frame is repeated at the command rate."""
+    """Each new frame of a changing motion is sent 18 ms after the previous frame."""
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
     assert [frame[-1] for _, frame in written] == [3, 2, 1, 0]
@@ -144,7 +146,7 @@ def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
 
 
 def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream) -> None:
-    """Stop is sent at once, the new command one control tick later."""
+    """Stop is sent at once, and the command of the new authority one control tick later."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -154,7 +156,7 @@ def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
     stream: Stream,
 ) -> None:
-    """One Stop precedes the newest command; the command in between is never written."""
+    """One Stop precedes the newest of three commands; the command in between is never written."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -168,7 +170,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """Stop has already been sent when the first authority's command expired."""
+    """No Stop is added, because one was sent when the command of the first authority expired."""
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
     order(stream, TURN, 1.62, Authority.WHEELS)
@@ -178,7 +180,8 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
     stream: Stream,
 ) -> None:
-    """A second Stop between two authorities would only delay the new command."""
+    """If Stop has just been sent, a second Stop between two authorities would only cause a delay.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)
@@ -188,7 +191,7 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """A Stop that was due at once, and its repetition, are discarded as well."""
+    """When a command is discarded, the Stop that was due and its repetitions are discarded too."""
     order(stream, GO, 1.0)
     stream.halt(1.0)
     stream.discard(1.0)
@@ -197,7 +200,8 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """After a long stall of the process, commands from before the stall have no effect."""
+    """After a long stall of the process, Stop is sent instead of the command from before the stall.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(60.0) == STOP

@@ -17,14 +17,14 @@ def bench() -> Bench:
 
 
 def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
-    """The frame is the manual's: 0.3 m/s is 21 LSB, -0.2 m/s is -14 LSB, 0.5 rad/s is 250 LSB."""
+    """0.3 m/s is sent as 21 LSB, -0.2 m/s as -14 LSB and 0.5 rad/s as 250 LSB."""
     start = len(bench.written)
     bench.drive(0.3, -0.2, 0.5)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 15 FF F2 00 FA")
 
 
 def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
-    """10 rad/s at a radius of 29 mm is 20.3 LSB; a limit scales all wheels equally."""
+    """10 rad/s at a radius of 29 mm is 20.3 LSB; a limit scales all wheels by one factor."""
     start = len(bench.written)
     bench.session.command_wheels((10.0, -10.0, 0.0), bench.now)
     bench.settle()
@@ -37,7 +37,8 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 
 
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
-    """With the switch on position control, zeros in mode 1 mean: drive to the origin."""
+    """A zero twist is sent as Stop; on position control, zeros in mode 1 mean: drive to the origin.
+    """
     bench.drive(0.3)
     start = len(bench.written)
     bench.drive()
@@ -59,7 +60,8 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """The refusal of another number of wheel rates contains that number."""
+    """A wheel command without exactly three rates is refused; the refusal states the number given.
+    """
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)

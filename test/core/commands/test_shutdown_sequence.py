@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The last bytes before the port is closed: the robot is stopped, then paused or reset if asked."""
+"""The last bytes before the port is closed: Stop, then the letters for a pause or reset if set."""
 
 import pytest
 from robots import driving, paused, standing
@@ -21,7 +21,7 @@ def bench() -> Bench:
 def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
-    """Stop is written first, three times, before the letters for pause or reset."""
+    """At shutdown, Stop is written three times before the letters for a pause or a reset."""
     assert bench.last_words(on_exit) == 3 * STOP + expected
 
 
@@ -32,7 +32,7 @@ def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """P has been sent but not confirmed yet; a second P alone would undo it."""
+    """At the shutdown a P is sent but not confirmed; a second P alone would resume the board."""
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
     bench.speaks = False
@@ -47,7 +47,8 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """The last notice says paused, but the letter S, which starts the board, is on its way."""
+    """At the shutdown the last notice says paused, but an S, which starts the board, is on its way.
+    """
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -64,7 +65,7 @@ def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
 
 
 def left(bench: Bench) -> None:
-    """Shut down as the link does: wait until the robot is seen at rest."""
+    """Begin the shutdown and wait until the robot is seen at rest, as the link does."""
     bench.session.shutdown.begin(bench.now)
     bench.settle()
     while not bench.session.shutdown.stands:
@@ -72,7 +73,7 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """During the wait nothing is sent, because damage on the line could make it a motion."""
+    """The final wait is silent, because damage on the line could turn any frame into a motion."""
     bench = driving()
     left(bench)
     assert bench.session.shutdown.fall_silent(bench.now)
@@ -96,7 +97,8 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """A paused board does not send displacements, but its motors are off."""
+    """A paused board sends no displacements, but its motors are off, so the shutdown does not wait.
+    """
     bench = paused()
     left(bench)
     assert not bench.session.shutdown.fall_silent(bench.now)

@@ -27,7 +27,7 @@ def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> Dis
 
 
 def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
-    """Return whether displacements at these speeds, every 40 ms from 0.1 s on, prove rest."""
+    """Return whether rest is proved by displacements at ``speeds``, one every 40 ms."""
     for number, speed in enumerate(speeds):
         proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
     return proof.proved
@@ -41,13 +41,14 @@ def proof() -> StopProof:
 
 
 def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof) -> None:
-    """Three displacements of zero take 0.12 s; two are not enough."""
+    """Three displacements of zero, which take 0.12 s, prove rest; two are not enough."""
     assert not shown(proof, 0.0, 0.0)
     assert shown(proof, 0.0, 0.0, 0.0)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """With displacements every 0.4 s, the first one after Stop may still contain motion."""
+    """With displacements every 0.4 s, the first one after Stop may contain motion from before it.
+    """
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
     proof.look(rare, 10.3)
@@ -61,7 +62,7 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
 
 
 def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopProof) -> None:
-    """Boards with a ``delta_period`` of 0.1 s may send such long displacements."""
+    """A single displacement after Stop does not prove rest, even if it covers 0.1 s."""
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
     assert not proof.proved
@@ -70,7 +71,8 @@ def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopPro
 
 
 def test_without_stop_standing_still_proves_nothing() -> None:
-    """Without a Stop, an earlier command may still be on its way to the wheels."""
+    """Without a Stop, displacements of zero prove nothing: a command may be on its way to the
+    wheels."""
     assert not shown(StopProof(), *[0.0] * 50)
 
 
@@ -90,7 +92,7 @@ def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopP
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """Neither a new connection nor Stop replaces the proof that the robot is at rest."""
+    """Neither a new connection nor a Stop replaces the proof that a driven robot is at rest."""
     assert not proof.owed
     proof.moved()
     proof.stopped(10.0)
@@ -105,14 +107,15 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """A robot at rest that is then pushed is not proved to be at rest."""
+    """A displacement above the rest thresholds ends a proof that the robot is at rest."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved
 
 
 def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) -> None:
-    """The first displacement after a pause includes all motion since the pause began."""
+    """A displacement of unknown duration, such as the first one after a pause, does not prove rest.
+    """
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
         proof.look(unknown, 10.1 + number * PERIOD_S)
@@ -133,7 +136,7 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """Displacements of one flickering encoder count are regarded as rest."""
+    """Four displacements below the rest thresholds prove rest, whatever came before."""
     proof = StopProof()
     proof.stopped(10.0)
     shown(proof, *before)
@@ -143,7 +146,7 @@ def test_whatever_came_before_standing_for_long_enough_proves_it(
 
 
 def without_deltas(bench: Bench) -> None:
-    """Lose all delta frames from now on; IMU frames and poses still arrive."""
+    """Discard all delta frames from now on; IMU frames and poses still arrive."""
     step = bench.board.step
 
     def heard() -> bytes:
@@ -155,7 +158,7 @@ def without_deltas(bench: Bench) -> None:
 
 
 def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it() -> None:
-    """All odometry frames are lost, so the log only says that the stop is not confirmed."""
+    """If all odometry frames are lost, the log only says that the stop is not confirmed."""
     bench = driving()
     without_deltas(bench)
     bench.run(8.0)
@@ -165,7 +168,8 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
-    """The board misses Stop and drives on; the motion monitor, which may notice it, is off."""
+    """The board misses Stop and drives on; the motion monitor, which would report it too, is off.
+    """
     bench = driving()
     bench.configure(motion_monitor=False)
     bench.hears = False

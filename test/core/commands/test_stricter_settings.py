@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Limits and timeout that change while the robot drives."""
+"""Speed limits and a command timeout that change while the robot drives."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,7 @@ DRIVES = Bench.drive, (0.4,)
 def test_what_was_commanded_under_looser_ones_ends(
     command: Callable[..., None], values: tuple[float, ...], changed: dict[str, object]
 ) -> None:
-    """A stricter setting sends Stop at once, with a message; the next command is accepted."""
+    """When a limit or the timeout becomes stricter, Stop is sent; the next command is accepted."""
     bench = driving()
     command(bench, *values)
     bench.run(0.05)
@@ -54,7 +54,7 @@ def test_what_was_commanded_under_looser_ones_ends(
     ],
 )
 def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
-    """The robot also continues after a change of accelerations and rates."""
+    """A looser limit or timeout, a new acceleration or a new rate does not stop the robot."""
     bench = driving()
     start = len(bench.written)
     bench.drive(0.4)
@@ -65,7 +65,7 @@ def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
 
 
 def test_a_robot_that_stands_is_told_nothing() -> None:
-    """A robot without a command, or with a zero command, does not cause a notice."""
+    """A stricter setting causes no notice if the robot has no command or a zero command."""
     bench = driving()
     bench.drive()
     bench.configure(limits=SpeedLimits(linear_mps=0.1))

@@ -40,7 +40,8 @@ def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() ->
 
 
 def test_about_a_wheel_that_stands() -> None:
-    """The right wheel is at rest, the left at 0.4 m/s: yaw rate -1 rad/s, speed 0.2 m/s."""
+    """If the right wheel is at rest and the left at 0.4 m/s, the robot turns at -1 rad/s, at 0.2
+    m/s."""
     assert triple(ROBOT.body_twist((4.0, 0.0))) == pytest.approx((0.2, 0.0, -1.0))
 
 
@@ -48,7 +49,7 @@ def test_about_a_wheel_that_stands() -> None:
 def test_wheels_and_back_is_the_feasible_part(
     robot: DifferentialKinematics, twist: BodyTwist
 ) -> None:
-    """The sideways velocity of a twist is lost, because the base cannot move sideways."""
+    """Converting a twist to wheel rates and back loses only the sideways velocity."""
     back = robot.body_twist(robot.wheel_rates(twist))
     assert triple(back) == pytest.approx(triple(robot.feasible(twist)), rel=1e-9, abs=1e-9)
     assert robot.feasible(twist).vy_mps == 0.0
@@ -58,7 +59,8 @@ def test_wheels_and_back_is_the_feasible_part(
 def test_body_and_back_is_the_same_wheels(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """Body motion has two degrees of freedom, as two wheels have, so nothing is lost."""
+    """Converting wheel rates to a twist and back loses nothing, as both have two degrees of
+    freedom."""
     back = robot.wheel_rates(robot.body_twist(wheel_rates))
     assert back == pytest.approx(wheel_rates, rel=1e-9, abs=1e-7)
 
@@ -67,7 +69,7 @@ def test_body_and_back_is_the_same_wheels(
 def test_each_wheel_rolls_about_the_instantaneous_centre(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """The wheel's speed is the yaw rate times its distance from the centre, at vx / yaw rate."""
+    """Each rim speed is the yaw rate times the wheel's distance from the instantaneous centre."""
     twist = robot.body_twist(wheel_rates)
     if abs(twist.yaw_rate_radps) < 1e-3:
         return

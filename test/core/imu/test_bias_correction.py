@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Biases, calibration and figures, tested with a session and a simulated board."""
+"""IMU biases, gyro calibration and figures, tested with a session and a simulated board."""
 
 import math
 
@@ -41,7 +41,7 @@ def last(bench: Bench) -> ImuEstimate:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -> None:
-    """In both running modes the published rates are about zero after the calibration."""
+    """In nominal and in IMU-only mode the published rates are about zero after a calibration."""
     bench = running(gyro_bias_dps=PLANTED_DPS, imu_only=imu_only)
     assert last(bench).angular_velocity == pytest.approx(PLANTED, abs=0.006)
     assert calibrated(bench).success
@@ -50,7 +50,8 @@ def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -
 
 
 def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
-    """The board sends nothing during the reset, but its cable is not the reason."""
+    """During a reset the board sends nothing; the refusal names the reset, not the cable, as the
+    reason."""
     bench = running()
     bench.session.request(Request.RESET, "reset", bench.now)
     bench.settle()
@@ -59,7 +60,8 @@ def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
 
 
 def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
-    """A calibration is refused during a command, and fails if a command arrives later."""
+    """A calibration is refused during a motion command, and fails if a motion command arrives
+    later."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.3, 0.0, 0.0), bench.now)
     with pytest.raises(RequestRefused, match="commanded by cmd_vel; end these commands"):
@@ -77,7 +79,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
 
 
 def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
-    """The wheels show that the robot is pushed or rolls out."""
+    """A calibration fails if the wheels turn, as when the robot is pushed or rolls out."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.0, 0.0, 0.5), bench.now)
     bench.run(0.4)
@@ -90,7 +92,8 @@ def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
 
 @pytest.mark.parametrize("state", ["disconnected", "paused"])
 def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> None:
-    """The refusal says what to do."""
+    """On a closed port or a paused board, a calibration is refused with the advice to call again.
+    """
     bench = running()
     if state == "paused":
         bench.ask(Request.PAUSE, 5.0)
@@ -101,7 +104,7 @@ def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> No
 
 
 def test_one_calibration_at_a_time() -> None:
-    """A second request is refused, and the first calibration continues."""
+    """A second request to calibrate is refused, and the first calibration continues."""
     bench = running()
     bench.session.calibrate_gyro("first", bench.now)
     with pytest.raises(RequestRefused, match="under way"):
@@ -112,7 +115,7 @@ def test_one_calibration_at_a_time() -> None:
 
 @pytest.mark.parametrize("how", ["silence", "loss"])
 def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
-    """The answer also comes when the board falls silent or the port is lost."""
+    """A calibration is answered even if the board falls silent or the port is lost."""
     bench = running()
     bench.session.calibrate_gyro("token", bench.now)
     bench.run(1.0)
@@ -127,7 +130,7 @@ def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
 
 
 def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> None:
-    """The driver wakes up for the answer, although no output is due at that time."""
+    """The driver wakes up to answer a calibration, although no output is due at that time."""
     bench = Bench(BoardSettings(running=True), run=False)
     bench.open()
     bench.run(1.0)
@@ -140,7 +143,7 @@ def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> 
 
 
 def test_a_change_of_settings_does_not_replace_the_bias() -> None:
-    """A change of other parameters, as of limits, must not undo a calibration."""
+    """A change of settings keeps the calibrated gyro bias, but applies a new accelerometer bias."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     calibrated(bench)
     found = bench.session.gyro_bias
@@ -155,7 +158,8 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """The estimate covers half the distance in 15 s at rest, and does not change during motion."""
+    """With ``auto_gyro_bias``, the bias moves half the distance in 15 s at rest, and not in motion.
+    """
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)

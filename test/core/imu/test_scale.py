@@ -58,7 +58,7 @@ def test_full_scale_is_the_range() -> None:
 
 @pytest.mark.parametrize(("accel", "gyro"), [(3, 250), (2, 300)])
 def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int) -> None:
-    """The driver does not guess a range that the MPU6050 does not have."""
+    """A range that the MPU6050 does not have raises an error; the driver does not guess."""
     scale = ImuScale(accel_range_g=accel, gyro_range_dps=gyro)
     with pytest.raises(KeyError):
         (scale.specific_force((0, 0, 0)), scale.angular_velocity((0, 0, 0)))
@@ -67,7 +67,7 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 @pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
 @pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
-    """The range in which gravity at rest is right within a tenth is the likely one."""
+    """The advice names the range in which gravity at rest would be right within a tenth."""
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
         assert bool(text) == (actual_g != believed_g)
@@ -76,7 +76,7 @@ def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_
 
 @pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
 def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
-    """If gravity fits none of the ranges, the advice does not suggest a range."""
+    """If gravity fits none of the ranges, the advice is to check range, bias and sensor."""
     assert gravity_advice(gravity, 2).endswith(
         "check `accel_range` and `accel_bias`, or the sensor"
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements of a complete session: SI units, stamps, and a continuous pose."""
+"""Measurements through a complete session: SI units, stamps, and a continuous pose."""
 
 import itertools
 import math
@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 
 def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
-    """The sensor is upside down: z shows minus one g. One reading may have been held before."""
+    """A reading is published for each tick; the sensor is upside down, so z shows -9.8 m/s²."""
     start = bench.now
     bench.run(1.0)
     imu = [
@@ -32,14 +32,14 @@ def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
 
 
 def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
-    """Displacements that waited for the first pose have these stamps too."""
+    """Displacements that waited for the first pose also have the stamps of their own ticks."""
     stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
     assert len(bench.odometry) > 30
     assert {estimate.stamp_s for estimate in bench.odometry} <= stamps
 
 
 def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
-    """After both, ticks are 10 ms again."""
+    """After a restart and a reconnect, stamps still increase and are 10 ms apart again."""
     bench.board.reboot()
     bench.run_until_state("paused")
     bench.run_until_state("nominal")
@@ -56,7 +56,8 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """The only error is the last displacement before the reset, at most 20 mm."""
+    """After a reset, odom is right except for the displacement under way, which is at most 20 mm.
+    """
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)
@@ -72,7 +73,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 
 
 def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench) -> None:
-    """A hundred lost frames do not make a hundred log lines."""
+    """Thirty losses of frames cause only one or two notices."""
     for _ in range(30):
         bench.speaks = False
         bench.run(0.08)
@@ -84,7 +85,7 @@ def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench)
 
 
 def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> None:
-    """The kernel has counted an overrun of the port."""
+    """Frames lost after an overrun of the port are blamed on this computer, not on the line."""
     bench.run(0.4)
     bench.session.overran(1)
     bench.speaks = False
@@ -96,7 +97,8 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
-    """The robot rolled out without reports; its twist is unknown once, then zero."""
+    """The robot rolls out in a pause; the first twist after the pause is unknown, later ones are
+    zero."""
     bench.drive(0.5)
     bench.run(0.4)
     bench.ask(Request.PAUSE, 5.0)
@@ -115,7 +117,7 @@ def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     signs: tuple[int, int, int], frame: str
 ) -> None:
-    """The robot curves to the left, on a board with another initial heading."""
+    """A curve to the left is measured as commanded, whatever the board's heading and axis signs."""
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
         axis_signs=signs,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outlier filter: it rejects readings that cannot be true, and only these."""
+"""The outlier filter, which rejects readings that cannot be true, and no others."""
 
 import math
 from dataclasses import replace
@@ -41,7 +41,7 @@ def gate() -> OutlierFilter:
 
 
 def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Reading]]:
-    """Return what the filter releases for each reading."""
+    """Return the readings that the filter releases on each given reading."""
     return [
         [found for found, _ in through.admit(reading, number * TICK_S)]
         for number, reading in enumerate(readings)
@@ -49,12 +49,12 @@ def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Readi
 
 
 def trembling(random: Random) -> list[float]:
-    """Return the noise of a sensor at rest: three forces and three rates."""
+    """Return the noise of an IMU at rest: three specific forces and three rates."""
     return [random.gauss(0.0, 0.03) for _ in range(3)] + [random.gauss(0.0, 9e-4) for _ in range(3)]
 
 
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
-    """Return noisy readings of 1 g upwards; ``leaps`` adds offsets to words of some readings."""
+    """Return noisy readings of 1 g upwards; ``leaps[reading][word]`` is added to that word."""
     random, found = Random(seed), list[Reading]()
     for number in range(count):
         words = trembling(random)
@@ -74,7 +74,7 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """The jumps are the topmost bits of a word, at 2 g and 250 °/s."""
+    """Each jump is the value of one of the highest bits of a word, at 2 g and 250 °/s."""
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -84,7 +84,7 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
-    """An example is a robot that is set down on a slope."""
+    """A lasting jump is delivered one reading late; an example is a robot set down on a slope."""
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -94,7 +94,7 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """The gyro's words are replaced by words of another frame."""
+    """In one reading, words of another frame replace the gyro's words; the reading is rejected."""
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
     came = admitted(readings, through)
@@ -107,13 +107,13 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
-    """A knock that is short, or on a single axis, is not suspicious."""
+    """A knock in one reading is delivered at once if its size is not that of a single bit."""
     readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A reading at the end of the scale, 2 g, is regarded as a knock that saturates the sensor."""
+    """A reading at the end of the 2 g scale is delivered, as a knock that saturates the sensor."""
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
@@ -121,7 +121,7 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """The scale is that of ``full_scale_mps2``."""
+    """With a larger ``full_scale_mps2``, jumps of the size of that scale's bits are rejected."""
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
     assert came[50] == []
@@ -130,7 +130,8 @@ def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
 def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
-    """The force does not return to its old value at once."""
+    """A shock that rings is delivered, because the force does not return to its old value at once.
+    """
     readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
     through = gate()
     assert list(chain(*admitted(readings, through))) == readings
@@ -140,7 +141,7 @@ def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("g_rms", [0.003, 0.02, 0.1, 0.5])
 def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
-    """The robot shakes at random for ten minutes."""
+    """For ten minutes the robot shakes at random, and no reading is rejected."""
     random, through = Random(1), gate()
     for number in range(60_000):
         force = [random.gauss(0.0, g_rms * G) for _ in range(3)]
@@ -156,7 +157,8 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """The limits are 2 m/s and 8 rad/s; the next displacement reports one more as lost."""
+    """A displacement above 2 m/s or 8 rad/s is rejected; the next displacement counts it as lost.
+    """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
     assert came == [[ahead()], [], [ahead(lost=4)], [ahead()]]
@@ -164,14 +166,15 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
 
 
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
-    """The pose is delivered first, so the rejected motion is not bridged a second time."""
+    """The pose reports the rejected displacement as lost; the next displacement does not."""
     pose = PoseReading(0.0, 0.0, 0.0)
     came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
     assert came == [[ahead()], [], [replace(pose, lost=1)], [ahead()]]
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """The displacement jumps from 0.25 to 1.5 m/s and back in 80 ms; poses wait with it."""
+    """A jump from 0.25 to 1.5 m/s and back within 80 ms is rejected; a pose waits for the decision.
+    """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
@@ -179,7 +182,7 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """A jump that stays may be real, whatever its cause."""
+    """A jump that lasts may be real, so it is delivered one displacement late."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
     assert came[3:] == [[], [], [ahead(0.06), pose, ahead(0.05)], [ahead(0.05)]]
@@ -187,7 +190,7 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
-    """Up to ten readings wait; then all are released, and the next jump is judged separately."""
+    """At most ten readings wait for the next displacement; then all are released."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
     assert came[3:14] == [[]] * 10 + [[ahead(0.06), *[pose] * 10]]
@@ -195,7 +198,8 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """The next displacement says that the board has restarted, and has no known duration."""
+    """The restart and the unknown duration of a rejected displacement pass to the next
+    displacement."""
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
     assert came[2:] == [[replace(ahead(), duration_s=None, restarted=True)], [ahead()]]
@@ -230,7 +234,7 @@ readings = st.one_of(
 
 @given(st.lists(readings, max_size=60))
 def test_what_is_not_refused_comes_out_once_in_order_and_unchanged(given: list[Reading]) -> None:
-    """Readings of each kind keep their order; only losses, restarts and durations may be moved."""
+    """Accepted readings keep their order and values, except for losses, restarts and durations."""
     through = gate()
     came = list(chain(*admitted(given, through)))
     came += [reading for reading, _ in through.release()]
@@ -255,7 +259,8 @@ def bare(reading: Reading) -> Reading:
 
 
 def test_two_displacements_that_came_with_one_read_are_believed() -> None:
-    """The time between them is zero as far as is known, which must not be divided by."""
+    """Two displacements from one read are zero seconds apart, which must not cause a division by
+    zero."""
     through = gate()
     assert through.admit(ahead(), 1.0) == [(ahead(), 1.0)]
     at_once = replace(ahead(), duration_s=0.0)
@@ -272,7 +277,7 @@ def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
 
 @pytest.mark.parametrize("broken", ["pose", "twist", "covariance"])
 def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) -> None:
-    """The board that sends it, or the estimate made from it, is broken."""
+    """Odometry with NaN or infinity in its pose, twist or covariance is rejected and counted."""
     sound = OdometryReading(
         1.0, Pose(), BodyTwist(0.0, 0.0, 0.0), Covariance(), (0.0, 0.0), Pose(), None
     )
@@ -288,7 +293,8 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 
 
 def test_an_estimate_that_is_put_right_may_leap() -> None:
-    """The jump is a correction by the board's own odometry, not a bit that changed on the line."""
+    """With ``corrected``, a jump is accepted, as it may be a correction by the board's own
+    odometry."""
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
@@ -296,9 +302,9 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 
 
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
-    """A step that no robot can drive is passed on as not measured.
+    """A step that no robot can drive is passed on with ``measured`` false.
 
-    Only a value that is not finite is rejected.
+    Only a step that is not finite is rejected.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]

@@ -9,14 +9,14 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def lost(bench: Bench) -> tuple[int, int]:
-    """Return the numbers of lost IMU readings and displacements."""
+    """Return how many IMU readings and how many displacements were lost."""
     tally = bench.session.figures(bench.now).tally
     return tally.lost_imu, tally.lost_displacements
 
 
 @pytest.mark.parametrize("silence_s", [0.04, 0.2, 1.0, 5.0])
 def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: float) -> None:
-    """IMU frames have no counter, but four of them precede each displacement."""
+    """IMU frames have no counter, so four of them count as lost with each lost displacement."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(2.0)
@@ -29,7 +29,7 @@ def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: f
 
 
 def test_a_pause_loses_nothing() -> None:
-    """A paused board does not measure."""
+    """A paused board does not measure, so a pause loses no readings."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(2.0)

@@ -19,7 +19,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """A calibration needs the motion monitor switched off, since it measures wrong settings."""
+    """A calibration measures wrong settings, so the motion monitor must be off during it."""
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
     bench.configure(motion_monitor=False)
@@ -31,7 +31,8 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """A motion limit is too low and is corrected when the motion monitor is switched on again."""
+    """A motion limit is too low, but is corrected before the motion monitor is switched on again.
+    """
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
         bench.configure(motion_monitor=False, motion=limits)
@@ -43,7 +44,7 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """The limit is still too low, so it takes four more displacements."""
+    """A motion limit is still too low, so four more rejected displacements trip the monitor."""
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)
     bench.configure(motion_monitor=False, motion=too_low)
@@ -56,7 +57,7 @@ def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault
 
 
 def test_a_refused_command_says_why() -> None:
-    """The refusal also says what to do."""
+    """The refusal says that the motion monitor has stopped the robot, and what to do."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
@@ -64,7 +65,8 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """A zero command ends the refusal once; after the second trip in a minute only ~/start does."""
+    """A zero command ends the first refusal; after the second trip within a minute only ~/start
+    does."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 3.0) == 0
@@ -83,7 +85,7 @@ def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
 
 
 def test_silence_for_the_timeout_lets_it_move_again() -> None:
-    """The sender has stopped sending."""
+    """Motion is allowed again when the sender has been silent for the timeout."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 2.0) == 0
@@ -94,7 +96,7 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """The commands that were sent during the stall are lost; the pause begins after it."""
+    """A stall of the driver loses commands, so the sender's silence is counted from its end."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     bench.now += 3.0
@@ -106,7 +108,7 @@ def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
 
 
 def test_the_e_stop_works_while_motion_is_refused() -> None:
-    """The release of the e-stop does not end the refusal."""
+    """During the refusal the e-stop can be latched; its release does not end the refusal."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert estop(bench, True) == "e-stop latched"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots that do not move as commanded, in a complete session: stopped, with the reason."""
+"""Robots that do not move as commanded are stopped by a session, and the log says why."""
 
 import pytest
 from disobedient_robots import (
@@ -59,7 +59,8 @@ DISOBEYING = {
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """The log contains the measured velocity, and what to check."""
+    """The robot is stopped within 0.3 s; the log contains the measured velocity and what to check.
+    """
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -75,8 +76,7 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """The monitor needs two displacements after the one in which the deviation began, at any
-    phase."""
+    """The monitor needs only two displacements after the one in which the deviation began."""
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
         bench.run(phase * TICK_S)
@@ -88,7 +88,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """The distance lost in the long displacement must not count as wind-up that explains the motion
+    """Distance lost in one long displacement is not wind-up, so it does not explain the motion
     back."""
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
@@ -105,7 +105,7 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """The robot drives towards its origin, 3 m away, and gets less than 5 cm far."""
+    """The robot drives towards the board's origin, 3 m away, and is stopped within 5 cm."""
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m
     assert stopped_after_s(bench, SLOWLY) <= WITHIN_S
@@ -118,13 +118,13 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
 
 @pytest.mark.parametrize("board", [FAST, A_AND_B])
 def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
-    """The twist of all wheels together is compared."""
+    """For wheel commands, the monitor compares the twist that all wheels together give."""
     bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S
 
 
 def test_wheel_commands_that_are_obeyed_are_not_noticed() -> None:
-    """Each wheel turns alone, then all together."""
+    """No fault is reported when each wheel turns alone, nor when all wheels turn together."""
     bench = started(BoardSettings(running=True))
     for rates in ((10.0, 0.0, 0.0), (0.0, -10.0, 0.0), (0.0, 0.0, 5.0), (17.0, 17.0, -17.0)):
         for _ in range(10):
@@ -134,7 +134,7 @@ def test_wheel_commands_that_are_obeyed_are_not_noticed() -> None:
 
 
 def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
-    """The log uses the robot's axes, although the board's differ."""
+    """The log states velocities in the robot's axes, although the board's axes differ."""
     bench = started(BoardSettings(running=True, **FAST), axis_signs=(-1, 1, -1))  # type: ignore[arg-type]
     stopped_after_s(bench, FORWARD)
     assert "commanded 0.50, 0.00 m/s" in bench.notices[0]
@@ -145,7 +145,7 @@ def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
     ("heading_mrad", "what"), [(1571.0, "wrong direction"), (700.0, "moves faster")]
 )
 def test_a_wrong_delta_frame_is_among_what_to_check(heading_mrad: float, what: str) -> None:
-    """The robot obeys, but its displacements are read in the wrong frame."""
+    """The robot obeys, but the driver reads its displacements in the wrong frame."""
     bench = Bench(BoardSettings(running=True, initial_pose=BoardPose(0.0, 0.0, heading_mrad)))
     bench.read_deltas_as("body")
     bench.open()
@@ -156,7 +156,8 @@ def test_a_wrong_delta_frame_is_among_what_to_check(heading_mrad: float, what: s
 
 
 def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> None:
-    """If deltas come more rarely than ``delta_period``, every velocity is computed too large."""
+    """If deltas come less often than ``delta_period`` says, the driver computes too large
+    velocities."""
     bench = Bench(BoardSettings(running=True))
     bench.board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     bench.open()
@@ -177,7 +178,8 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """Without the trip, a node that sends goals could restart the robot again and again."""
+    """If leaving the goal did not trip, a node that repeats goals could restart the robot for ever.
+    """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)
@@ -187,7 +189,7 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
 
 
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped() -> None:
-    """All its displacements are rejected as implausible, so they cannot be compared."""
+    """A robot too fast to be plausible is stopped, although all its displacements are rejected."""
     bench = driving()
     for _ in range(5):
         bench.drive(0.4)

@@ -30,7 +30,7 @@ def plain(twist: BodyTwist) -> tuple[float, float, float]:
 def test_what_lies_between_rest_and_the_set_points_is_inside(
     setpoints: list[tuple[BodyTwist, float]],
 ) -> None:
-    """Any mean of the set points and standstill is inside."""
+    """Any weighted mean of the set points and rest is inside the envelope."""
     weight = max(1.0, sum(part for _, part in setpoints))
     motion = BodyTwist(
         sum(part * each.vx_mps for each, part in setpoints) / weight,
@@ -51,7 +51,8 @@ near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
 def test_what_is_on_the_way_is_inside(
     setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
 ) -> None:
-    """The shortcut agrees with the full computation."""
+    """A twist that the shortcut ``on_the_way`` accepts is inside by the full computation as well.
+    """
     one, other = setpoints[0], setpoints[-1]
     x, y, yaw = off
     motion = BodyTwist(
@@ -67,7 +68,7 @@ def test_what_is_on_the_way_is_inside(
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 1.0, math.pi, -2.0])
 def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> None:
-    """The margin is subtracted; the direction has little influence."""
+    """A twist is outside by its distance from the hull less the margin, in almost any direction."""
     away = BodyTwist(-0.3 * math.cos(angle), -0.3 * math.sin(angle), 0.0)
     way_mps, turn_radps = outside(
         away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True
@@ -77,7 +78,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """The set-point has its full weight at first, and none after a second."""
+    """A replaced set point keeps its full weight for a while, then fades to none."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -91,7 +92,7 @@ def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
 
 
 def test_a_set_point_that_was_short_counts_as_well() -> None:
-    """The set point lasts for a single tick between two displacements."""
+    """A set point that lasts for a single tick between two displacements is still considered."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -102,7 +103,7 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """Nothing is known just after a first set-point either, nor while the robot moves to a goal."""
+    """The envelope is unknown before the first set point, just after it, and just after a goal."""
     history = SetpointHistory()
     assert not history.known(0.0)
     history.add(AT_REST, 10.0)
@@ -115,7 +116,7 @@ def test_nothing_is_known_before_the_first_set_point() -> None:
 
 
 def test_the_history_does_not_grow_without_end() -> None:
-    """The case is a long ramp, with a new set point in each tick."""
+    """A long ramp, with a new set point in each tick, does not let the history grow without end."""
     history = SetpointHistory()
     for tick in range(10_000):
         history.add(BodyTwist(1e-6 * tick, 0.0, 0.0), 0.01 * tick)
@@ -123,9 +124,10 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """The wind-up grows by 1.2 times the loss, up to the integrator's limit.
+    """The wind-up of a held robot grows by 1.2 times the lost distance, up to the integrator's
+    limit.
 
-    Normal motion reduces it.
+    Normal motion reduces the wind-up.
     """
     wind_up = WindUp()
     for _ in range(10):
@@ -140,14 +142,15 @@ def test_a_held_robot_winds_up_by_what_it_loses() -> None:
 
 
 def test_a_robot_that_speeds_up_is_not_held() -> None:
-    """The robot has not reached the set-point yet, and rest was commanded a moment ago."""
+    """A robot that is still at rest is not held if rest was commanded a moment ago."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
     assert wind_up.way_m == 0.0
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """The robot may have turned round during the displacement; a second one confirms both."""
+    """During one long displacement the robot may have turned round; a second one makes both count.
+    """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
     assert wind_up.way_m == 0.0
@@ -159,7 +162,7 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """Motion that was made good is subtracted until the wind-up is zero."""
+    """Motion that makes up for lost distance is subtracted from the wind-up, down to zero."""
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)
     assert wind_up.pay(0.5, 0.0, 0.1)

@@ -31,7 +31,7 @@ class Drive:
     def move(
         self, motion: Triple, seconds: float, *, heading_known: bool = True
     ) -> list[tuple[float, Fault]]:
-        """Move like this; return each fault with its time after the beginning, in s."""
+        """Move with the twist ``motion``; return each fault with its time since the start, in s."""
         begun, found = self.now, []
         for _ in range(round(seconds / PERIOD_S)):
             self.now += PERIOD_S
@@ -66,7 +66,7 @@ DISOBEYING = {
 def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
     commanded: Triple, motion: Triple, fault: Fault
 ) -> None:
-    """The robot may never have obeyed, or have obeyed for a while."""
+    """The fault is found in a robot that never obeyed, and in one that obeyed for two seconds."""
     for obeyed_s in (0.0, 2.0):
         drive = Drive()
         drive.command(*commanded)
@@ -83,10 +83,10 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """The time is counted from the moment at which it moves at 0.05 m/s.
+    """A robot that moves the wrong way is found out within 0.3 s of reaching 0.05 m/s.
 
-    Such a robot must not be taken for one that is held, whose wound-up controllers would explain
-    its motion for up to 0.4 s.
+    Its motion must not be taken for that of a held robot, which is excused for up to 0.4 s while
+    its wound-up controllers unwind.
     """
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
@@ -104,7 +104,7 @@ def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
 def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_s(
     motion: Triple,
 ) -> None:
-    """The robot is pushed, or the board obeys a command that was not sent."""
+    """A person pushes the robot, or the board obeys a command that the driver did not send."""
     found_s, fault = first(Drive().move(motion, 1.0))
     assert fault is Fault.UNCOMMANDED
     assert found_s <= 0.28
@@ -113,7 +113,8 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """Scales found by hand are inexact. A robot that is too slow may only be called blocked."""
+    """A robot that is up to 25 % too fast trips nothing; one that is too slow may be called
+    blocked."""
     drive = Drive()
     drive.command(*commanded)
     x, y, yaw = (scale * value for value in commanded)
@@ -122,7 +123,7 @@ def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: 
 
 @given(motions=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=2, max_size=2))
 def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -> None:
-    """The displacements may have any size."""
+    """Two displacements of any size in a row do not trip the motion monitor."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -131,7 +132,7 @@ def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -
 
 
 def test_a_new_command_may_be_followed_late() -> None:
-    """A reversal begins 0.3 s late, with a time constant of 0.15 s."""
+    """A reversal that begins 0.3 s late, with a time constant of 0.15 s, is accepted."""
     drive = Drive()
     drive.command(0.5, 0.0, 0.5)
     drive.move((0.5, 0.0, 0.5), 1.0)
@@ -143,7 +144,7 @@ def test_a_new_command_may_be_followed_late() -> None:
 
 
 def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
-    """The robot is commanded to slow down to a fifth, but keeps its speed."""
+    """A robot that is commanded to slow down to a fifth keeps its speed, which is a fault."""
     drive = Drive()
     drive.command(0.5, 0.0, 0.0)
     drive.move((0.5, 0.0, 0.0), 1.0)
@@ -154,7 +155,7 @@ def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
 
 
 def test_two_senders_in_turn_do_not_trip() -> None:
-    """The robot moves at a speed between both commands."""
+    """Two senders command motion and rest in turn; the robot moves at a speed in between."""
     drive = Drive()
     for step in range(100):
         drive.command(*((0.4, 0.0, 0.0) if step % 2 else REST))
@@ -165,7 +166,7 @@ def test_two_senders_in_turn_do_not_trip() -> None:
 
 
 def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None:
-    """A velocity in the earth's axes contains no forward or backward."""
+    """Without the heading, forward and backward look alike, so only the speed is compared."""
     drive = Drive()
     drive.command(0.2, 0.0, 0.0)
     assert drive.move((-0.2, 0.0, 0.0), 2.0, heading_known=False) == []
@@ -173,14 +174,14 @@ def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None
 
 
 def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
-    """The board itself chooses how to drive to the goal."""
+    """On the way to a goal the board itself chooses the motion, so nothing is judged."""
     drive = Drive()
     drive.monitor.set_point(None, drive.now)
     assert drive.move((-1.5, 0.0, 3.0), 5.0) == []
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """The event repeats each second; the caller filters repetitions."""
+    """A robot that does not move causes an event each second; the caller filters repetitions."""
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
     found = drive.move(REST, 2.4)
@@ -191,7 +192,8 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """Held for 1 s at 0.4 m/s, its wheel controllers integrate and may catch up 0.4 m."""
+    """A robot held for 1 s at 0.4 m/s may catch up 0.4 m, because its wheel controllers integrate.
+    """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
     drive.move((0.4, 0.0, 0.0), 1.0)
@@ -202,7 +204,8 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """After the next command, wound-up wheel controllers may move it back."""
+    """A robot pushed at rest may be moved back by wound-up wheel controllers at the next command.
+    """
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)
@@ -211,14 +214,14 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """The robot was at rest, so it has received Stop before."""
+    """A pushed robot was at rest, so it has received Stop, and further Stops become rarer."""
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """The board does not receive at present, but may receive again."""
+    """A robot that drives on after Stop may receive again, so the Stops do not become rarer."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -231,7 +234,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
-    """The motion before Stop can have arrived is not a fault either."""
+    """Motion before the arrival of Stop, and rolling out after it, are not a second fault."""
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)
     assert first(drive.move((-0.3, 0.0, 0.0), 0.2))[1] is Fault.WRONG_WAY
@@ -242,7 +245,7 @@ def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
 
 
 def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -> None:
-    """A plausible displacement in between restarts the count."""
+    """Four rejected displacements in a row are a fault; a plausible one in between ends the row."""
     drive = Drive()
     assert [drive.monitor.count_refused(count, drive.now) for count in range(4)] == [None] * 4
     drive.move(REST, PERIOD_S)
@@ -253,7 +256,7 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """When the robot has obeyed, the same fault is reported again."""
+    """A fault is reported once, and again only after the robot has obeyed in between."""
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
     assert not drive.monitor.is_news(Fault.BLOCKED)

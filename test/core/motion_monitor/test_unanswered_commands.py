@@ -20,7 +20,8 @@ def bench() -> Bench:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
-    """The cause may be blocked wheels, missing motor power, or a switch on position control."""
+    """A robot that does not move is reported once; in this case its switch is on position control.
+    """
     bench = started(BoardSettings(running=True, control="position"), control="velocity")
     for _ in range(10):
         drive_on(bench)
@@ -34,7 +35,8 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     held_s: float, gains: WheelGains
 ) -> None:
-    """The wheel controllers have wound up, and Stop would not unwind them."""
+    """A released robot may leap: its wheel controllers have wound up, and Stop would not unwind
+    them."""
     bench = driving(wheel_gains=gains)
     bench.board.grip()
     for _ in range(round(held_s / PERIOD_S)):
@@ -49,7 +51,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """The line to the board is cut twice."""
+    """The line to the board is cut twice, and the robot obeys in between, so two notices appear."""
     bench = standing()
     for hears in (False, True, False):
         bench.hears = hears
@@ -63,7 +65,7 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """Motion within the noise cannot be judged."""
+    """Neither a command within the noise nor a zero command shows whether a robot obeys."""
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)
         bench.run(0.1)
@@ -74,7 +76,7 @@ def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> No
 
 
 def test_in_imu_only_mode_nothing_is_found() -> None:
-    """Displacements to compare with the commands are missing."""
+    """IMU-only mode has no displacements to compare with the commands."""
     bench = Bench(BoardSettings(running=True, imu_only=True, linear_scale=70 / 2.38))
     bench.open()
     bench.run_until_state("imu_only")
@@ -86,7 +88,7 @@ def test_in_imu_only_mode_nothing_is_found() -> None:
 
 
 def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
-    """The cut lasts longer than the first Stops; the deltas show that the robot still drives."""
+    """The first Stops are lost in a cut; later deltas show motion, so Stop is sent again."""
     bench.hears = False
     bench.run(20.0)
     assert not bench.still()
@@ -101,7 +103,7 @@ def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench:
 
 
 def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> None:
-    """Stopping takes a moment, and a short bump is not a drive."""
+    """A robot that rolls out after Stop, or is bumped for a moment, causes no notice."""
     bench.run(4.0)
     for _ in range(5):
         push(bench, 0.005, 0.0, 0.0)
@@ -110,7 +112,8 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
 
 
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """Stop is sent at once, then ever more rarely; later commands are accepted."""
+    """For a pushed robot, Stop is sent at once, then ever more rarely; a later command is obeyed.
+    """
     bench = standing()
     bench.board.grip(0.3, 0.0, 0.2)
     start = len(bench.written)
@@ -131,7 +134,7 @@ def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
 def test_the_stops_for_a_robot_that_moves_without_a_command_do_not_hinder_the_next_one(
     bench: Bench,
 ) -> None:
-    """The repeated stops are harmless, and a command replaces them."""
+    """A new command replaces the repeated Stops for a robot that moves without a command."""
     bench.hears = False
     bench.run(4.0)
     bench.hears = True

@@ -28,7 +28,8 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def minors(c: Covariance) -> Triple:
-    """Return the leading principal minors; they are positive if the matrix is positive definite."""
+    """Return the leading principal minors of ``c``; all are positive if ``c`` is positive definite.
+    """
     first = c.xx
     second = c.xx * c.yy - c.xy**2
     third = (
@@ -41,7 +42,7 @@ def minors(c: Covariance) -> Triple:
 
 @given(st.lists(displacements("body"), max_size=60))
 def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
-    """The covariance's determinant and the variance of yaw never shrink: slip is not corrected."""
+    """The determinant of the covariance and the variance of yaw never decrease."""
     odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0, wheel_slip=0.0)))
     before = Covariance()
     for reading in readings:
@@ -54,7 +55,8 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """One wheel wrong by 1 % gives 0.01 / 0.4 rad per metre, and 5 mm of distance."""
+    """An error of 1 % in one wheel's size turns the robot by 0.025 rad per metre and shifts it by 5
+    mm."""
     noise = OdometryNoise(
         wheel_drift=0.0,
         wheel_scale=0.01,
@@ -68,7 +70,7 @@ def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
 
 
 def test_a_robot_at_rest_grows_no_less_sure() -> None:
-    """A robot at rest has no slip."""
+    """Wheels at rest do not slip, so the covariance does not grow."""
     odometry = Odometry(SETTINGS)
     for _ in range(100):
         (estimate,) = odometry.displace(body(0.0, 0.0), 0.0)
@@ -88,7 +90,7 @@ def test_the_covariance_is_a_random_walk_over_the_way() -> None:
 
 
 def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
-    """The sample is 2000 robots with random wheel errors, computed with the manual's matrix."""
+    """The spread of 2000 simulated robots with random wheel errors agrees with the covariance."""
     random, deviation, n, steps = Random(1), 0.003, 2000, 25
     noise = OdometryNoise(wheel_drift=deviation, wheel_scale=0.0, wheel_slip=0.0)
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -119,7 +121,8 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """The error after 10 m is ten times that after 1 m; back at the start it is zero."""
+    """The yaw error from wheel sizes is ten times larger after 10 m than after 1 m, and 0 on
+    return."""
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -134,10 +137,10 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 
 @pytest.mark.slow
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
-    """Wheels of wrong size (1 %) slip (2 %) in 40 drives; errors are compared to the covariance.
+    """In 40 drives, wheels of wrong size (1 %) slip (2 %), and the errors fit the covariance.
 
-    The mean squared error over covariance is 3 (x, y, yaw) for a true covariance. With 40 drives it
-    is within 2.29 and 3.80 in nineteen cases out of twenty (chi-squared of 120).
+    For a true covariance the mean of the normalized squared error is 3, one each for x, y and yaw.
+    Over 40 drives it lies between 2.29 and 3.80 with a probability of 95 % (chi-squared of 120).
     """
     total = 0.0
     for seed in range(40):
@@ -153,7 +156,7 @@ def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None
 
 
 def squared(off: Pose, estimate: OdometryEstimate) -> float:
-    """Return the squared error over its covariance (NEES), by elimination."""
+    """Return the error squared and divided by its covariance (NEES), computed by elimination."""
     c = estimate.covariance
     rows = [
         [c.xx, c.xy, c.x_yaw, off.x_m],
@@ -171,7 +174,8 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """Drift is not visible to the wheels, and the board's pose is computed from the wheels."""
+    """The board's pose comes from the same wheels, so it does not reduce the variance of their
+    drift."""
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):
@@ -184,7 +188,7 @@ def test_settling_removes_nothing_but_the_gap() -> None:
 
 
 def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
-    """The errors of robots that slip, speed up and brake are below 0.02 m/s and 0.025 rad/s."""
+    """The RMS errors of robots that slip, speed up and brake are below 0.02 m/s and 0.025 rad/s."""
     linear, angular, n = 0.0, 0.0, 0
     for seed in range(8):
         random = Random(seed)

@@ -32,7 +32,7 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, Simulated
 
 
 def test_straight_ahead_is_x() -> None:
-    """The robot drives at 0.5 m/s for 1 s."""
+    """The robot drives straight ahead at 0.5 m/s for 1 s."""
     odometry = Odometry(SETTINGS)
     for _ in range(25):
         estimates = odometry.displace(body(0.02, 0.0), 0.0)
@@ -41,7 +41,7 @@ def test_straight_ahead_is_x() -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
-    """The radius is exactly 1 m, in 50 steps."""
+    """A quarter circle with a radius of 1 m, driven in 50 steps, is measured exactly."""
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
     step = math.pi / 2 / 50
@@ -51,7 +51,7 @@ def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
 
 
 def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
-    """Yaw is not wrapped."""
+    """The yaw of a robot that spins is not wrapped."""
     odometry = Odometry(SETTINGS)
     for _ in range(100):
         estimates = odometry.displace(body(0.0, 0.0, 0.2), 0.0)
@@ -63,7 +63,7 @@ def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
 def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
     moves: list[Pose], initial: float, signs: tuple[int, int, int]
 ) -> None:
-    """A board that has driven before, or whose axes point elsewhere, gives the same odometry."""
+    """The odometry is the same whatever the board's initial heading and the signs of its axes."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
     attach(odometry, trip.pose)
     for number, move in enumerate(moves):
@@ -75,7 +75,8 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 
 @given(st.lists(small_moves, min_size=1, max_size=40), axis_signs)
 def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
-    """Each estimate is published at once, and its pose is the true one."""
+    """Deltas in the body's axes are published at once, without a pose, and give the true position.
+    """
     odometry, trip = Odometry(SETTINGS, signs), Trip(1.0, signs)
     for move in moves:
         estimates = odometry.displace(trip.move(*xyyaw(move), "body"), 0.0)
@@ -98,7 +99,7 @@ def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: st
 
 
 def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
-    """The order is kept."""
+    """Each estimate has the stamp of its delta, and the order is kept."""
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.01, 0.0), 1.0) == []
     assert odometry.displace(earth(0.01, 0.0), 1.04) == []
@@ -111,7 +112,8 @@ def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
 
 
 def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odometry]:
-    """Drive smooth curves for 12 s and stop, through the protocol; return the estimates."""
+    """Drive smooth curves for 12 s and stop, through the protocol; return estimates and odometry.
+    """
     settings_ = board.settings
     bot = OmniBot(OmniBotSettings(delta_frame=settings_.frame))
     odometry, estimates, random = Odometry(SETTINGS), [], Random(seed)
@@ -143,7 +145,7 @@ def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odo
 def test_the_odometry_is_the_truth_of_the_simulated_robot(
     frame: str, initial: BoardPose, seed: int
 ) -> None:
-    """The error after metres of curves is below 5 mm and 3 mrad, also with an initial pose."""
+    """For any initial pose, the error after metres of curves is below 5 mm and 3 mrad."""
     board = SimulatedBoard(
         BoardSettings(seed=seed, frame=frame, initial_pose=initial, running=True)
     )
@@ -160,7 +162,8 @@ def test_the_odometry_is_the_truth_of_the_simulated_robot(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_twist_is_the_velocity_of_the_simulated_robot(frame: str) -> None:
-    """The robot drives forward, left and turns at once; the board's heading is a quarter turn."""
+    """The twist is right for a robot that drives forward, drives left and turns at the same time.
+    """
     board = SimulatedBoard(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 1571.0), running=True)
     )

@@ -11,12 +11,13 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:
-    """Return a displacement straight ahead after ``lost`` missing ones."""
+    """Return a displacement straight ahead, before which ``lost`` displacements are missing."""
     return DisplacementReading(dx_m, 0.0, 0.0, "body", duration_s, lost)
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four displacements are missing between 0.5 and 1 m/s."""
+    """Four displacements that are missing between 0.5 and 1 m/s are filled in at the mean, 0.75
+    m/s."""
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)
@@ -25,7 +26,7 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """The driver stops a robot from which it receives nothing for longer."""
+    """At most two seconds are filled in; the driver stops a robot that is silent for longer."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     lost, _ = bridge.tangents(after(250, 0.02), None)
@@ -34,7 +35,7 @@ def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
 
 @pytest.mark.parametrize("missing", [0, 1, 7])
 def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
-    """Earth displacements are turned by the heading after the gap."""
+    """In an even curve the gap is filled exactly, also for displacements in the earth's axes."""
     bridge, trip = GapInterpolation(), Trip(0.7)
     bridge.tangents(trip.move(0.02, 0.01, 0.1), 0.7)
     before = trip.board
@@ -50,7 +51,7 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 
 
 def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
-    """The displacement may include all motion of a pause; the next one is used to fill the gap."""
+    """A displacement of unknown duration, as after a pause, is not used to fill the next gap."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     assert bridge.tangents(after(0, 0.5, None), None) == (Pose(), Pose(0.5))
