@@ -60,7 +60,7 @@ class Adjusting(Moves):
         return self._ask(words.CS.request(-right, -left), now)
 
     def _learn(self, moved: DisplacementReading, now: float) -> None:
-        """Learn from the last measurement how fast the motors turn with their units."""
+        """Learn from the last measurement how fast the motors turn with their present units."""
         self.loop.trip_s = self.conversation.trip_s
         if moved.duration_s is not None:
             blind = self.odometry.left_over_right is not None
@@ -88,7 +88,7 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Learn that the motors do not turn with the units of the present motion.
 
-        If the robot has moved before in this motion, it is blocked, and nothing is learned.
+        A robot that has already moved in this motion is blocked now, so nothing is learned from it.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.spun_rad) * self._settings.track_m / 2

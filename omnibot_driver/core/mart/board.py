@@ -138,7 +138,7 @@ class MartBoard(Board):
         self._pilot.fell_silent()
 
     def flush(self, now: float) -> list[Reading]:
-        """End the present job, as the port is closed; return the readings and its result."""
+        """End the present job, as the port is closed; return the readings and the job's result."""
         self._pilot.jobs.cancel("the port was lost meanwhile; call again once it is back")
         return self._pilot.take()
 
@@ -201,7 +201,8 @@ class MartBoard(Board):
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job; a JobDone with this ``token`` reports its result later.
 
-        Raises RequestRefused while another job is under way, or if a log was not started.
+        Raises RequestRefused while another job is under way, or if the job downloads a log and no
+        log was started.
         """
         self._pilot.jobs.ask(job, token, now, *arguments)
 
@@ -214,8 +215,8 @@ class MartBoard(Board):
     def is_fresh(self) -> bool:
         """Whether the server has not driven by RM since its start, so its clock may be set back.
 
-        RM integrates the heading over the time since the previous RM. If the clock was set back,
-        this heading is useless.
+        RM integrates the heading over the time since the previous RM. If the clock was set back in
+        that time, the heading is useless.
         """
         return self._pilot.odometry.heading.is_zero
 

@@ -37,19 +37,19 @@ SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
 """Factor and addend in s by which an unanswered query raises ``trip_s``.
 
-The query may have been given up too soon, so the next one is awaited longer.
+The driver may have stopped waiting too soon, so it waits longer for the reply to the next query.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
 """After an exchange longer than SLOW_S (s), the network counts as disturbed for DISTURBED_S (s).
 
-A network that delays, loses or duplicates a datagram may do so again. While it is disturbed, each
-reply may belong to an earlier query.
+A network that delays, loses or duplicates a datagram may do so again. While the network is
+disturbed, each reply may belong to an earlier query.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
-"""Failure texts that a check of the IMU may return at once: it is refused, or finds no IMU."""
+"""Failure texts that the server may send at once, when it refuses a check or finds no IMU."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +111,8 @@ class Conversation:
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now.
 
-        It must wait while a request is pending. A query must also wait while a late reply can be
-        mistaken for its reply, except the queries in PRESSING.
+        A command must wait while a request is pending. A query that is not in PRESSING must also
+        wait while a late reply can be mistaken for its reply.
         """
         if self.pending is not None:
             return False
@@ -174,7 +174,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        A late reply is expected afterwards, except to a controlled move: its stop waits for it.
+        Afterwards a late reply is still expected, except after a controlled move: the stop of the
+        move waits for the move's reply.
         """
         if self.pending is None:
             return None
@@ -224,7 +225,7 @@ class Conversation:
         self._answers[pending.word] = reply, now + self.delay_s
         from_s = pending.sent_s
         if doubtful or self.disturbed(now):
-            from_s = min(from_s, now - self.delay_s)  # it may answer an earlier query
+            from_s = min(from_s, now - self.delay_s)  # the reply may answer an earlier query
         when = Moment(now - took_s / 2, from_s, now, doubtful)
         return Answer(pending.request, reply, took_s, when)
 
@@ -242,9 +243,10 @@ class Conversation:
     def _has_come(
         self, reply: Ok | Fail, now: float, *, but: Word | None = None, kind: Kind | None = None
     ) -> bool:
-        """Return whether an identical reply to a command came within the last ``delay_s``.
+        """Return whether a reply identical to ``reply`` came within the last ``delay_s``.
 
-        ``but``: a command to leave out; ``kind``: the only kind of command to look at.
+        ``but``: a command whose replies are left out; ``kind``: the only kind of command whose
+        replies are compared.
         """
         return isinstance(reply, Ok) and any(
             each == reply and until_s > now and word is not but and kind in (None, word.kind)

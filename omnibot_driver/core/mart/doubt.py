@@ -2,10 +2,10 @@
 
 """The uncertainty of a MART robot's odometry, and its sources.
 
-The sources are: a wheel that slips or has another size, a gyro that drifts, unequal motors
-while the heading is unknown, the beginning and end of each motion, and replies whose time is known
-only within the network's delay. This module knows metres, rad and seconds; it does not know how
-they are measured.
+The sources are: a wheel that slips or whose size is not exactly known, a gyro that drifts, unequal
+motors while the heading is unknown, the beginning and end of each motion, and replies whose time is
+known only within the network's delay. This module knows metres, rad and seconds; it does not know
+how they are measured.
 """
 
 import math
@@ -26,16 +26,16 @@ WHEEL_HEADING: Final = 0.06
 END_M, END_RAD = 0.004, math.radians(0.4)
 """Standard deviations that the start and roll-out of each motion add, in m and rad."""
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
-"""Standard deviation of a turn on the spot that the server reports in whole degrees.
+"""Standard deviations of a turn on the spot that the server reports in whole degrees.
 
-The first is in rad, the second is relative to the turn.
+The first is a constant in rad, the second is a part of the turn.
 """
 PIVOT: Final = 0.01
 """Offset of the centre of a turn on the spot, as a part of the track."""
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation of the heading after a straight controlled move, in rad."""
 BEND_WALK: Final = 0.5
-"""If a turn is known from commands alone, this part of its error is independent in each step."""
+"""Part of the error of a turn known from commands alone that is independent in each step."""
 ASTRAY: Final = 0.7
 """Position error, as a part of the distance driven, per rad² of heading variance."""
 SPREAD: Final = 0.3
@@ -73,7 +73,7 @@ class Doubt:
 
         ``bend``: standard deviation of the ratio of left to right wheel speed if the turn is known
         from that ratio alone, else 0; ``aside_m``: standard deviation across the direction of
-        motion in m, because the heading was measured at another time.
+        motion in m, because the heading was not measured at the time of the count.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)

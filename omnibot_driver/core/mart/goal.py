@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The plan to a goal pose by controlled moves: turn to it, drive straight, turn to its heading.
+"""The plan of moves to a goal pose: turn towards it, drive straight, turn to the goal's heading.
 
-Each move is a number of whole degrees or inches and ends a little beside its target, so the rest is
-planned anew after each move. This module knows poses and the commands for moves; it does not know
-when they are sent.
+Each move is a number of whole degrees or inches and ends a little beside its target, so the
+remaining moves are planned anew after each move. This module knows poses and the commands for
+moves; it does not know when they are sent.
 """
 
 import math
@@ -34,7 +34,7 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Least improvement of the heading in degrees for which a turn is made."""
 WIDER: Final = 0.5
-"""Part of NEAR_RAD by which each turn in a row widens the tolerance, as turns overshoot."""
+"""Part of NEAR_RAD that each turn in a row adds to the heading's tolerance, as turns overshoot."""
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal; after them the goal is given up."""
 
@@ -133,7 +133,8 @@ class Move:
     """The progress towards the goal ``place``.
 
     ``said``: number of moves sent so far; ``turns``: number of turns since the last straight move;
-    ``given_up``: whether the goal is finished, or a move has failed; ``failed``: the latter.
+    ``given_up``: whether the goal is finished, or a move has failed; ``failed``: whether a move has
+    failed.
     """
 
     place: Pose
@@ -147,7 +148,7 @@ class Move:
         self.given_up = self.failed = True
 
     def repeated(self) -> "Move":
-        """Return the progress after the same goal was commanded again.
+        """Return the progress with which to continue after ``place`` was commanded again.
 
         A robot that has come near enough is left where it is.
         """

@@ -39,13 +39,13 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryRe
 STARTS_UP_S: Final = 1.5
 """Time in s from the first reply after an absence within which no motion is started.
 
-The server opens its ports before it is complete. VOLTS and most motions crash a server that has
-just started; a crash by RM leaves the motors on.
+The server opens its ports before it has started up completely. VOLTS and most motions crash a
+server that has just started; a crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""A longer time without a reply shows an absence: in s, plus a number of exchange durations."""
+"""Longest silence of a server that was not absent: in s, plus a number of exchange durations."""
 ABSENT_BUSY_S: Final = 2.5
-"""A longer time in s than this without a reply shows an absence of a server that may be busy.
+"""Longest silence, in s, of a server that may be busy but was not absent.
 
 A stop, for example, keeps the server busy.
 """
@@ -199,7 +199,7 @@ class Ground:
 
     @property
     def _rolled_out(self) -> bool:
-        """Whether the roll-out of the last motion has been counted."""
+        """Whether the odometry includes the roll-out of the last motion."""
         odometry = self.odometry
         return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
 
@@ -207,8 +207,8 @@ class Ground:
     def _heading_first(self) -> bool:
         """Whether the heading must be read before the encoder.
 
-        After RM the last heading must come before the last count, because that count ends the
-        motion.
+        After RM the last heading must come before the last count, because with that count the
+        odometry ends the motion.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

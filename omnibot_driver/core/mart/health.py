@@ -41,11 +41,11 @@ ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """Largest difference of two readings that confirm each other, in V and inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Similar readings in a row needed to accept one that may be the reply to another query."""
+"""Number of similar readings in a row that are accepted, even if a late reply may be among them."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Time in s after a failed RM; a motion within this time is caused by that RM."""
+"""Longest time in s from a failed RM to an uncommanded motion that this RM has caused."""
 
 
 class Health:
@@ -161,9 +161,9 @@ class Health:
         self.reference_fails, self._reference_failed_s = 0, -math.inf
 
     def strays(self, now: float) -> None:
-        """Record that the robot moves without a command.
+        """Record that the robot moves although no motion is commanded.
 
-        Soon after an RM that failed, this shows a defect of the server.
+        If an RM has failed shortly before, the motion shows that the server is defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 

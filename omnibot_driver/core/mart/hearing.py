@@ -63,10 +63,11 @@ class Hearing(Measuring):
             self._answered(answer, now)
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
-        """Return whether a reply after a stop may answer an earlier request, or be a copy.
+        """Return whether a reply after a stop may be a copy, or the answer to an earlier request.
 
-        A bare ``ok`` may answer the start or the check. A number, which is also the reply to a stop
-        of a turn on the spot, may be a count that was requested before the stop.
+        A bare ``ok`` may answer the start of the motion or the check of the IMU. A number answers
+        the stop of a turn on the spot, but it may also be a count that was requested before the
+        stop.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -95,7 +96,7 @@ class Hearing(Measuring):
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion: a server that gives its name is not busy with a controlled move.
 
-        So either its reply to the move was lost, or the server was restarted while the motors
+        Either the reply that ended the move was lost, or the server was restarted while the motors
         turned.
         """
         self._appears(now)
@@ -130,7 +131,7 @@ class Hearing(Measuring):
             self.state = State.SERVING if self.jobs.collecting else State.STILL
 
     def _missed(self, word: Word, now: float) -> None:
-        """React to the reply to ``word`` that did not come in time."""
+        """React to the fact that the reply to ``word`` did not come in time."""
         if self.state is State.ASKING:
             self._unanswered(word)
         elif word.kind is Kind.START:

@@ -62,9 +62,9 @@ class Jobs:
     """The job that is under way, and the results of those that have ended.
 
     ``done``: results that the caller has not taken yet; ``logging``: whether LOG was answered with
-    ok in this connection; ``log_may_be_lost``: whether the server may have been restarted since;
-    ``ended``: whether EXIT was sent, which ends the server; ``moving``:
-    whether the controlled move of the job was sent.
+    ok in this connection; ``log_may_be_lost``: whether the server may have been restarted since
+    that reply; ``ended``: whether EXIT was sent, which ends the server; ``moving``: whether the
+    controlled move of the job was sent.
     """
 
     def __init__(self) -> None:
@@ -115,7 +115,8 @@ class Jobs:
         """Begin a job.
 
         Raises RequestRefused while another job is under way, and for a download of a log that was
-        not started. The driver's own job, setting the clock, gives way until it is sent.
+        not started. A new job replaces the driver's own job of setting the clock, if its request
+        was not sent yet.
         """
         if self.job is Job.TIME and not self._waiting:
             self._clear()

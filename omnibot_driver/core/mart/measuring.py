@@ -60,8 +60,9 @@ class Measuring(Starts):
     def _shows_restart(self, before_rad: float | None) -> bool:
         """Return whether the present heading shows that the server was restarted.
 
-        It is exactly zero before the first RM of a server, but also at the start of each RM, and
-        whenever it changes its sign. ``before_rad``: the previous heading, or None.
+        The heading is exactly zero before the first RM of a server, but also at the start of each
+        RM, and whenever the heading changes its sign. ``before_rad``: the previous heading, or
+        None.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False
@@ -108,7 +109,7 @@ class Measuring(Starts):
             self._learn(reading, now)
 
     def _discard_goal(self) -> None:
-        """Discard the goal after a copy of its last move, as the count covers only the copy."""
+        """Discard the goal, because the network has duplicated the last move to it."""
         if self._move is None or self._move.given_up:
             return
         self._move.fail()

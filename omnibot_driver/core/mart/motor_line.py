@@ -3,9 +3,9 @@
 """The speed of a motor as a learned straight line over its command units.
 
 A motor without a regulator needs some units before it turns, so its speed is not proportional to
-its units. With a mere gain that was learned at a high speed, a slow wheel would be too slow. Speeds
-are given in nominal units: the units that an ideal motor would need for the speed. This module
-knows neither wheels nor time.
+its units. If the driver learned only a gain, at a high speed, slow wheels would turn too slowly.
+Speeds are given in nominal units: the units that an ideal motor would need for the speed. This
+module knows neither wheels nor time.
 """
 
 import math
@@ -36,7 +36,7 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Correct the line by a measured speed; ``doubt`` multiplies the speed's deviation."""
+        """Correct the line by a measured speed; ``doubt`` multiplies the deviation NOISE."""
         self._learned = True
         if self._ss < SLOPE_SD**2:
             self._ss += SLOPE_DRIFT**2
@@ -57,7 +57,7 @@ class MotorLine:
     def stood(self, units: float) -> None:
         """Record that the motor does not turn with these units.
 
-        The offset then is uncertain again: maybe the robot was only held.
+        Afterwards the offset is uncertain again, as the robot may only have been held.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2

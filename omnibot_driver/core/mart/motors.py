@@ -21,7 +21,7 @@ MOST_UNEQUAL: Final = 2 * UNEQUAL
 """Largest relative difference of the two motors' gains that is used for predictions."""
 Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
-"""Fewest units at which the motors are compared; below, a line's error has too much effect."""
+"""Fewest units at which the motors are compared; at fewer, a line's error has too much effect."""
 
 
 class Motors:
@@ -88,8 +88,8 @@ class Motors:
     def _balance(self, units: float) -> float:
         """Return the ratio of the left to the right motor's speed at these units on both sides.
 
-        A change of units that was lost or duplicated while learning falsifies the lines, so the
-        ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
+        If a change of units is lost or duplicated while the lines are learned, the lines are wrong.
+        So the ratio is limited: it differs from ``motor_balance`` by MOST_UNEQUAL at most.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))

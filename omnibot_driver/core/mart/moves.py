@@ -45,7 +45,7 @@ class Moves(Asking):
     def _moved(self, reply: Ok | Fail, now: float, *, sure: bool) -> None:
         """Evaluate the reply that ends a controlled move.
 
-        ``sure``: the reply is certainly that to this move.
+        ``sure``: whether the reply certainly belongs to this move.
         """
         motion = self.motion
         if sure and isinstance(reply, Ok):

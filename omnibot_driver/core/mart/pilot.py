@@ -35,19 +35,19 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 STOPS_S: Final = 1.0
 """Time in s within which a stop is usually answered."""
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
-"""Time in s from the first reply after an absence to the first VOLTS.
+"""Time in s from the first reply after an absence to the first query VOLTS.
 
 It is shorter than STARTS_UP_S, so that the first motion uses the measured voltage.
 """
 VOLTS_S: Final = 10.0
-"""Longest time in s for which unanswered requests hold VOLTS back."""
+"""Longest time in s for which unanswered requests delay the query VOLTS."""
 SILENT_S, GREET_AGAIN_S = 0.15, 0.1
 """Times in s: from the last reply to the first HELLO, and from each HELLO to the next.
 
 Two exchange durations are added to the first time.
 """
 COPY_S: Final = 0.25
-"""If ENC is unanswered for this time in s after a controlled move, a duplicate may be running."""
+"""If ENC is unanswered for this time in s after a move, a duplicate of the move may be running."""
 
 
 class Pilot(Hearing):
@@ -199,14 +199,15 @@ class Pilot(Hearing):
             return math.inf
         apart_s = self._halted_s + self._delay_s
         silent_s = COPY_S
-        if self.odometry.wheel.told_s >= self._rested_s:  # maybe this count is a late reply
+        if self.odometry.wheel.told_s >= self._rested_s:  # the last count may be a late reply
             silent_s += 2 * self._delay_s
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def _may_ask_volts(self, now: float) -> bool:
-        """Return whether the server has certainly started up; before that, VOLTS crashes it.
+        """Return whether the server has started up completely, as VOLTS crashes it before.
 
-        The only possible sign of an absence shorter than ABSENT_S is an unanswered request.
+        A restart that takes less than ABSENT_S can show only as an unanswered request. So the query
+        VOLTS also waits after each unanswered request.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

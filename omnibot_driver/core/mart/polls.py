@@ -80,9 +80,9 @@ class Polls:
         self._asked_s.pop(word, None)
 
     def wake_at(self, state: State) -> float:
-        """Return the time at which the next frequent query is due; infinite if none is.
+        """Return the time at which the next query for encoder or heading is due; else infinite.
 
-        The other queries are sent at the wake-ups for these.
+        The less frequent queries have no wake-ups of their own: they are sent at these times too.
         """
         frequent = (word for word in (ENC, RMRA) if word in PERIODS.get(state, {}))
         return min((self._at(word, state) for word in frequent), default=math.inf)

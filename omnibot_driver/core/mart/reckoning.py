@@ -22,14 +22,14 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest difference of a reported turn from the wheel's: in rad, plus a part of the turn.
+"""Largest difference of a reported turn from the turn by the wheel: in rad, plus a part.
 
 A number that differs by more is regarded as the answer to another query.
 """
 BEGIN_RADPS: Final = 0.03
-"""Standard deviation in rad/s of the turn rate before the first heading of RM.
+"""Standard deviation in rad/s of the turn rate before RM reports its first heading.
 
-The two motors differ although their units are equal.
+The robot may turn, because the two motors have different speeds at equal units.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
@@ -38,7 +38,7 @@ ACCELERATION_RADPS2: Final = 3.0
 FRESH_S: Final = 0.2
 """Age in s up to which the last heading shows the present turn rate."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations of a motion's end that was missed in a lost connection, in m and rad."""
+"""Standard deviations in m and rad of the unmeasured end of a motion that lost the connection."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 
@@ -153,7 +153,8 @@ class Reckoning:
     def guess_changed(self, part: float, late_s: float) -> None:
         """Add the error due to the uncertain time of a change of the wheels' speed ratio.
 
-        ``part``: the change of the ratio; ``late_s``: the interval in s in which it takes effect.
+        ``part``: the change of the ratio; ``late_s``: the interval in s within which the change
+        takes effect.
         """
         turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
@@ -200,7 +201,7 @@ class Reckoning:
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Return the turn on the spot, in rad, that moves the wheel by ``wheel_m``; else zero."""
+        """Return the turn in rad that moves the wheel by ``wheel_m``; zero if not on the spot."""
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property
@@ -225,7 +226,7 @@ class Reckoning:
         if self.motion is Motion.TURN and told:
             turn_rad = told_rad
         self.spun_rad += turn_rad
-        return turn_rad if self.told_rad is None else 0.0  # the reported turn includes it
+        return turn_rad if self.told_rad is None else 0.0  # the reported turn includes this turn
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
         """Correct this motion's guessed turn at the first reported heading.

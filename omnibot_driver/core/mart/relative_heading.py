@@ -17,7 +17,7 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest turn acceleration (rad/s²) and rate (rad/s) with which a heading is plausible."""
 OLD_RAD: Final = 0.01
-"""A heading nearer than this, in rad, to the last heading before RM is itself from before RM."""
+"""Largest difference, in rad, of a heading measured before RM from the last heading before RM."""
 MOST_RAD: Final = 1e7
 """Largest heading in rad that still resolves small turns.
 

@@ -50,5 +50,5 @@ def required_motion(order: Drive | GoTo | None, track_m: float) -> tuple[Motion,
 
 
 def _is_on_the_spot(speed_mps: float, rate_radps: float, track_m: float) -> bool:
-    """Return whether a turn on the spot is nearer to the motion than a turn about one wheel."""
+    """Return whether the twist is more like a turn on the spot than like a turn about one wheel."""
     return abs(speed_mps) < 0.5 * abs(rate_radps) * track_m / 2 or math.isclose(speed_mps, 0.0)

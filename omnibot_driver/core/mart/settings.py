@@ -16,8 +16,9 @@ class MartSettings:
     when the robot turns left, else -1; ``network_delay_s``: longest time that a datagram may be on
     its way, in s; ``spin_speed``: whether R and L turn at the commanded speed (set by SSP) or at
     the server's own SLOW speed; ``motor_balance``: speed of the left motor divided by that of the
-    right one, at equal units; ``max_speed_mps``, ``max_yaw_rate_radps``: limits of the motions to a
-    goal, as far as the server has a slower motion.
+    right one, at equal units; ``max_speed_mps``, ``max_yaw_rate_radps``: limits for the motions to
+    a goal; the server has only a normal and a slow motion, and the driver uses the slow one if the
+    normal one exceeds its limit.
     """
 
     wheel_radius_m: float = 0.0625

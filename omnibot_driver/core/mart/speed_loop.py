@@ -17,7 +17,7 @@ from omnibot_driver.core.mart.motors import MOST_UNITS, UNEQUAL, Motors
 from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_CHANGE: Final = 15
-"""Largest change in units by one command, as a duplicated command acts twice."""
+"""Largest change in units by one command; it is small, as a duplicated command acts twice."""
 MOST_BACKWARD: Final = 5
 """Largest change in units while reversing on a slow network, where duplicates are unnoticed."""
 SETTLE_S, LEARN_S = 0.45, 0.35
@@ -32,13 +32,13 @@ The window grows by LEARN_TRIPS durations. The standard deviation of its speeds 
 SLOWEST_MPS: Final = 0.015
 """Slowest speed of a wheel that certainly turns, in m/s."""
 SLOWEST_START_MPS: Final = 0.03
-"""Slowest wheel speed in m/s with which a motion starts, as the server waits for a movement."""
+"""Slowest wheel speed in m/s with which a motion starts, so that the server sees the wheel turn."""
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the units of a start grow after a start that moved nothing."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""Time in s after a change of the turn rate for which the heading error is not summed."""
+"""Time in s after a change of the turn rate for which the heading error is not integrated."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Variances per squared change of units: if the change may arrive twice; if it is unanswered.
@@ -111,8 +111,9 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Learn that no motor turns with the present units, or with ``units`` on both sides.
 
-        More units than MOST_DEAD turn each motor that is not blocked, so they teach nothing. Units
-        with which the motor has turned before teach nothing either, but a start may need more.
+        MOST_DEAD units or more turn each motor that is not blocked, so they teach nothing. Present
+        units with which the motor has already turned leave its line unchanged, but the next start
+        uses more units.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -207,7 +208,7 @@ class SpeedLoop(Motors):
         should_turn = units < MOST_DEAD and side.line.speed(units) > slowest
         must_turn = units >= MOST_DEAD and side.line.speed(units) > 2 * slowest
         side.stood_s = side.stood_s + self._window_s if must_turn and speed < slowest else 0.0
-        if speed > slowest or should_turn:  # else it stands, as it should
+        if speed > slowest or should_turn:  # else the wheel stands, as it should
             side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:

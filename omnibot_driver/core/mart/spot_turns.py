@@ -18,7 +18,7 @@ from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
-"""Part by which the commanded rate must change for a turn to be begun anew."""
+"""Relative change of the commanded rate from which a turn is begun anew."""
 OFF, OFF_AGAIN = 0.05, 0.12
 """Relative errors of the rate from which a turn is begun anew, with other units.
 
@@ -28,8 +28,8 @@ correction would often cost more than the error.
 HELD, LEAST_LESSON = 0.6, 0.6
 """Parts of the commanded rate, for turns in which the robot may be held.
 
-A robot whose motors are known is regarded as held below HELD. A rate below LEAST_LESSON is learned
-as LEAST_LESSON, so that the next turn has at most 1.7 times the units.
+If the motors are known, a robot that turns slower than HELD is regarded as held. A rate below
+LEAST_LESSON is learned as LEAST_LESSON, so that the next turn has at most 1.7 times the units.
 """
 EVEN: Final = 0.15
 """Largest change of the rate, relative to its mean, with which a turn shows the motors' speed."""
@@ -97,7 +97,7 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the command to send before a turn with this rate (SSP), or None if none is needed.
 
-        It must be sent before the check of the IMU. ``delay_s``: longest delay of a datagram; a
+        SSP must be sent before the check of the IMU. ``delay_s``: longest delay of a datagram; a
         copy of an older setting must not come after a newer one.
         """
         units = self._loop.spin_units(rate_radps)
@@ -183,7 +183,7 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the rate to learn from a measured one, with a minimum as the robot may be held."""
+        """Return the measured rate for learning, raised to a minimum, as the robot may be held."""
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
@@ -227,8 +227,8 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Forget the lesson of a slow turn if this turn shows that the robot was held in it.
 
-        ``part``: rate of this turn as a part of the commanded one. Both lessons together would fit
-        motors with a dead zone that they do not have.
+        ``part``: rate of this turn as a part of the commanded one. From the slow and the fast turn
+        together, the driver would learn a dead zone that the motors do not have.
         """
         if self._before_slow is not None and part > TOO_FAST:
             self._loop.restore(self._before_slow)

@@ -203,7 +203,7 @@ class Starts(Adjusting):
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        self.odometry.started(now, sure=not answer.when.doubtful)  # it may answer RST IMU
+        self.odometry.started(now, sure=not answer.when.doubtful)  # the reply may answer RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 
@@ -242,7 +242,7 @@ class Starts(Adjusting):
         self._halt(now, f"{failed}: {why}", arrived=arrived)
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Return whether the failure text of RM may not be about this RM.
+        """Return whether the failure text of RM may be about another motion.
 
         On some servers the text belongs to the last B. So a reported obstacle is believed only if
         the front sonar sees an obstacle too, or if RM has reported an obstacle twice in a row.

@@ -2,9 +2,9 @@
 
 """The table of commands that may be sent to the MART controller in each state of motion.
 
-If some commands are sent in the wrong state, they hang the real server permanently, with the motors
-turning. So each command is looked up here before it is sent. This module knows commands and states;
-it does not know times or measurements.
+Some commands, sent in the wrong state, hang the real server permanently while the motors turn. So
+each command is looked up here before it is sent. This module knows commands and states; it does not
+know times or measurements.
 """
 
 from collections.abc import Mapping
@@ -142,8 +142,8 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU they start the motors and never answer, or begin when the IMU works again. MCR and
-MCL notice the dead IMU, but some servers turn the robot for half a second first.
+With a dead IMU they start the motors and are never answered, or they begin when the IMU works
+again. MCR and MCL notice the dead IMU, but some servers turn the robot for half a second first.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})

@@ -138,7 +138,7 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The reply to the stop if the network delays and duplicates nothing, or None.
 
-        It is known if more replies came than were missing when the stop began.
+        The reply is known if more replies came than were missing when the stop began.
         """
         return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 

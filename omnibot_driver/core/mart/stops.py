@@ -128,9 +128,9 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user.
 
-        The command is discarded as well, unless its direction is blocked: a block lasts until the
-        command changes. ``arrived``: whether the start has certainly arrived, so that a stop cannot
-        overtake it.
+        The user's command is discarded as well, unless its direction is blocked: a block lasts
+        until the command changes. ``arrived``: whether the start has certainly arrived, so that a
+        stop cannot overtake it.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
@@ -248,8 +248,8 @@ class Stops(Ground, ABC):
         """Record a reply to a stop on the command port that comes after the stop port was used.
 
         So the server has not been restarted, and its stop port may still wait for the end of the
-        motion. It would mistake the start of the next RM for that end. This RM would then never be
-        answered, and nothing could stop it.
+        motion. The stop port would mistake the start of the next RM for that end. The next RM would
+        then never be answered, and nothing could stop it.
         """
         ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
         if ends and self.motion is not Motion.SPIN:
@@ -300,7 +300,7 @@ class Stops(Ground, ABC):
             self._notice(self._obstacle(reply, motion), halt=True)
 
     def _block(self, motion: Motion, why: str) -> None:
-        """Refuse this direction until the command has ended or is zero."""
+        """Refuse the direction of ``motion`` until the command has ended or is zero."""
         if self._blocked is not motion:
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"

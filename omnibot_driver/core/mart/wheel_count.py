@@ -15,7 +15,7 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Largest accepted error of a count that may answer another query, in m, plus m/s times time."""
+"""Largest accepted error, in m, plus m/s times time, of a count that may answer another query."""
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest distance of a wheel between two counts, in m, plus m/s times the time between them.
 
@@ -77,7 +77,7 @@ class WheelCount:
     def refused(self) -> None:
         """Record that the motion did not begin, so the count continues from its last value.
 
-        Ignored if the server has acknowledged the motion.
+        The call is ignored if the server has acknowledged the motion.
         """
         if not self._confirmed:
             self.last, self._begins = self._before, False
