@@ -2,10 +2,10 @@
 
 """Serialise measurements to CDR as rclpy does, and parse velocity commands from CDR.
 
-No ROS message objects are made for this. CDR, the format in which DDS serialises messages, aligns
-every number to its own size, like a C struct on a 64-bit machine, so Python's ``struct`` with
-native alignment writes it. A string is a length and its bytes with a NUL; a sequence is a length
-and its elements. ``difference`` checks whether this holds on the present machine: it compares the
+No ROS message objects are needed. CDR, the format in which DDS serialises messages, aligns every
+number to its own size, like a C struct on a 64-bit machine, so Python's ``struct`` with native
+alignment writes it. A string is a length and its bytes with a NUL; a sequence is a length and its
+elements. ``difference`` checks whether this layout is right on the present machine: it compares the
 bytes with rclpy's own.
 """
 
@@ -126,7 +126,7 @@ def twist(data: bytes) -> tuple[BodyTwist, bool]:
 class Messages:
     """A Serializer that returns rclpy messages instead of bytes.
 
-    It is used on a machine on which rclpy's bytes differ from those of Serializer.
+    The driver uses it on a machine on which rclpy's bytes differ from those of Serializer.
     """
 
     def __init__(self, settings: MessageSettings) -> None:

@@ -63,8 +63,8 @@ def _ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, 
 def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, parameters.Value]:
     """Return the parameters that the calibration file sets, and log their names.
 
-    A missing file, and names in it that are not read, are logged as warnings. Without the warning,
-    a misspelt path would look like a file that does not exist yet.
+    Warnings are logged for a missing file, and for names in the file that the driver does not read.
+    Without the first warning, a misspelt path would look like a file that does not exist yet.
     """
     found, names = calibration.load(path, table), calibration.names(path)
     unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]

@@ -2,8 +2,8 @@
 
 """Diagnostics: the figures of the link, judged and published on ``/diagnostics`` once a second.
 
-diagnostic_updater publishes them where it is installed. Otherwise this module publishes the same
-message without it: same topic, names, levels, hardware id and period. The timer runs on the steady
+diagnostic_updater publishes the diagnostics where it is installed. Otherwise this module publishes
+an equal message: same topic, names, levels, hardware id and period. The timer runs on the steady
 clock, so simulated time does not stop it.
 """
 
@@ -75,7 +75,7 @@ def _through_updater(node: Node, hardware_id: str) -> tuple[Publish, float] | No
     except ImportError:
         return None
     updater = Updater(node, PERIOD_S)
-    updater.timer.cancel()  # it runs on ROS time
+    updater.timer.cancel()  # this timer runs on ROS time
     updater.setHardwareID(hardware_id)
     judged: dict[str, Status] = {}
 

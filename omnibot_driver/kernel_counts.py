@@ -30,7 +30,7 @@ def overruns(descriptor: int) -> int | None:
 
 
 def waited_s(thread_id: int) -> float | None:
-    """Return the time for which this thread was ready to run but did not, in s; None if unknown."""
+    """Return how long this thread was ready to run but did not run, in s; None if unknown."""
     try:
         words = Path(f"/proc/self/task/{thread_id}/schedstat").read_text().split()
         return int(words[1]) * 1e-9

@@ -29,13 +29,13 @@ from omnibot_driver.transports import Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s; longer than a guard takes to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown for a proof that the robot is at rest, in s; extended if a proof takes
-longer. Afterwards the guard repeats Stop."""
+"""Longest wait at shutdown for a proof that the robot is at rest, in s; longer for a board whose
+proof takes longer. Afterwards the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown for a proof that the robot is at rest, in s, without a guard process."""
 SILENCE_S: Final = 0.25
-"""Longest wait for a second proof of standstill, in s. Nothing is sent during this wait, so the
-second proof shows that the last Stop was not damaged."""
+"""Longest wait for a second proof of standstill, in s; longer for a board whose proof takes longer.
+Nothing is sent during this wait, so the second proof shows that the last Stop was not damaged."""
 
 T = TypeVar("T")
 
@@ -145,7 +145,7 @@ class Link:
 
         Returns whether this call has sent Stop and ended the threads. If the port was lost while
         the robot drove, the reader sends Stop if it can open the port again. Afterwards ``stands``
-        shows whether the robot was shown to be at rest.
+        tells whether the board has shown that the robot is at rest.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:

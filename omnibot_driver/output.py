@@ -43,7 +43,7 @@ class UnblockedOutput:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if sys.stdout is not None:  # it is None if closed
+        if sys.stdout is not None:  # a closed output is None
             with contextlib.suppress(BlockingIOError):
                 sys.stdout.flush()
         nothing = os.open(os.devnull, os.O_WRONLY)

@@ -11,6 +11,6 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 DEEP: Final = QoSProfile(depth=1000)
 """Quality of service of messages and calls that must not be lost while the driver is busy.
 
-A queue of 10, as is usual, drops the oldest ones: the messages of a released button would displace
-the message of its press.
+The usual queue of 10 drops the oldest messages: the messages after a button's release would
+displace the message of its press.
 """

@@ -162,7 +162,7 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Process the effects of the received bytes other than measurements; the lock is held."""
+        """Process what the received bytes cause besides measurements; the lock is held."""
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:
             self._shared.settle()

@@ -18,8 +18,8 @@ second. It is less than the guard's limit, so the driver notices every stall in 
 acts."""
 SETTLE_S: Final = 0.25
 """Time after a stall, in s. A command that arrives within this time is regarded as sent during the
-stall, whatever its send time. So is a command whose send time is within this time,
-because a sender's clock is known only roughly."""
+stall, whatever its send time. A command that was sent within this time is regarded as sent during
+the stall too, because a sender's clock is known only roughly."""
 LATEST_S: Final = 10.0
 """Longest time in transit, in s, retransmissions included. A command that seems to be older comes
 from a sender whose clock is wrong."""
@@ -65,7 +65,7 @@ class StallDetector:
         """Record that the watchdog's thread runs; ``wall_ns`` is the time of day in ns."""
         if self._begun:
             self._begun = False
-            if now >= self._over_at + LATEST_S:  # else commands from then may still arrive
+            if now >= self._over_at + LATEST_S:  # else commands from that stall may still arrive
                 self._from_ns = _ns(self._passed_at - LATEST_S)
             self._over_at = now
             self._until_ns = _ns(now + SETTLE_S)

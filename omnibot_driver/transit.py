@@ -34,12 +34,13 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest drift between two clocks, in s/s: a crystal is off by a tenth of this, NTP corrects a
 clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which a message that seems early is less likely to come from a sender than a message
-that is late by the same time."""
+"""Factor that compares two messages, one early and one late by the same time, according to a
+sender's clock: the early one is less likely by this factor to come from that sender."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages of a sender of which at least one is assumed to be hardly delayed. Before
-that, all may have been delayed; the estimated send time of the next message may be too late."""
+"""Number of messages of a sender of which at least one is assumed to be hardly delayed. Before this
+number is reached, all of them may have been delayed; then the estimated send time of the next
+message is too late."""
 
 Differences = tuple[float, float]
 """Our clock at a message's arrival minus the sender's clock at its sending, in s: by our time of

@@ -259,7 +259,7 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_possible_periods(values: Mapping[str, Any]) -> None:
-    """Reject periods below ``SHORTEST_PERIOD_S``, and a period of ticks above 0.5 s or off.
+    """Reject periods below ``SHORTEST_PERIOD_S``, and a ``ticks_period`` above 0.5 s or 0 (off).
 
     With a period near 0 the public firmware would always be sending, and would miss all commands.
     """

@@ -28,7 +28,7 @@ def make(values: Mapping[str, Any]) -> OmniBot:
 
 
 def settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """Make the settings of the board from checked values; its data does not show these settings."""
+    """Make the settings that the board's data does not show, from checked parameter values."""
     return OmniBotSettings(
         baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],

@@ -61,8 +61,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""By common parameter: the condition on a board's traits under which the board has the parameter. A
-parameter that is not listed has no condition."""
+"""For each common parameter: the condition on a board's traits under which the board has the
+parameter. A parameter that is not listed has no condition."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",

@@ -2,8 +2,8 @@
 
 """Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
-They know descriptors and bytes, but not threads or boards. Every failure is a LinkError whose
-text says what to do.
+The transports know descriptors and bytes, but not threads or boards. Every failure is a LinkError
+whose text says what to do.
 """
 
 from collections.abc import Mapping
@@ -59,7 +59,7 @@ class Transport(Protocol):
         """
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write what is accepted without waiting, perhaps nothing; return the number of bytes."""
+        """Write the bytes that are accepted at once, perhaps none; return the number of bytes."""
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, if this kind of port allows it."""

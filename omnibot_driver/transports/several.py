@@ -64,8 +64,7 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines; None for a missing line, even if it is still open.
 
-        A copy of its descriptor in another process would prevent the driver from opening the line
-        again.
+        If another process had a copy of the descriptor, the driver could not open the line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -226,8 +225,8 @@ class Several:
 class Line:
     """One of several lines.
 
-    ``trouble`` is the reason why it is missing, or empty. ``waits`` are the bytes that it has not
-    accepted yet.
+    ``trouble`` is the reason why the line is missing, or empty. ``waits`` are the bytes that the
+    line has not accepted yet.
     """
 
     def __init__(self, opener: Opener) -> None:
@@ -265,7 +264,7 @@ class Line:
     def flush(self, now: float) -> bool:
         """Write waiting bytes; return False if some remain after ``WRITE_TIMEOUT_S``.
 
-        These bytes, and written ones that are not sent yet, are then discarded.
+        In that case, these bytes, and bytes that were written but not sent yet, are discarded.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

@@ -79,7 +79,7 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add uncertainty: the unmeasured left wheel may have turned for this time."""
+        """Add uncertainty: the left wheel is not measured, and may have turned for ``seconds``."""
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
         turn_rad = min(math.pi, most_m / self._settings.track_m)

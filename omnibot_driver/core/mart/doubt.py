@@ -154,7 +154,7 @@ class Doubt:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return independent errors with these standard deviations: of x and y, and of the heading."""
+    """Return independent errors: the standard deviation of x and y, and that of the heading."""
     return _around(way_m * way_m, turn_rad * turn_rad)
 
 

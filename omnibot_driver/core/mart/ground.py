@@ -171,7 +171,7 @@ class Ground:
         self.heard_s = now
 
     def _appears(self, now: float) -> None:
-        """Record that the server may have been restarted: it then starts up, and has no log."""
+        """Record that the server may have been restarted: it may be starting up, without a log."""
         self.appeared_s = now
         self.jobs.log_may_be_lost = self.jobs.logging
         self.jobs.ended = False
@@ -220,7 +220,7 @@ class Ground:
             raise AssertionError(f"{word.text} must not be sent while {self.state.value}")
 
     def _send(self, said: tuple[Word, ...], now: float) -> Packets:
-        """Return the packets of commands whose replies are not awaited, and note their times."""
+        """Return the packets of commands whose replies are not awaited, and record the sending."""
         for word in said:
             self._require(word)
             if word in HARMFUL_LATE:

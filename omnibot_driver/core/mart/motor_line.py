@@ -90,7 +90,7 @@ class MotorLine:
         self.offset = min(0.0, max(-MOST_DEAD * self.slope, offset))
 
     def speed(self, units: float) -> float:
-        """Return the speed at these command units, in nominal units; negative for no motion."""
+        """Return the speed at these command units, in nominal units; negative if it stands."""
         return self.slope * units + self.offset
 
     def units(self, speed: float) -> float:

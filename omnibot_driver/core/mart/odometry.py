@@ -61,7 +61,7 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """Return the errors of the motion since the last count, and of that count's uncertain time.
+        """Return the errors by the motion since the last count, and by that count's uncertain time.
 
         ``ahead_s``: time since the last count; ``blind_since_s``: as in ``told``.
         """

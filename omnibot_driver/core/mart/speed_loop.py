@@ -129,7 +129,7 @@ class SpeedLoop(Motors):
 
     @property
     def blocked_s(self) -> float:
-        """Time in s for which a wheel has stood with units that turn each wheel."""
+        """Time in s for which a wheel has stood although its units suffice to turn it."""
         return max(self._right.stood_s, self._left.stood_s)
 
     @property

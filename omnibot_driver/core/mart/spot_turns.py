@@ -179,7 +179,7 @@ class SpotTurns:
         return abs(speeds.changes[1]) < EVEN * abs(speeds.means[1])
 
     def _is_held(self, seen_radps: float) -> bool:
-        """Return whether something holds the robot, so that its rate teaches nothing."""
+        """Return whether something holds the robot, so that its rate must not be learned."""
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:

@@ -15,7 +15,7 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Largest accepted error, in m, plus m/s times time, of a count that may answer another query."""
+"""Largest accepted error of a count that may answer another query: m, plus m/s times time."""
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest distance of a wheel between two counts, in m, plus m/s times the time between them.
 

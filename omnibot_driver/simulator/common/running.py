@@ -19,7 +19,7 @@ from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.common.wired import B, Line, WiredBoard
 
 UNREAD_LIMIT = 4095
-"""Number of unread bytes that a Linux terminal holds; bytes beyond it are lost."""
+"""Number of unread bytes that a Linux terminal holds; further bytes are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
 """Longest delay in s that the thread makes up for; after a longer delay, ticks are skipped."""

@@ -5,7 +5,7 @@
 It shares no code with the driver: otherwise both would contain the same misreading of the manual,
 and tests would not find it. ``MartServer`` uses no sockets or clocks: its interface is
 ``receive(datagram, port, sender, now)``, ``advance(now)`` and ``copy()``. ``SimulatedMart`` wraps
-it for real ports, ``sim://`` and simulated bad networks.
+``MartServer`` for real ports, ``sim://`` and simulated bad networks.
 """
 
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart

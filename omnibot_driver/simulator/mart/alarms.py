@@ -2,9 +2,9 @@
 
 """Supervision of a motion in progress, 100 times a second, as the server does it.
 
-This module detects that the wheel starts to turn, that it comes to rest, and obstacles; it also
-ends controlled moves. Without samples of the IMU it detects only the obstacles and the dock, in
-controlled linear moves. It knows motions; it does not know commands.
+This module detects the start and the stop of the wheel, and obstacles; it also ends controlled
+moves. Without samples of the IMU, it detects only obstacles and the dock, and only in controlled
+linear moves. It knows motions; it does not know commands.
 """
 
 from typing import TYPE_CHECKING
@@ -73,7 +73,7 @@ def sample(server: "MartServer", motion: Motion) -> None:
 def _miss(server: "MartServer", motion: Motion) -> None:
     """End the motion with an error if samples of the IMU are missing for too long.
 
-    With ``drives_trust_imu`` only controlled motions are checked.
+    With the quirk ``drives_trust_imu``, only controlled motions are checked.
     """
     if server.quirks.drives_trust_imu and motion.kind not in (*_TIMED, Kind.CONTROLLED_SPIN):
         return
@@ -147,7 +147,7 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, from the calibration and the time alone.
 
-    Like the server, it adds the ramps' distance in feet to a sum in inches.
+    Like the server, this function adds the distance of the ramps in feet to a sum in inches.
     """
     if motion.kind not in _TIMED:
         return 0.0

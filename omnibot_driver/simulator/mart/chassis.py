@@ -3,7 +3,7 @@
 """The motor board, its two motors, and the robot that they move.
 
 This module knows registers (0 full forward, 128 stop, 255 full backward), volts and metres; it does
-not know commands or the reason of a movement.
+not know commands or the reason for a movement.
 """
 
 from math import cos, exp, inf, pi, sin
@@ -132,7 +132,7 @@ class Chassis:
     def _turn(
         self, wanted: int, applied: float, speed_mps: float, gain: float
     ) -> tuple[float, float]:
-        """Return a motor's applied effort and speed in m/s after 10 ms more."""
+        """Return a motor's applied effort and speed in m/s after another 10 ms."""
         if applied != wanted:
             slew = self.acceleration * RAMPS_PER_S * STEP_S
             if applied < wanted:

@@ -2,9 +2,9 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-The server compares the beginning of a request with its commands in a fixed order, so F matches any
-later command that begins with F. This module knows command words and numbers; it does not know
-how a motion proceeds.
+The server compares the beginning of a request with its commands in a fixed order, so F also matches
+each command that begins with F and comes later in that order. This module knows command words and
+numbers; it does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -32,8 +32,8 @@ BAD_DISTANCE = "fail bad distance value"
 class Row(NamedTuple):
     """A command and its handler.
 
-    word: the complete command, or its beginning if ``begins``. moves: whether the server refuses it
-    while a motion, a recording or MCS is in progress.
+    word: the complete command, or its beginning if ``begins``. moves: whether the server refuses
+    the command while a motion, a recording or MCS is in progress.
     """
 
     word: str
@@ -91,7 +91,7 @@ def _joined(server: "MartServer") -> bool:
 def _timed(server: "MartServer", text: str) -> str | None:
     """Start TF or TB: an optional speed word, then a distance in inches.
 
-    Without ``speed_word_first`` the speed word may also follow the distance.
+    Without the quirk ``speed_word_first``, the speed word may also follow the distance.
     """
     server.motions[Kind.CONTROLLED_LINEAR].reported_in = 0.0
     behind = text[2:]

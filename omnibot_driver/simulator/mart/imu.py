@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The IMU: its gyro, whether it works, and the heading that the server integrates from it.
+"""The IMU: its gyro, whether it works, and the heading that the server integrates.
 
 This module knows turn rates and times; it does not know motions or commands.
 """
@@ -46,7 +46,7 @@ class Imu:
         return self.alive and not self.closed and not self._dies_s <= now < self._returns_s
 
     def learn(self) -> None:
-        """Let the server know the present bias, as after its measurement at rest."""
+        """Let the server know the present bias, as if it had measured the bias at rest."""
         self._known_dps = self._bias_dps
 
     def sample(self, rate_dps: float, now: float, *, integrates: bool) -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the server remembers of each kind of motion, with its texts, speeds and times.
+"""What the server remembers of each kind of motion, and its reply texts, speeds and times.
 
 This module only holds the values; it does not know what changes them.
 """
@@ -56,7 +56,7 @@ class Motion:
     motion. right, left: register values as the server knows them. encoder: the last count, which
     the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
     turned_s: when the wheel began to turn, and when it last turned. angle_deg: angle since the
-    start. released: whether the stop port ended it.
+    start. released: whether the stop port ended the motion.
     """
 
     def __init__(self, kind: Kind) -> None:

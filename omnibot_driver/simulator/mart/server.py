@@ -20,7 +20,7 @@ from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then
 QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
 QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
-"""Time until a restarted server opens its ports, and from then until it is complete, in s."""
+"""Times in s from a restart to the opening of the ports, and from then to the complete start-up."""
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
 Sender = object
@@ -115,7 +115,8 @@ class MartServer(ServerState):
     def restart(self, boot_s: float = BOOT_S) -> None:
         """Start the server program again; the motors keep their last command.
 
-        Datagrams of the next ``boot_s`` seconds are lost. START_UP_S later the server is complete.
+        Datagrams of the next ``boot_s`` seconds are lost. START_UP_S later the server has started
+        up completely.
         """
         self.begin()
         self.imu.restart()

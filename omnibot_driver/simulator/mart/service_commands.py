@@ -29,7 +29,10 @@ Handler = Callable[["MartServer", str], str | None]
 
 
 def missing(server: "MartServer", what: str) -> str | None:
-    """Refuse a command that lacks numbers, or end the server for the reason ``what`` (a quirk)."""
+    """Refuse a command that lacks numbers.
+
+    With the quirk ``crashes_on_missing_numbers``, end the server instead, for the reason ``what``.
+    """
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
     server.end(what)

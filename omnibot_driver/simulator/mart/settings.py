@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of a simulated MART controller and its robot: sizes, planted faults, firmware.
+"""Settings of a simulated MART controller and its robot: sizes, simulated faults, firmware.
 
 ``Quirks`` are the deviations of the public server from its manual, one switch each. So a driver
 can be tested against the manual, the public server, or a single deviation.
@@ -24,14 +24,14 @@ class Quirks:
     left_spin_in_reference_move: L during RM is accepted, and hangs the command port.
     moves_wait_for_imu: F, B, TF, TB and SB wait until a dead IMU works again, and then continue.
     drives_trust_imu: RM, R and L start without a working IMU. Every uncontrolled motion continues
-        without one, and then does not detect obstacles. The server detects the start and the stop
-        of such a motion by samples of the IMU only.
+        without a working IMU, and then does not detect obstacles. The server detects the start and
+        the stop of such a motion by samples of the IMU only.
     reference_speed_wraps: RM with a speed below 1 or above 127 writes a register value that wraps
         around, which RMCS then clamps.
-    reference_start_counts_on: RM counts samples until the wheel turns. It does not reset this
-        count, but continues from the count of its last stop. After a stop of 0.56 to 0.6 s RM fails
-        at once; after a longer stop it waits for a stuck motor without end. The reason in its reply
-        is that of the last F or B.
+    reference_start_counts_on: RM counts samples until the wheel turns. The count does not begin at
+        zero, but continues from the count of the samples during the last stop of RM. After a stop
+        of 0.56 to 0.6 s RM fails at once; after a longer stop it waits for a stuck motor without
+        end. The reason in the reply to RM is that of the last F or B.
     speed_word_first: a speed word has an effect only before the number; after the number it is
         ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB with 0 inches, or with a word instead of a
@@ -45,7 +45,7 @@ class Quirks:
     unknown_reset_repeats: RST with an unknown word is answered by the last reply.
     clock_moves_heading: TIME during a motion integrates the turn rate over the jump of the clock.
     undocumented_commands: commands that are not in the manual are accepted. Without this quirk, ENC
-        is the only one of these that is accepted.
+        is the only undocumented command that is accepted.
     heading_in_reference_moves_only: the heading of RMRA changes during RM only, according to the
         public source. The server that was run updates it at any time.
     probe_turns: MCR by 0 runs the motors until the wheel moves, or for 0.5 s if the IMU is dead,

@@ -114,7 +114,7 @@ class ServerState:
 
     @property
     def driven_m(self) -> float:
-        """Distance of the right wheel in m since the encoder was reset, by its counts."""
+        """Distance of the right wheel in m since the encoder was reset, by the encoder counts."""
         return self.chassis.counts * self.settings.metres_per_count
 
     @property

@@ -82,11 +82,11 @@ class SimulatedBoard:
 
     tick: number of control ticks of 10 ms since construction.
     mode: current mode. estopped: whether an emergency stop is in effect.
-    commands: commands that it obeyed, newest last; motion that a latched emergency stop refused
-        is not included.
-    sent: frames and texts that it sent, newest last.
-    received: all bytes that reached its serial port, also while it booted; beyond a million bytes
-        the older half is discarded.
+    commands: commands that the board obeyed, newest last, without motion commands that it refused
+        because of a latched emergency stop.
+    sent: frames and texts that the board sent, newest last.
+    received: all bytes that reached the board's serial port, also during the boot; beyond a million
+        bytes the older half is discarded.
     """
 
     channels = CHANNELS

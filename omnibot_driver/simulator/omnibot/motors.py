@@ -83,7 +83,7 @@ class Motor:
         settled = (pwm - copysign(constants.friction_pwm, direction)) / constants.pwm_per_count
         end = settled + (start - settled) * self._decay
         ticks = 1.0
-        if end * direction < 0:  # friction stops it within this tick
+        if end * direction < 0:  # friction stops the wheel within this tick
             ticks = constants.time_constant_ticks * log(1 - start / settled)
             end = 0.0
         turned = settled * ticks + constants.time_constant_ticks * (start - end)

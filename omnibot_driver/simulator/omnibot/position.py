@@ -13,7 +13,7 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 from omnibot_driver.simulator.omnibot.wire import Triple
 
 SPEED_PER_WAY = 2.0
-"""Speed per distance from the goal, in 1/s, up to the limits below."""
+"""Speed per distance from the goal, in 1/s, up to FASTEST_MPS and FASTEST_RADPS."""
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3
