@@ -38,6 +38,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.status import Status
 
 UNMEASURED_VARIANCE: Final = 1e6
+"""Variance of z, roll and pitch, which planar odometry lacks, and of an unknown twist."""
 RADIATION: Final = {"ultrasound": Range.ULTRASOUND, "infrared": Range.INFRARED}
 """Value of ``radiation_type`` in sensor_msgs/Range, by the type of the sensor."""
 SHORTEST_QUATERNION: Final = 1e-3
@@ -45,8 +46,8 @@ MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""State of the wheels: displacement of the robot by which they have rolled so far (m, rad),
-unwrapped wheel angles in rad, wheel rates in rad/s (empty if unknown)."""
+"""State of the wheels: displacement of the robot by their rolling so far (m, rad), unwrapped wheel
+angles in rad, wheel rates in rad/s (empty if unknown)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,8 +34,8 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest drift between two clocks, in s/s: a crystal is off by a tenth of this, NTP corrects a
 clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor that compares two messages, one early and one late by the same time, according to a
-sender's clock: the early one is less likely by this factor to come from that sender."""
+"""A message that seems early is less likely by this factor to come from a sender than a message
+that is late by the same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages of a sender of which at least one is assumed to be hardly delayed. Before this

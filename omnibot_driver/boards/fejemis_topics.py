@@ -207,7 +207,7 @@ class FejemisTopics:
         return response
 
     def _lift(self, link: Any) -> Callable[..., None]:
-        """Return the callback of ``lift_cmd``; 0 V is obeyed at any age and in any state."""
+        """Return the callback of ``lift_cmd``, which obeys 0 V at any age and in any state."""
 
         def lift(session: Session, message: Float32, now: float) -> None:
             board = cast(FejemisBoard, session.board)

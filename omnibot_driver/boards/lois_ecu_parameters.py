@@ -237,7 +237,7 @@ SENT: Final = (
 
 
 def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
-    """Reject a terminal mode without checksum: one setting of the board selects either."""
+    """Reject a terminal mode without checksum: both are values of one setting of the board."""
     if values["terminal_mode"] != "host" and not values["checksum"]:
         raise ParameterError(
             "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"

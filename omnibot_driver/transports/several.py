@@ -80,7 +80,7 @@ class Several:
 
     @property
     def overruns(self) -> int | None:
-        """Sum of the counts of the open lines; None if one of them does not have a count."""
+        """Number of times the kernel has lost bytes of open lines; None if one has no counter."""
         counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))
 

@@ -213,7 +213,7 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server has not driven by RM since its start, so its clock may be set back.
+        """Whether the server's clock may be set back: no RM has run since the server's start.
 
         RM integrates the heading over the time since the previous RM. If the clock was set back in
         that time, the heading is useless.

@@ -106,7 +106,7 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Record that a motion has begun, so that ``heading_told`` can remove its heading error."""
+        """Record that a motion has begun, whose heading error ``heading_told`` can remove."""
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:

@@ -179,7 +179,7 @@ class Jobs:
             self._finish(False, f"the controller did not answer {word.text}; {advice}")
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
-        """Evaluate the reply to a controlled move, and end the docking job if it was its move."""
+        """Evaluate the reply to a controlled move; end the docking job if the job sent the move."""
         if self.job is not Job.DOCK or not self.moving:
             return
         if isinstance(reply, Fail):

@@ -36,7 +36,7 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Correct the line by a measured speed; ``doubt`` multiplies the deviation NOISE."""
+        """Correct the line by a measured speed; ``doubt`` multiplies its standard deviation."""
         self._learned = True
         if self._ss < SLOPE_SD**2:
             self._ss += SLOPE_DRIFT**2
@@ -90,7 +90,7 @@ class MotorLine:
         self.offset = min(0.0, max(-MOST_DEAD * self.slope, offset))
 
     def speed(self, units: float) -> float:
-        """Return the speed at these command units, in nominal units; negative if it stands."""
+        """Return the speed at these command units, in nominal units; negative at a standstill."""
         return self.slope * units + self.offset
 
     def units(self, speed: float) -> float:

@@ -173,7 +173,7 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Give a notice of a start or end to the first waiter, or keep it if none waits."""
+        """Give a notice of a motion's start or end to the first waiter; keep it if none waits."""
         for waiter in self.waiters:
             if waiter.kind is kind:
                 self.waiters.remove(waiter)

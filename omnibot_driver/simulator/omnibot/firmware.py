@@ -110,7 +110,7 @@ class SimulatedBoard:
             self._run()
 
     def reboot(self) -> None:
-        """Restart the board as after a power cycle or an R; the robot keeps its true pose."""
+        """Restart the board, as a power cycle or an R does; the robot keeps its true pose."""
         self._power_up(BoardPose())
 
     def _power_up(self, pose: BoardPose) -> None:
