@@ -17,9 +17,10 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""After WAG_S (s) of constant heading, the driver turns the robot a little, by WAG_UNITS.
+"""After WAG_S (s) of constant heading, the driver turns the robot a little: WAG_UNITS per motor.
 
-If the heading then changes, the IMU works and the robot has driven straight.
+If the turn changes the heading, the IMU works, and the heading was constant because the robot drove
+straight.
 """
 
 STARTED_M: Final = 0.01

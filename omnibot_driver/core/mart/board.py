@@ -52,7 +52,7 @@ TRAITS: Final = Traits(
 UNREAD_S: Final = 0.5
 """Time in s without a reading after which any reply is reported as NOTHING_MEASURED.
 
-Measurements of a moving robot come more often than this.
+Measurements of a moving robot come at shorter intervals.
 """
 EXPECTED_EVERY_S: Final = 0.2
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The exchange with the server: one request at a time, and the matching of replies.
+"""The exchange with the server: one request at a time, and the assignment of replies to requests.
 
 Replies carry no sequence number, and datagrams can be lost, duplicated or late. So a reply is
-matched by its form, its failure text and the least time that its command takes. A reply that does
+assigned by its form, its failure text and the least time that its command takes. A reply that does
 not match is regarded as late and discarded. After an unanswered query, no query with the same form
 of reply is sent until the missing reply can no longer come. The queries that are needed for driving
 cannot wait: the replies to them are marked as doubtful, and their recipient compares them with the
@@ -152,7 +152,7 @@ class Conversation:
     def settle(self, now: float) -> None:
         """Record that the server has answered the last request.
 
-        Replies to earlier requests then come within ``delay_s`` or are lost.
+        Missing replies to earlier requests come within ``delay_s`` from now, or are lost.
         """
         for form, until_s in self._owed_until_s.items():
             self._owed_until_s[form] = min(until_s, now + self.delay_s)
@@ -198,7 +198,8 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """Return the reply with its request, or None if the reply is late, duplicate or foreign.
 
-        Replies to HELLO do not pass here, as HELLO may be sent while a request is pending.
+        Replies to HELLO are evaluated elsewhere, because HELLO may be sent while a request is
+        pending.
         """
         pending = self.pending
         if isinstance(reply, Ok):
@@ -232,8 +233,8 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether the reply to ``word`` is a duplicate of the reply to another query.
 
-        That is assumed if another query was just answered identically, but ``word`` was answered
-        differently the last time. The reply to ``word`` is then still to come.
+        A duplicate is assumed if an identical reply to another query has just come, and the
+        previous reply to ``word`` was different. The true reply to ``word`` is then still to come.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA

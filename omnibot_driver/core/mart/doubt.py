@@ -35,7 +35,7 @@ PIVOT: Final = 0.01
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation of the heading after a straight controlled move, in rad."""
 BEND_WALK: Final = 0.5
-"""Part of the error of a turn known from commands alone that is independent in each step."""
+"""Part of a turn's error that is independent in each step, if only commands show the turn."""
 ASTRAY: Final = 0.7
 """Position error, as a part of the distance driven, per rad² of heading variance."""
 SPREAD: Final = 0.3
@@ -112,7 +112,8 @@ class Doubt:
     def heading_told(self) -> None:
         """Remove the heading error of a turn known from commands alone.
 
-        Call this when the server reports the heading. The resulting position error remains.
+        Call this when the server reports the heading. The position error that the wrong heading has
+        caused remains.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad

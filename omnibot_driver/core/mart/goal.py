@@ -89,8 +89,8 @@ class Done:
 class Surplus:
     """The measured excess of controlled moves over the requested distances and turns.
 
-    The excess of turns is a number of degrees. The excess of straight moves is a ratio, as the
-    server ends them by time.
+    The excess of turns is a number of degrees. The excess of straight moves is a ratio, because the
+    server ends a straight move after a computed time.
     """
 
     def __init__(self) -> None:
@@ -112,7 +112,8 @@ class Surplus:
     def degrees(self, wanted: float, *, slow: bool) -> int:
         """Return the number of degrees to request for a turn by ``wanted`` degrees.
 
-        The result is 0 if no possible turn would bring the robot nearer by at least WORTH_DEG.
+        The result is 0 if no possible turn would bring the heading nearer to the goal's by at least
+        WORTH_DEG.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
@@ -150,7 +151,7 @@ class Move:
     def repeated(self) -> "Move":
         """Return the progress with which to continue after ``place`` was commanded again.
 
-        A robot that has come near enough is left where it is.
+        A robot that has come near enough to the goal is left where it is.
         """
         if not self.given_up:
             return self

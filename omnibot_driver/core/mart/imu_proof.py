@@ -25,7 +25,7 @@ from omnibot_driver.core.mart.words import (
 PROVED_S: Final = 0.2
 """Largest age in s of a successful check of the IMU with which a motion may start."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""Usual duration of a check in s; half of any excess is regarded as the delay of the reply."""
+"""Usual duration of a check in s; half of any additional time is regarded as the reply's delay."""
 FAILS: Final = {RESET: 3, CHECK: 1}
 """Number of failed checks in a row after which the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0

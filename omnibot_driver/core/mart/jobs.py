@@ -115,8 +115,8 @@ class Jobs:
         """Begin a job.
 
         Raises RequestRefused while another job is under way, and for a download of a log that was
-        not started. A new job replaces the driver's own job of setting the clock, if its request
-        was not sent yet.
+        not started. A new job replaces the driver's own job of setting the clock, unless TIME was
+        already sent.
         """
         if self.job is Job.TIME and not self._waiting:
             self._clear()
@@ -200,7 +200,7 @@ class Jobs:
                 self._piece_s = now + QUIET_S / 3
 
     def tick(self, now: float) -> None:
-        """End the download if no more pieces come, or a job that has taken too long."""
+        """End a download that gets no more pieces, or a job that has taken too long."""
         if self.collecting and now >= self._piece_s:
             self._close_file()
         elif self.job is not None and now >= self._until_s:

@@ -22,7 +22,7 @@ STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 """Time in s for which a robot may roll out after a stop, and after a controlled move.
 
-If a controlled move fails, the server reports it at once, before the robot is at rest.
+If a controlled move fails, the server reports the failure at once, before the robot is at rest.
 """
 
 

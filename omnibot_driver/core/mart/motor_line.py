@@ -36,7 +36,7 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Correct the line by a measured speed; ``doubt`` multiplies its standard deviation."""
+        """Learn from a measured speed; ``doubt`` multiplies the standard deviation of the speed."""
         self._learned = True
         if self._ss < SLOPE_SD**2:
             self._ss += SLOPE_DRIFT**2

@@ -116,7 +116,7 @@ def _units(lines: Lines, speed: float) -> int:
 
 
 def _learn_spin(lines: Lines, units: int, speed: float) -> None:
-    """Learn the mean speed of both motors; it shows nothing of the ratio of their speeds."""
+    """Learn the mean speed of both motors, without any change of the ratio of their speeds."""
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2
     slope, offset = right.slope, right.offset

@@ -71,7 +71,7 @@ class Moves(Asking):
     def _doubt_a_copy(self, now: float) -> None:
         """Add uncertainty if the server may have run the last controlled move twice.
 
-        The encoder count then begins anew, and covers only the second run.
+        A second run resets the encoder count, so the count covers only the second run.
         """
         move, self._last_move = self._last_move, None
         if move is None or not self.conversation.disturbed(now):

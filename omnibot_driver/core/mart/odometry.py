@@ -61,7 +61,9 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """Return the errors by the motion since the last count, and by that count's uncertain time.
+        """Return the errors of a prediction from the last count.
+
+        They come from the motion since that count, and from the uncertain time of that count.
 
         ``ahead_s``: time since the last count; ``blind_since_s``: as in ``told``.
         """

@@ -37,7 +37,7 @@ STOPS_S: Final = 1.0
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 """Time in s from the first reply after an absence to the first query VOLTS.
 
-It is shorter than STARTS_UP_S, so that the first motion uses the measured voltage.
+This time is shorter than STARTS_UP_S, so that the first motion uses the measured voltage.
 """
 VOLTS_S: Final = 10.0
 """Longest time in s for which unanswered requests delay the query VOLTS."""
@@ -192,7 +192,8 @@ class Pilot(Hearing):
 
         The duplicate runs after the move and blocks the command port, so ENC is not answered.
 
-        SL and SS would hang a server that drives by RM or B, but the last motion was neither.
+        The stops SL and SS would hang a server that drives by RM or B, but the last motion was a
+        controlled move.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
         if self.state is not State.STILL or not suspected:

@@ -162,7 +162,7 @@ class Reckoning:
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
         """Process a count of the right wheel; return the displacement since the last count.
 
-        Returns None if the count is implausible or may be of an earlier motion, and
+        Returns None if the count is implausible or may belong to an earlier motion, and
         NOTHING_MEASURED if the displacement is unknown, as at the first count.
         """
         if when.from_s < self._began_s:

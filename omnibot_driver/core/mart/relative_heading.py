@@ -21,8 +21,8 @@ OLD_RAD: Final = 0.01
 MOST_RAD: Final = 1e7
 """Largest heading in rad that still resolves small turns.
 
-The server integrates by its wall clock in unsigned milliseconds. If that clock was set back, the
-heading is about 1e15 degrees.
+The server integrates the turn rate over unsigned milliseconds of its wall clock. If that clock was
+set back, the heading is about 1e15 degrees.
 """
 AHEAD_S: Final = 0.3
 """Longest prediction of the heading to the time of a count, in s."""
@@ -69,7 +69,7 @@ class RelativeHeading:
         self._angle_rad = None
 
     def begin(self, now: float, *, anew: bool) -> None:
-        """Record that a motion was started; ``anew``: whether it resets the heading to zero."""
+        """Record that a motion was started; ``anew``: whether RM resets the heading."""
         if anew:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
         self._turned_rad = 0.0

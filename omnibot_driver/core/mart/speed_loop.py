@@ -111,8 +111,8 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Learn that no motor turns with the present units, or with ``units`` on both sides.
 
-        MOST_DEAD units or more turn each motor that is not blocked, so they teach nothing. Present
-        units with which the motor has already turned leave its line unchanged, but the next start
+        MOST_DEAD units or more turn each motor that is not blocked, so they teach nothing. If a
+        motor has already turned with its present units, its line is not changed, but the next start
         uses more units.
         """
         for side in (self._right, self._left):
@@ -136,7 +136,7 @@ class SpeedLoop(Motors):
     def left_over_right(self) -> float:
         """Ratio of left to right wheel speed, by the units and the learned lines.
 
-        At equal units of both sides it is ``balance``.
+        At equal units of both sides, the ratio is ``balance``.
         """
         right, left = self._right, self._left
         if not right.units:
@@ -148,7 +148,7 @@ class SpeedLoop(Motors):
     def balance(self) -> float:
         """Ratio of the left to the right motor's speed at equal units of the present motion.
 
-        It differs from ``motor_balance`` by MOST_UNEQUAL at most.
+        The ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
         """
         return self._balance(self.units)
 
@@ -173,8 +173,8 @@ class SpeedLoop(Motors):
     ) -> None:
         """Learn from a measured displacement of this duration, and hold the heading.
 
-        ``right_only``: only the right wheel was measured, so the left motor's line is moved as the
-        right motor's.
+        ``right_only``: only the right wheel was measured, so the left motor's line is changed by as
+        much as the right motor's.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

@@ -34,8 +34,8 @@ LEAST_LESSON is learned as LEAST_LESSON, so that the next turn has at most 1.7 t
 EVEN: Final = 0.15
 """Largest change of the rate, relative to its mean, with which a turn shows the motors' speed."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Parts of the commanded rate. After a turn slower than the first, a turn that is faster than the
-second shows that something held the robot in the slow turn, so its lesson is false."""
+"""Parts of the commanded rate. If a turn slower than HINDERED is followed by one faster than
+TOO_FAST, something held the robot in the slow turn, and what was learned from it is false."""
 SAME, CORRECTIONS = 0.2, 2
 """Largest relative difference of rates that are regarded as equal; most corrections of a rate."""
 STEADY: Final = 0.03
@@ -152,8 +152,8 @@ class SpotTurns:
     def _is_off(self, rate_radps: float, steady_s: float, *, disturbed: bool) -> bool:
         """Return whether the turn's rate is so wrong that the turn must be begun anew.
 
-        The stop shows how fast the motors turn with their units, so the next turn is better. While
-        the commanded rate changes, the result is False.
+        The stop of the turn shows how fast the motors turn with their units, so the next turn is
+        better. While the commanded rate changes, the result is False.
         """
         if disturbed or not self._is_seen(steady_s):
             return False

@@ -264,7 +264,7 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _learn_standing(self) -> None:
-        """Learn that the motors need more units than those of the present motion to turn."""
+        """Learn that the motors do not turn with the units of the present motion."""
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:

@@ -15,11 +15,15 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Largest accepted error of a count that may answer another query: m, plus m/s times time."""
+"""Largest accepted error of a count that may answer another query.
+
+The error is DOUBT_M (m), plus DOUBT_MPS (m/s) times the driving time since the last count and the
+time uncertainty of the reply.
+"""
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest distance of a wheel between two counts, in m, plus m/s times the time between them.
 
-A larger difference shows that one of the counts is false.
+A larger distance shows that one of the two counts is false.
 """
 STRAY_COUNTS: Final = 3
 """Largest change of the count of a robot at rest."""
