@@ -114,7 +114,7 @@ class Link:
 
     @property
     def reconnect_interval_s(self) -> float:
-        """Wait before a lost port is first opened again, in s."""
+        """Time in s from the loss of a port to the first attempt to open it again."""
         return self._reader.reconnect_interval_s
 
     @reconnect_interval_s.setter

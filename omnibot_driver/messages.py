@@ -46,16 +46,16 @@ MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""State of the wheels: displacement of the robot by their rolling so far (m, rad), unwrapped wheel
-angles in rad, wheel rates in rad/s (empty if unknown)."""
+"""State of the wheels: sum of the robot's displacements along its own axes (m, rad), unwrapped
+wheel angles in rad, wheel rates in rad/s (empty if unknown)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageSettings:
     """Frames, standard deviations (SI units) and wheels that messages are made with.
 
-    Frame names include the prefix. Without an IMU its frame name is the prefix alone, and its
-    standard deviations are 0.
+    Frame names include the prefix. Without an IMU, the name of the IMU frame is the prefix alone,
+    and the IMU's standard deviations are 0.
     """
 
     odom_frame: str

@@ -3,9 +3,9 @@
 """A session fed from a recording: the counterpart of `Link` for recorded bytes.
 
 The only clock is the recording's. The session gets each chunk of bytes at the time at which it was
-received, and ``tick`` is called whenever ``wake_at`` is reached. Its output therefore depends on
-the recording alone, and not on this machine or on the playback speed. The bytes that the session
-would write are discarded.
+received, and ``tick`` is called whenever ``wake_at`` is reached. The session's output therefore
+depends on the recording alone, and not on this machine or on the playback speed. The bytes that the
+session would write are discarded.
 """
 
 import threading

@@ -57,7 +57,7 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
 def waiting_advice(port: str, now_ns: int) -> str:
     """Return a warning if the node's clock, ``now_ns``, is still 0; otherwise empty.
 
-    A recording has stamps of its own, so this is not checked for it.
+    A recording has stamps of its own, so the clock is not checked for a recording.
     """
     if now_ns or port.lower().startswith(RECORDING):
         return ""

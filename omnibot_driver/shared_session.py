@@ -70,7 +70,8 @@ class SharedSession:
     def call(self, action: Callable[[Session, float], T]) -> T:
         """Call ``action`` with the session and the time in s; return the result of ``action``.
 
-        The resulting packets are written before this returns; another thread delivers the events.
+        The resulting packets are written before ``call`` returns; another thread delivers the
+        events.
         """
         try:
             with self.lock:

@@ -14,7 +14,7 @@ from typing import Final
 
 STANDSTILL_S: Final = 0.4
 """Shortest stall, in s: time without a call of ``passed``, which should be called ten times a
-second. It is less than the guard's limit, so the driver notices every stall in which the guard
+second. This limit is less than the guard's, so the driver notices every stall in which the guard
 acts."""
 SETTLE_S: Final = 0.25
 """Time after a stall, in s. A command that arrives within this time is regarded as sent during the
@@ -42,7 +42,7 @@ class StallDetector:
     ``outlived_by`` is never True while ``begun`` would report a stall.
 
     All times are kept by the steady clock, so a step of the time of day does not change them. Each
-    call of ``passed`` measures the difference between the two clocks.
+    call of ``passed`` measures the difference of the time of day from the steady clock.
     """
 
     def __init__(self) -> None:

@@ -66,7 +66,7 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """The age of a message: ``total_s`` since it was sent, ``waited_s`` of that in our own queue.
+    """The age of a message: ``total_s`` since the sending, including ``waited_s`` in our own queue.
 
     ``sent_ns`` is when the message was sent, by our time of day in ns. It has two possible values
     until enough messages of its sender have arrived.
@@ -132,7 +132,7 @@ class Transit:
 
 
 class _Sender:
-    """One sender on a topic, and its clock compared with both of ours."""
+    """One sender on a topic, and its clock compared with both of our clocks."""
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
         self.number: int | None = None

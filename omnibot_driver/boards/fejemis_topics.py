@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Topics and services that only a Fejemis has. They only connect ROS to the session."""
+"""Topics and services that only a Fejemis has. This module only connects ROS to the session."""
 
 import math
 from collections.abc import Callable, Mapping

@@ -14,10 +14,10 @@ ENDS_S: Final = range(56, 59)
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
-    """Return month, day, year, hour, minute and second for TIME (UTC), or None if it must wait.
+    """Return month, day, year, hour, minute and second for TIME (UTC), or None if TIME must wait.
 
-    ``now_s``: this computer's time in s since 1970. Without ``may_set_back``, the next minute
-    is sent shortly before it begins; the clock then is up to 4 s fast.
+    ``now_s``: this computer's time in s since 1970. Without ``may_set_back``, the next minute is
+    sent shortly before it begins, so the clock is set up to 4 s fast.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters that the MART controller has and not every board has. No ROS is needed."""
+"""The parameters of the MART controller that not every board has. No ROS is needed."""
 
 from typing import Final
 

@@ -159,7 +159,7 @@ class MartTopics:
     async def _save(self, done: JobDone) -> tuple[bool, str]:
         """Write the file in a separate thread, since a disk may be slow.
 
-        Returns whether it succeeded, and the message for the caller.
+        Returns whether the file was written, and the message for the caller.
         """
         answer = Future()
 

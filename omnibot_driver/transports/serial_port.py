@@ -77,7 +77,7 @@ class SerialPort:
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
-        """Descriptor of the port; None if it does not have one."""
+        """Descriptor of the port; None if the port does not have one."""
         return None if self._descriptor is None else (self._descriptor,)
 
     @property

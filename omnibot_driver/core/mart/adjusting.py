@@ -37,7 +37,7 @@ class Adjusting(Moves):
         return "unknown" if ratio is None else f"{ratio:.3f}"
 
     def _adjust(self, now: float) -> Packets:
-        """Return the command that corrects the motors' units by the measured speed, if needed."""
+        """Return the command that adjusts the motors' units to the commanded speed, if needed."""
         odometry = self.odometry
         if self.state is State.DRIVING and not odometry.heading.is_known:
             if abs(odometry.speeds.means[0]) > CREEP_MPS:

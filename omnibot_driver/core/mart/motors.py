@@ -58,7 +58,7 @@ class Motors:
         return _units(self._lines, self._spin_speed(rate_radps))
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
-        """Return the units for a turn at ``rate_radps``, as ``units`` have given ``seen_radps``."""
+        """Return the units for a turn at ``rate_radps``; ``units`` have led to ``seen_radps``."""
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
         return _units(lines, self._spin_speed(rate_radps))
@@ -116,7 +116,7 @@ def _units(lines: Lines, speed: float) -> int:
 
 
 def _learn_spin(lines: Lines, units: int, speed: float) -> None:
-    """Learn the mean speed of both motors, without any change of the ratio of their speeds."""
+    """Learn the mean speed of both motors, by changing both lines by the same amounts."""
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2
     slope, offset = right.slope, right.offset

@@ -18,9 +18,9 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 class Terminal:
     """A new pseudo-terminal; the driver opens ``address``, the simulator uses ``descriptor``.
 
-    The terminal stays open when a program that uses it closes it. If more than ``UNREAD_LIMIT``
-    bytes are unread, further bytes are lost, as on a UART whose kernel buffer is full. ``link`` is
-    the path of a symbolic link to the terminal, made here and removed by ``close``.
+    The terminal stays open when the driver closes the port. If more than ``UNREAD_LIMIT`` bytes are
+    unread, further bytes are lost, as on a UART whose kernel buffer is full. ``link`` is the path
+    of a symbolic link to the terminal, made here and removed by ``close``.
 
     Raises FileExistsError if ``link`` exists, unless it is a dead link or a link to a
     pseudo-terminal; such a link is replaced.

@@ -36,7 +36,7 @@ class UdpSocket:
         return datagrams
 
     def send(self, data: bytes) -> int:
-        """Send a datagram to the driver; return 0 without a known address or after an error."""
+        """Send a datagram to the driver; return 0 if no address is known, or on an error."""
         if self._peer is None:
             return 0
         try:

@@ -18,7 +18,7 @@ TICK_S = 0.002
 class SimulatedMart:
     """A simulated MART controller with the common interface of simulated boards.
 
-    ``server`` is the controller with its robot; it holds all other state.
+    ``server`` is the controller with its robot, which holds all state except ``ticks``.
     """
 
     channels, tick_s = CHANNELS, TICK_S

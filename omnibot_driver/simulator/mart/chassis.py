@@ -100,7 +100,7 @@ class Chassis:
 
     @property
     def encoder(self) -> int:
-        """Encoder count that the board reports; 0 if its serial line is cut."""
+        """Encoder count that the board reports; 0 if the board's serial line is cut."""
         return 0 if self.silent else int(self.counts)
 
     @property

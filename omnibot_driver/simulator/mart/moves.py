@@ -82,8 +82,8 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
     """Take a sample of the gyro bias, and schedule the next one until ``left`` are taken.
 
-    Then start the motion ``kind``, or answer SB if ``kind`` is None. ``missed``: consecutive
-    samples that did not arrive.
+    After the last sample, start the motion ``kind``, or answer SB if ``kind`` is None. ``missed``:
+    consecutive samples that did not arrive.
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0

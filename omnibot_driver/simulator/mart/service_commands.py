@@ -100,7 +100,7 @@ def _tell_status(server: "MartServer") -> None:
 
 
 def sonar(*, backward: bool) -> Handler:
-    """Return the handler of SFC or SRC; a near obstacle takes three measurements."""
+    """Return the handler of SFC or SRC, which measures a near obstacle three times."""
 
     def handle(server: "MartServer", text: str) -> str | None:
         least = REAR_CLEARANCE_IN if backward else FRONT_CLEARANCE_IN

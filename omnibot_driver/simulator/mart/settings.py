@@ -41,7 +41,8 @@ class Quirks:
     crashes_early: VOLTS and all motions but F and B end a server that has just started.
     empty_datagram_ends: an empty datagram at the command port ends the server.
     exit_is_silent: EXIT is not answered unless LOG was sent before.
-    log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, which then fail.
+    log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, so that these commands
+        fail.
     unknown_reset_repeats: RST with an unknown word is answered by the last reply.
     clock_moves_heading: TIME during a motion integrates the turn rate over the jump of the clock.
     undocumented_commands: commands that are not in the manual are accepted. Without this quirk, ENC
@@ -101,17 +102,18 @@ Stuck = Literal["none", "left", "right", "both"]
 class MartSettings:
     """Settings of the controller, its robot and its surroundings.
 
-    speed_mps_per_unit: wheel speed per register unit at nominal_volts; it grows with the voltage.
-    dead_zone_units: effort that is needed before a motor turns; only effort beyond it gives speed.
-    motor_inequality: how much faster the left motor is than the right one, as a fraction of the
-    speed. encoder_sign: -1 if the count decreases forward. gyro_bias_dps: bias that the server does
-    not know before it has measured it. gyro_noise_dps: standard deviation of a sample while a wheel
-    turns. imu_dies_s, imu_returns_s: times since construction when the IMU fails and when it works
-    again. stuck: wheels that do not turn. motor_board_silent: whether the motor board's serial line
-    is cut. motor_status: bits of MCSTAT, except those of the voltage; a tripped or short-circuited
-    motor stops. front_m, rear_m: distances from the start to walls across the x axis. dock_m:
-    distance forward from the start to the dock. reference_start_fails: whether the server answers
-    ``fail`` to RM although the robot moves. clock_s: initial wall clock in Unix time.
+    speed_mps_per_unit: wheel speed per register unit at nominal_volts; the speed grows with the
+    voltage. dead_zone_units: effort that is needed before a motor turns; only effort beyond it
+    gives speed. motor_inequality: how much faster the left motor is than the right one, as a
+    fraction of the speed. encoder_sign: -1 if the count decreases forward. gyro_bias_dps: bias of
+    the gyro, which the server does not know before SB. gyro_noise_dps: standard deviation of a
+    sample while a wheel turns. imu_dies_s, imu_returns_s: times since construction when the IMU
+    fails and when it works again. stuck: wheels that do not turn. motor_board_silent: whether the
+    motor board's serial line is cut. motor_status: bits of MCSTAT, except those of the voltage; a
+    tripped or short-circuited motor stops. front_m, rear_m: distances from the start to walls
+    across the x axis. dock_m: distance forward from the start to the dock. reference_start_fails:
+    whether the server answers ``fail`` to RM although the robot moves. clock_s: initial wall clock
+    in Unix time.
     """
 
     quirks: Quirks = FIRMWARE

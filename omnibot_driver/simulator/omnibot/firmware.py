@@ -180,7 +180,7 @@ class SimulatedBoard:
         at_s: arrival time of the first byte, in s by any monotonic clock (default: the time of the
             last tick). The other bytes follow without a pause. Only a receiver that detects idle
             gaps uses this time.
-        channel: ignored, because the board has only one.
+        channel: ignored, because the board has only one channel.
         """
         self.received += data
         if len(self.received) > RECEIVED_LOG_BYTES:

@@ -3,7 +3,7 @@
 """Positional control: driving to a commanded pose.
 
 The manual says only that the switch selects this control; the rest is assumed. Knows the units of a
-commanded pose and how fast the robot drives there. Must not know wheels.
+commanded pose and how fast the robot drives to the pose. Must not know wheels.
 """
 
 from math import cos, hypot, sin

@@ -65,8 +65,8 @@ class BoardSettings:
         time.
     accel_bias_g, accel_noise_g: in the sensor's axes, in g; the noise is rms per reading.
     gyro_stuck: raw counts that the gyro reads at any motion; None if the gyro works.
-    boot_time_s: time from power-up or reset until the board is paused; until then it sends and
-        obeys nothing.
+    boot_time_s: time from power-up or reset until the board is paused; until then the board sends
+        and obeys nothing.
     initial_pose: the board's own pose at construction, for a board that has already driven.
     running: at construction the board is awake and in its running mode.
     """
