@@ -50,7 +50,7 @@ class Ending:
                 signal.signal(number, lambda *_: None)
 
     def begin(self, defect: BaseException | None = None) -> None:
-        """End the driver; with a defect its exit code is 1. Any thread may call this."""
+        """End the driver; with a defect the exit code is 1. Any thread may call this."""
         self.defect = self.defect or defect
         os.write(self._wake, b"\0")
 

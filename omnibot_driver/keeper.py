@@ -40,7 +40,8 @@ class Keeper:
     """A guard process for open lines, from construction until ``end``.
 
     ``descriptors``: file descriptors of the lines, by channel; None for a missing line. ``stop``:
-    what the guard sends; ``emergency_stop``: what it sends instead while the e-stop is latched.
+    what the guard sends; ``emergency_stop``: what the guard sends instead while the e-stop is
+    latched.
     """
 
     def __init__(

@@ -27,7 +27,7 @@ from omnibot_driver.replay import Replay
 class Services:
     """The services of one node, without those that only one board has.
 
-    ``calibration_file`` is where a measured bias is saved; if empty, it is not saved.
+    ``calibration_file`` is where a measured bias is saved; if it is empty, the bias is not saved.
     """
 
     def __init__(

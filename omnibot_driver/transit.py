@@ -10,11 +10,11 @@ its delay. The time that a message waited in this process is known exactly, by o
 
 Clocks can step. Our clock is read twice, as time of day and as a steady clock, which gives two
 differences. If our time of day and the sender's step together (one host, or NTP everywhere), only
-the difference of the steady clock changes. If our time of day steps alone, only its difference
-changes. So the smaller of the two delays is used. A sender whose clock alone is set back seems to
-be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``, the smallest
-difference among these messages becomes its offset. A real delay that lasts as long cannot be
-distinguished from this case.
+the difference of the steady clock changes. If our time of day steps alone, only the difference of
+the time of day changes. So the smaller of the two delays is used. A sender whose clock alone is set
+back seems to be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``,
+the smallest difference among these messages becomes its offset. A real delay that lasts as long
+cannot be distinguished from this case.
 
 The middleware numbers the messages of each sender. It does not report who sent a message. But a
 message whose number is not above a sender's last number comes from another sender. This module does
@@ -68,8 +68,8 @@ class Arrival:
 class Delay:
     """The age of a message: ``total_s`` since the sending, including ``waited_s`` in our own queue.
 
-    ``sent_ns`` is when the message was sent, by our time of day in ns. It has two possible values
-    until enough messages of its sender have arrived.
+    ``sent_ns`` is when the message was sent, by our time of day in ns. There are two possible send
+    times until enough messages of the sender have arrived.
     """
 
     total_s: float

@@ -41,7 +41,7 @@ class Profile(Protocol):
     """All parameters of the board."""
 
     def make(self, values: Mapping[str, Any]) -> Board:
-        """Return a board with these checked parameter values."""
+        """Return a board object, made from checked parameter values."""
 
     def settings(self, values: Mapping[str, Any]) -> object:
         """Return the value for ``Board.settings`` that these parameter values give."""

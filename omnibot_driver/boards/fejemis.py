@@ -22,7 +22,7 @@ from omnibot_driver.transports.several import Several
 
 SIMULATOR: Final = "omnibot_driver.simulator.fejemis"
 USB_BAUDRATE: Final = 115200
-"""Baud rate that is set for the USB ports; their real speed does not depend on it."""
+"""Baud rate that is set for the USB ports, whose real speed does not depend on this setting."""
 WHEEL_RADIUS_M, TRACK_M, WHEELBASE_M = 0.0775, 0.4, 0.42
 """Default sizes for values that the user does not set; only the track is in the manual."""
 PARAMETERS: Final = table(

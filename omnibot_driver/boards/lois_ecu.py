@@ -53,7 +53,7 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> LoisEcuBoard:
-    """Return a new board object with these checked parameter values."""
+    """Return a new board object, made from checked parameter values."""
     return LoisEcuBoard(settings(values))
 
 

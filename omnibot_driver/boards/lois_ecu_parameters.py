@@ -2,8 +2,8 @@
 
 """The LOIS ECU's own parameters, in addition to those of every board. Does not know ROS.
 
-Settings that the board stores are unset by default: the driver writes them only if the user gives a
-value.
+Settings that the board stores are unset by default: the driver writes such a setting only if the
+user gives a value.
 """
 
 from collections.abc import Mapping

@@ -45,7 +45,7 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> MartBoard:
-    """Return a new board object with these checked parameter values."""
+    """Return a new board object, made from checked parameter values."""
     return MartBoard(settings(values))
 
 

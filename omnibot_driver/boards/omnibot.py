@@ -23,7 +23,7 @@ PARAMETERS: Final = table(
 
 
 def make(values: Mapping[str, Any]) -> OmniBot:
-    """Return a new board object with these checked parameter values."""
+    """Return a new board object, made from checked parameter values."""
     return OmniBot(settings(values))
 
 

@@ -79,7 +79,7 @@ DISPENSABLE: Final = frozenset(
     }
 )
 """Common parameters that a board may omit. All other common parameters exist on each board whose
-traits they fit, because the driver reads them there."""
+traits they fit, because the driver reads them on such a board."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
 """Values of ``on_exit`` besides stop, with the request that a board must accept for each."""
 

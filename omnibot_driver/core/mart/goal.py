@@ -75,7 +75,7 @@ class Done:
     def may_have_run_twice(self, delay_s: float) -> bool:
         """Return whether the server may have run the move twice, as its datagram was duplicated.
 
-        The encoder count then covers only the second run.
+        If the move has run twice, the encoder count covers only the second run.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         number = float(self.request.data.split()[-1])

@@ -66,7 +66,7 @@ class ImuProof:
         return RESET.request() if self.word is RESET else CHECK.request(0)
 
     def missed(self, now: float) -> None:
-        """Record that a check was not answered; the next one is due after REPEAT_S."""
+        """Record that a check was not answered; the next check is due after REPEAT_S."""
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:

@@ -59,7 +59,7 @@ REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 
 
 class Jobs:
-    """The job that is under way, and the results of those that have ended.
+    """The job that is under way, and the results of the jobs that have ended.
 
     ``done``: results that the caller has not taken yet; ``logging``: whether LOG was answered with
     ok in this connection; ``log_may_be_lost``: whether the server may have been restarted since

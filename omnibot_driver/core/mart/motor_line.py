@@ -55,7 +55,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Record that the motor does not turn with these units.
+        """Record that the motor does not turn with ``units``.
 
         Afterwards the offset is uncertain again, as the robot may only have been held.
         """
@@ -68,7 +68,7 @@ class MotorLine:
         self._set(self.slope + slope, self.offset + offset)
 
     def turns(self, units: float) -> bool:
-        """Return whether the motor certainly turns with these units when it is not blocked."""
+        """Return whether the motor certainly turns with ``units`` when it is not blocked."""
         variance = self._ss * units * units + 2 * self._so * units + self._oo
         noise = NOISE + NOISE_PART * units
         return self._learned and self.speed(units) > SURE * math.hypot(math.sqrt(variance), noise)
@@ -90,7 +90,7 @@ class MotorLine:
         self.offset = min(0.0, max(-MOST_DEAD * self.slope, offset))
 
     def speed(self, units: float) -> float:
-        """Return the speed at these command units, in nominal units; negative at a standstill."""
+        """Return the speed at ``units``, in nominal units; negative if the motor does not turn."""
         return self.slope * units + self.offset
 
     def units(self, speed: float) -> float:

@@ -64,7 +64,7 @@ class Motors:
         return _units(lines, self._spin_speed(rate_radps))
 
     def spun(self, units: int, rate_radps: float) -> None:
-        """Learn from a turn on the spot with these units and this mean rate."""
+        """Learn from a turn on the spot with ``units`` and the mean rate ``rate_radps``."""
         if abs(rate_radps) > SLOWEST_TURN_RADPS:
             _learn_spin(self._lines, units, self._spin_speed(rate_radps))
 
@@ -86,7 +86,7 @@ class Motors:
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
-        """Return the ratio of the left to the right motor's speed at these units on both sides.
+        """Return the ratio of the left to the right motor's speed at ``units`` on both sides.
 
         If a change of units is lost or duplicated while the lines are learned, the lines are wrong.
         So the ratio is limited: it differs from ``motor_balance`` by MOST_UNEQUAL at most.
@@ -99,7 +99,7 @@ class Motors:
         return self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
 
     def _mean_speed(self, units: float) -> float:
-        """Return the mean speed of both motors at these units, in nominal units; not negative."""
+        """Return the mean speed of both motors at ``units``, in nominal units; not negative."""
         return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:

@@ -205,7 +205,7 @@ class Pilot(Hearing):
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def _may_ask_volts(self, now: float) -> bool:
-        """Return whether the server has started up completely, as VOLTS crashes it before.
+        """Return whether VOLTS may be sent: it crashes a server that has not started up completely.
 
         A restart that takes less than ABSENT_S can show only as an unanswered request. So the query
         VOLTS also waits after each unanswered request.

@@ -24,7 +24,7 @@ SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s: pause in learning after a large change, and shortest window of learning."""
 LARGE_UNITS: Final = 3
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""Effect of the exchange duration: it lengthens the window, and makes it less certain.
+"""Effect of the exchange duration, which lengthens the window, and makes it less certain.
 
 The window grows by LEARN_TRIPS durations. The standard deviation of its speeds is multiplied by
 1 + LESS_PER_S * duration in s.
@@ -84,7 +84,7 @@ class SpeedLoop(Motors):
         self.begin(0, False, 0.0)
 
     def begin(self, units: int, reverse: bool, now: float) -> None:
-        """Begin a motion with these units on both sides."""
+        """Begin a motion with ``units`` on both sides."""
         self._right.units = self._left.units = units
         self._right.stood_s = self._left.stood_s = 0.0
         self._direction = -1.0 if reverse else 1.0

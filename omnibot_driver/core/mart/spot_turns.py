@@ -39,7 +39,7 @@ TOO_FAST, something held the robot in the slow turn, and what was learned from i
 SAME, CORRECTIONS = 0.2, 2
 """Largest relative difference of rates that are regarded as equal; most corrections of a rate."""
 STEADY: Final = 0.03
-"""Relative change of the commanded rate from which it is regarded as a new one."""
+"""Relative change of the commanded rate from which the rate is regarded as a new one."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Shortest turn that shows how fast the motors turn: a time in s, and angles in rad.
 
@@ -189,7 +189,7 @@ class SpotTurns:
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number cannot be the angle that the stop of this turn reports.
 
-        The number is then a late reply to a query, such as an encoder count. ``unseen_s``: time
+        Such a number is a late reply to a query, for example an encoder count. ``unseen_s``: time
         from the last count to the stop; ``trip_s``: average duration of a query.
         """
         if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:

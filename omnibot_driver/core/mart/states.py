@@ -142,8 +142,9 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU they start the motors and are never answered, or they begin when the IMU works
-again. MCR and MCL notice the dead IMU, but some servers turn the robot for half a second first.
+With a dead IMU, these commands start the motors and are never answered, or take effect when the IMU
+works again. MCR and MCL notice the dead IMU, but some servers turn the robot for half a second
+first.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})

@@ -215,7 +215,7 @@ class Stops(Ground, ABC):
     def _may_be_count(self, reply: Reply) -> bool:
         """Return whether a number cannot be the angle that the stop of a turn on the spot reports.
 
-        The number is then a late reply to a query, such as an encoder count.
+        Such a number is a late reply to a query, for example an encoder count.
         """
         stopping = self._stopping
         assert stopping is not None

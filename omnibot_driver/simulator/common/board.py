@@ -18,7 +18,7 @@ Packet = tuple[int, bytes]
 class Channel:
     """One connection between a board and the computer.
 
-    name: name of the channel on its board; empty if it is the only one.
+    name: name of the channel on its board; empty if the board has only one channel.
     parameter: the driver's parameter that names the port of the channel; empty if another channel's
         port determines this port (the next UDP port).
     datagrams: True for UDP, False for a serial line.
