@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Calls that several threads queue, and that are made in the order of the events behind them.
+"""Calls that several threads queue, and that are made in the order of the events that caused them.
 
 A thread puts a call while it holds the lock under which the event occurred, and delivers after it
 has released that lock, so a slow listener delays no command. One thread delivers at a time; another

@@ -28,7 +28,7 @@ def core_kind() -> str:
 
 
 def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
-    """Return a warning about the adapter's latency timer; empty if it is short or absent."""
+    """Return a warning about the adapter's latency timer; empty for a short or absent timer."""
     device = Path(port).resolve().name
     try:
         text = (sysfs / "class/tty" / device / "device/latency_timer").read_text(encoding="ascii")

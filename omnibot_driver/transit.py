@@ -169,7 +169,7 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """Return the excess over the smallest difference plus its drift, in s; may be negative."""
+        """Return the excess of the difference over the offset and drift, in s; may be negative."""
         drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
         return difference_s - self._least_s - drift_s
 

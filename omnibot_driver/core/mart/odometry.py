@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The present pose and twist: predicted from the last count, with the uncertainty since then.
+"""The present pose and twist: predicted from the last count, with the added uncertainty.
 
 This module knows poses and speeds; it knows no commands. Time is an argument.
 """

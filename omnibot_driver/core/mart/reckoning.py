@@ -93,7 +93,7 @@ class Reckoning:
         self.speeds.forget()
 
     def begin(self, motion: Motion, now: float) -> None:
-        """Record that a motion was started; its count begins at zero."""
+        """Record that a motion was started; its encoder count begins at zero."""
         self.motion, self.stands = motion, False
         self._began_s, self._stood_s = now, math.inf
         self.slowing_since_s = None

@@ -65,7 +65,7 @@ class RelativeHeading:
         return self._angle_rad == 0.0
 
     def forget(self) -> None:
-        """Forget the heading, as the next reported heading may have another zero."""
+        """Forget the heading, as the next reported heading may have another zero point."""
         self._angle_rad = None
 
     def begin(self, now: float, *, anew: bool) -> None:

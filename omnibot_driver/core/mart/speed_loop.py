@@ -44,7 +44,7 @@ COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Variances per squared change of units: if the change may arrive twice; if it is unanswered.
 
 A change may come twice where an exchange takes longer than SLOW_TRIP_S (s). The variances are
-larger than probable, because a wrong ratio of speeds lasts for the complete motion.
+deliberately large, because a wrong ratio of speeds lasts for the whole motion.
 """
 
 
@@ -111,9 +111,9 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Learn that no motor turns with the present units, or with ``units`` on both sides.
 
-        MOST_DEAD units or more turn each motor that is not blocked, so they teach nothing. If a
-        motor has already turned with its present units, its line is not changed, but the next start
-        uses more units.
+        MOST_DEAD units or more turn each motor that is not blocked, so nothing is learned from
+        them. If a motor has already turned with its present units, its line is not changed, but the
+        next start uses more units.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -212,7 +212,7 @@ class SpeedLoop(Motors):
             side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
-        """Return the changes of right and left in units, positive along the motion; None if zero.
+        """Return the changes of right and left units, positive along the motion; None if zero.
 
         ``speed_mps`` is along the motion and not negative; ``rate_radps`` is positive to the left.
         """

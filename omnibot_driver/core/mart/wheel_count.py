@@ -3,9 +3,9 @@
 """The distance rolled by the right wheel, from an encoder count that restarts with each motion.
 
 A reply may answer an earlier query, or contain another number than the count. So an implausible
-count is discarded. An implausible count that comes several times is accepted; an impossibly large
-step then adds no distance. This module knows counts and times; time and metres per count are
-arguments.
+count is discarded. If several counts in a row are implausible, the last of them is accepted; an
+impossibly large step to this count adds no distance. This module knows counts and times; time and
+metres per count are arguments.
 """
 
 import math

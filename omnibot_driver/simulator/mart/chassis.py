@@ -15,7 +15,7 @@ STEP_S = 0.01
 RAMPS_PER_S = 40.0
 """Updates of the applied effort per second.
 
-Every 25 ms the effort changes by at most the acceleration.
+Every 25 ms the effort changes by at most the set acceleration.
 """
 STANDS_MPS = 0.006
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
