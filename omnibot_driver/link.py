@@ -5,10 +5,10 @@
 The *reader* opens the port, waits for bytes, hands them to the session and delivers the results at
 once, on its own thread. No timer and no other thread delays a measurement between the wire and the
 listener. The *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the
-watchdog does not depend on an executor. It also sends the guard its heartbeat. These threads and
-every caller use one lock. Events that the pacer and callers cause are delivered by the *teller*, so
-a slow listener delays neither the pacer nor a caller. All events are delivered in the order in
-which they occurred under that lock.
+watchdog does not depend on an executor. The pacer also sends the guard its heartbeat. These threads
+and every caller use one lock. Events that the pacer and callers cause are delivered by the
+*teller*, so a slow listener delays neither the pacer nor a caller. All events are delivered in the
+order in which they occurred under that lock.
 """
 
 import threading

@@ -39,7 +39,7 @@ WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
 """Shortest time between two published steering angles, in ns.
 
-The angle arrives 66 times a second; joint states are for display and need fewer.
+The board sends 66 angles a second; joint states are for display, so fewer angles are enough.
 """
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")

@@ -249,7 +249,7 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """Reject a command rate that is too high for a terminal mode.
 
     Stop is sent at ``command_rate``, and the board forwards each Stop to a sensor whose line has
-    4800 baud.
+    4800 baud. A higher rate would therefore delay Stop.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(

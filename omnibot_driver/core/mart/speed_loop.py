@@ -154,7 +154,7 @@ class SpeedLoop(Motors):
 
     @property
     def measured_balance(self) -> float | None:
-        """The balance as measured in a drive, without its limit; None before the first drive."""
+        """The ratio ``balance`` as measured in a drive, unlimited; None before the first drive."""
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
     @property
