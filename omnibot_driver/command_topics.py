@@ -40,7 +40,7 @@ def obeying(
         longest_s, now_ns = expires_s(), time.time_ns()
         arrival = Arrival(
             sent_ns=info["source_timestamp"],
-            received_ns=info["received_timestamp"] or now_ns,  # not every middleware has it
+            received_ns=info["received_timestamp"] or now_ns,  # not every middleware has this time
             now_ns=now_ns,
             steady_ns=boot_time_ns(),
             number=info.get("publication_sequence_number"),

@@ -88,7 +88,7 @@ def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
     """Create this board's own topics and services, and return its publishing functions.
 
-    The topics show steering joint, orientation, magnetic field, battery and ranges. Other topics
+    Some topics show steering joint, orientation, magnetic field, battery and ranges. Other topics
     and the services accept requests for brush, lift, lights and jobs.
     """
     from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS

@@ -48,7 +48,7 @@ class Adjusting(Moves):
         change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
         self.commanded = twist
         if change is None and self._heading_is_told and self._frozen_s > WAG_S:
-            change = (-WAG_UNITS, WAG_UNITS)  # a working IMU shows it; a later change undoes it
+            change = (-WAG_UNITS, WAG_UNITS)  # a working IMU shows this; the next change undoes it
         if change is None:
             return NO_PACKETS
         right, left = change

@@ -226,7 +226,7 @@ class Conversation:
         self._answers[pending.word] = reply, now + self.delay_s
         from_s = pending.sent_s
         if doubtful or self.disturbed(now):
-            from_s = min(from_s, now - self.delay_s)  # the reply may answer an earlier query
+            from_s = min(from_s, now - self.delay_s)  # it may answer an earlier query
         when = Moment(now - took_s / 2, from_s, now, doubtful)
         return Answer(pending.request, reply, took_s, when)
 

@@ -112,8 +112,7 @@ class Surplus:
     def degrees(self, wanted: float, *, slow: bool) -> int:
         """Return the number of degrees to request for a turn by ``wanted`` degrees.
 
-        The result is 0 if no possible turn would bring the heading nearer to the goal's by at least
-        WORTH_DEG.
+        The result is 0 if no possible turn would reduce the heading error by at least WORTH_DEG.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))

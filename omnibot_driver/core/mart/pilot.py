@@ -200,7 +200,7 @@ class Pilot(Hearing):
             return math.inf
         apart_s = self._halted_s + self._delay_s
         silent_s = COPY_S
-        if self.odometry.wheel.told_s >= self._rested_s:  # the last count may be a late reply
+        if self.odometry.wheel.told_s >= self._rested_s:  # maybe this count is a late reply
             silent_s += 2 * self._delay_s
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 

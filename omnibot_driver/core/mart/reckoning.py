@@ -226,7 +226,7 @@ class Reckoning:
         if self.motion is Motion.TURN and told:
             turn_rad = told_rad
         self.spun_rad += turn_rad
-        return turn_rad if self.told_rad is None else 0.0  # the reported turn includes this turn
+        return turn_rad if self.told_rad is None else 0.0  # the reported turn includes it
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
         """Correct this motion's guessed turn at the first reported heading.

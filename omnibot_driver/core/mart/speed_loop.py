@@ -208,7 +208,7 @@ class SpeedLoop(Motors):
         should_turn = units < MOST_DEAD and side.line.speed(units) > slowest
         must_turn = units >= MOST_DEAD and side.line.speed(units) > 2 * slowest
         side.stood_s = side.stood_s + self._window_s if must_turn and speed < slowest else 0.0
-        if speed > slowest or should_turn:  # else the wheel stands, as it should
+        if speed > slowest or should_turn:  # else it stands, as it should
             side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:

@@ -203,7 +203,7 @@ class Starts(Adjusting):
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        self.odometry.started(now, sure=not answer.when.doubtful)  # the reply may answer RST IMU
+        self.odometry.started(now, sure=not answer.when.doubtful)  # it may answer RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 
