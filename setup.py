@@ -26,9 +26,9 @@ COMPILED_OF_OMNIBOT = (
     *("cost_model", "decoder", "fast_path", "frame_schedule", "gaps", "late_reads", "lower_bound"),
     *("misconfiguration", "modes", "schedule", "sequence", "single_imu", "translation", "trellis"),
 )
-"""Modules that process received bytes. Modules that decide whether a robot moves are not compiled,
-so that they run as they were debugged; nor are base classes, nor frames, which are created faster
-without mypyc's dataclasses."""
+"""Modules that process received bytes. Some modules are not compiled: those that decide whether a
+robot moves, so that they run as they were debugged; base classes; and frames, which are created
+faster without mypyc's dataclasses."""
 
 
 class CompileCore(build_ext):
@@ -45,13 +45,13 @@ class CompileCore(build_ext):
         remove_compiled(self.build_lib)
         try:
             self._compile()
-        except (Exception, SystemExit) as error:  # mypyc exits at code that it cannot compile
+        except (Exception, SystemExit) as error:  # mypyc calls exit for code that it cannot compile
             remove_compiled(self.build_lib)
             self.distribution.ext_modules = []
             print(f"{NAME}: not compiled ({error!r}); core: interpreted", file=sys.stderr)
 
     def get_outputs(self) -> list[str]:
-        """Return the built files."""
+        """Return the paths of the compiled files."""
         return [str(path) for path in compiled_in(self.build_lib)]
 
     def _compile(self) -> None:
@@ -93,12 +93,12 @@ class InstallAnew(install_lib):
 
 
 def compiled_in(folder: str) -> list[Path]:
-    """Return the files that mypyc made of this package's modules, and those that they share."""
+    """Return the modules that mypyc compiled, and the files that the compiled modules share."""
     return [*Path(folder).glob(f"{NAME}__mypyc.*"), *Path(folder, CORE).rglob("*.so")]
 
 
 def remove_compiled(folder: str) -> None:
-    """Remove the compiled modules, so that the sources beside them are what runs."""
+    """Remove the compiled modules, so that Python runs the sources beside them."""
     for path in compiled_in(folder):
         path.unlink()
 
@@ -122,7 +122,7 @@ setup(
     install_requires=["pyserial", "PyYAML"],
     extras_require={
         "replay": ["rosbags"],
-        "test": ["pytest"],  # without it `colcon test` passes, and has run nothing
+        "test": ["pytest"],  # without pytest, `colcon test` passes but runs nothing
         "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
     },
     packages=find_packages(include=[NAME, f"{NAME}.*"]),

@@ -2,8 +2,8 @@
 
 """Write the parts of the documents that come from the code.
 
-`make docs` runs this, and a test compares the files with its results. Each text depends on the code
-alone, so the test shows what to commit after a change.
+`make docs` runs this script. A test compares the files with the script's output. The output depends
+on the code alone, so the test shows which files to regenerate after a change of the code.
 """
 
 import textwrap
@@ -123,7 +123,7 @@ def architecture() -> str:
 
 GENERATED: Final[dict[str, Callable[[], str]]] = {
     **{f"config/{board}.yaml": partial(parameter_file, board) for board in boards.PROFILES},
-    "config/driver.yaml": partial(parameter_file, "omnibot"),  # former name, for one release
+    "config/driver.yaml": partial(parameter_file, "omnibot"),  # former name, kept for one release
     "docs/internals/architecture.md": architecture,
     "docs/parameters.md": parameters_page,
     "docs/pictures/modes.svg": mode_diagram.svg,

@@ -29,7 +29,7 @@ Point = tuple[float, float]
 
 
 def svg() -> str:
-    """Return the picture: arrows show what changes the mode, boxes what does not."""
+    """Return the picture: arrows show what changes the mode, boxes show what does not."""
     pairs = [(before, after) for before in Mode for after in Mode if before is not after]
     return "\n".join(
         [
@@ -93,7 +93,7 @@ def _arrow(before: Mode, after: Mode) -> list[str]:
 def _label(before: Mode, after: Mode) -> list[str]:
     """Return an arrow's label: at the middle of a horizontal arrow, near the start of any other.
 
-    There it does not meet the label of another arrow.
+    In these places no two labels overlap.
     """
     lying = PLACES[before][1] == PLACES[after][1]
     x, y = _at(_curve(before, after), 0.5 if lying else 0.3)

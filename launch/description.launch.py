@@ -2,8 +2,8 @@
 
 """Launch file that publishes the robot's description and fixed frames, and optionally starts RViz.
 
-The joints keep their names whatever ``frame_prefix`` is: robot_state_publisher puts it before the
-frames only, as the driver does.
+The joints keep their names whatever ``frame_prefix`` is: robot_state_publisher and the driver put
+the prefix before the names of frames only.
 """
 
 from launch import LaunchDescription

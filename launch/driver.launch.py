@@ -21,7 +21,7 @@ OVERRIDES = {
 
 
 def driver_node(context: LaunchContext) -> list[Node]:
-    """Return the driver node; an empty argument leaves the choice to the parameter file."""
+    """Return the driver node; for an empty launch argument it uses the parameter file's value."""
     file = LaunchConfiguration("params_file").perform(context)
     if not file:
         board = LaunchConfiguration("board").perform(context) or "omnibot"

@@ -2,10 +2,11 @@
 
 """Launch file that starts the driver, the description and robot_localization's filter.
 
-The filter combines odometry and gyro, or odometry and compass where the board has one. It publishes
-odom to base_link, so the driver does not. The description is needed because it has the mounting of
-the sensors; OmniBot's IMU is upside down. The arguments are those of driver.launch.py and
-description.launch.py. A board without parameters for the filter is refused.
+The filter combines odometry with the gyro or, on a board that has one, with the compass. The filter
+publishes the transform from odom to base_link, so the driver does not. The description is needed
+because it has the mounting of the sensors; for example, OmniBot's IMU is upside down. The
+arguments are those of driver.launch.py and description.launch.py. A board without parameters for
+the filter is refused.
 """
 
 from pathlib import Path

@@ -140,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"DEMO_SECONDS must be a number above 0, not {given!r}", file=sys.stderr)
         return 2
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # question marks where Braille cannot be encoded
+        sys.stdout.reconfigure(errors="replace")  # prints ? for Braille that the encoding lacks
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: signals.append(received))
@@ -157,7 +157,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except DemoFailed as error:
         print(f"\ndemo: {error}", file=sys.stderr)
         return 1
-    except BrokenPipeError:  # the reader has gone
+    except BrokenPipeError:  # the pipe's reader has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     return 0

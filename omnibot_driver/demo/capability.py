@@ -18,9 +18,10 @@ from omnibot_driver.simulator.common import options
 class Capability:
     """The abilities of a board that drives by ``cmd_vel`` and has ``odom``.
 
-    ``title`` is its name in "A simulated ... drives". ``imu``: whether it has ``imu/data_raw``.
-    ``sideways``: whether it can move along y as well. ``ports``: the driver's parameter for each
-    address that the simulator prints; empty if another address implies this one.
+    ``title``: the board's name in the sentence "A simulated ... drives". ``imu``: whether the board
+    has ``imu/data_raw``. ``sideways``: whether it can move along y as well. ``ports``: for each
+    address that the simulator prints, the name of the driver's parameter; empty if another
+    address determines this one.
     ``real``: arguments that a driver needs for the real robot; ``page``: the board's document.
     """
 

@@ -19,9 +19,9 @@ class DemoFailed(Exception):
 
 
 class Program:
-    """A module of this package as a separate process, which never outlives this one.
+    """A module of this package as a child process, which never outlives its parent.
 
-    Signals of the terminal do not reach this process; ``end`` ends it.
+    Signals from the terminal do not reach the child process; ``end`` ends it.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:
@@ -47,7 +47,7 @@ class Program:
             self._process.wait()
 
     def failure(self, what: str) -> DemoFailed:
-        """Return an exception that says what happened, with the last output of this process."""
+        """Return an exception that says what happened, with the child's last output."""
         self._log.seek(0)
         lines = self._log.read().splitlines()[-10:] or ["(nothing)"]
         return DemoFailed("\n  ".join([f"{what}. Last output of the {self._name}:", *lines]))

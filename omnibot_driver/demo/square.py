@@ -27,8 +27,8 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
     """Return the present leg, and the velocity along it in the robot's own axes.
 
     A leg is a side of the square. Legs are counted from 0 without end: +x, +y, -x, -y in the
-    odometry frame. On legs 0, 2, ... the robot turns by 90° to the left, and on legs 1, 3, ...
-    back, while it drives along a straight line.
+    odometry frame. The robot turns while it drives straight along a leg: by 90° to the left
+    on even legs, and back on odd legs.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD
@@ -44,7 +44,7 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return leg and velocity for a robot that cannot drive sideways and turns at corners."""
+    """Return leg and velocity for a robot that cannot drive sideways, and so turns at corners."""
     leg, along_m, aside_m = _progress(pose, leg)
     course_rad = leg % 4 * QUARTER_RAD - math.atan2(GAIN_PER_S * aside_m, 2 * SPEED_MPS)
     error_rad = math.remainder(course_rad - pose.yaw_rad, math.tau)
@@ -54,7 +54,7 @@ def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
-    """Return the present leg, the distance along it, and the robot's offset to its left, in m."""
+    """Return the present leg, and the robot's position along it and to the left of it, in m."""
     turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
     along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
     return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)

@@ -2,7 +2,7 @@
 
 """The command line.
 
-Must not import the libraries of the calibrations, because ``--help`` works without them.
+Must not import libraries that only a calibration needs, so that ``--help`` works without them.
 """
 
 import argparse
@@ -32,15 +32,15 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller that it can model"),
 }
-"""Requirements by subcommand.
+"""For each subcommand, names of parameters, and a text.
 
-The driver must have at least one of the parameters. If it has none, the text names for the user
-what the board lacks.
+The driver must have at least one of these parameters. If it has none, the text tells the user what
+the driver's board lacks.
 """
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
-    """Raise ToolError if the driver's parameters show that its board lacks what is needed."""
+    """Raise ToolError if the driver has none of the parameters that the subcommand needs."""
     wanted, thing = NEEDS[subcommand]
     if not any(parameter in parameters for parameter in wanted):
         raise ToolError(

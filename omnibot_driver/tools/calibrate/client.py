@@ -30,7 +30,7 @@ class Client:
     """A ROS client of one running driver.
 
     ``driver``: the full name of the driver's node; ``parameters``: values of the driver's
-    parameters, by name; ``table``: their descriptions.
+    parameters, by name; ``table``: the descriptions of these parameters.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -63,7 +63,7 @@ class Client:
         )
 
     def _require_alone(self) -> None:
-        """Raise ToolError if two drivers share the namespace, as both would obey commands."""
+        """Raise ToolError if two drivers share the namespace, because both would obey commands."""
         here = [
             name
             for name in self._here()
@@ -118,7 +118,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Set those parameters that may change while the driver runs; leave out the others."""
+        """Set the parameters that may change while the driver runs, and ignore the others."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }
@@ -151,7 +151,7 @@ class Client:
             self._node.destroy_client(client)
 
     def _wait(self, done: Callable[[], object], seconds: float) -> bool:
-        """Wait at most ``seconds`` for the condition; return whether it became true."""
+        """Wait up to ``seconds`` until ``done`` returns a true value; return whether it did."""
         deadline_s = time.monotonic() + seconds
         while not (held := done()) and time.monotonic() < deadline_s:
             self._spin(0.05)

@@ -2,9 +2,10 @@
 
 """``calibrate commission``: a guided procedure that finds how motors and IMU are oriented.
 
-The procedure uses the board's data where they are sufficient. It asks the user how the wheels
-really turn, and to hold the robot in several postures. If an answer contradicts the command or
-another answer, the procedure explains why and repeats the question.
+The procedure uses the board's data where they are sufficient. For the rest, it asks the user in
+which directions the wheels really turn, and lets the user hold the robot in several postures. If an
+answer contradicts the command or another answer, the procedure explains why and repeats the
+question.
 """
 
 import argparse
@@ -68,7 +69,10 @@ T = TypeVar("T")
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Run the selected parts. Raises ToolError if repeated answers remain contradictory."""
+    """Run the selected parts of the procedure.
+
+    Raises ToolError if repeated answers remain contradictory.
+    """
     walk = Walk(robot, console)
     found = Found(before=robot.parameters)
     if "board" in arguments.only or "wheels" in arguments.only:
@@ -123,7 +127,7 @@ class Walk:
                 f"In a turn on the spot the deltas show {turning.speed_mps:.3f} m/s sideways:"
                 f" delta_frame is not {frame}, but {found.delta_frame}."
             )
-            self._obeys = False  # the speeds that the driver reports are wrong now
+            self._obeys = False  # with the wrong delta_frame, the driver reports wrong speeds
             return
         turned_rad = float(log.odometry.pose[-1, 2] - log.odometry.pose[0, 2])
         log = self._drive([(JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False)
@@ -204,7 +208,7 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Show a motion, again if the user asks for it; return the pattern that the user saw."""
+        """Show a motion, as often as the user asks for it; return the pattern that the user saw."""
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
@@ -251,7 +255,7 @@ class Walk:
     # Common to all parts
 
     def _until_possible(self, find: Callable[[], T]) -> T:
-        """Repeat a measurement until it is plausible. Raises ToolError after three attempts."""
+        """Call ``find`` up to ``TRIES`` times. Raises ToolError if no answer is plausible."""
         for _ in range(TRIES):
             try:
                 return find()
@@ -277,5 +281,5 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """Return the pattern that an answer describes: empty for ``r``, None if not valid."""
+    """Return the pattern in the user's answer: empty for ``r`` (repeat), None if not valid."""
     return () if answer == "r" else understand(answer)

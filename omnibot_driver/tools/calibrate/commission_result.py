@@ -42,7 +42,7 @@ class Found:
 
 
 def result_of(found: Found) -> Result:
-    """Return the driver's parameters, and the IMU's mounting for the robot's description."""
+    """Return the result: values of the driver's parameters, and the mounting of the IMU."""
     parameters: dict[str, Value] = {}
     for name in ("control_method", "delta_frame", "axis_signs"):
         value = getattr(found, name)

@@ -21,7 +21,7 @@ from omnibot_driver.tools.needs import ToolError
 def connect(
     namespace: str, ros_arguments: Sequence[str], interruption: Interruption
 ) -> Iterator[Robot]:
-    """Connect to the driver in this namespace. Raises ToolError if none is running there."""
+    """Connect to the driver in ``namespace``. Raises ToolError if no driver is running in it."""
     context = Context()
     quiet = SignalHandlerOptions.NO
     try:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The dialogue with the user beside the robot: questions, progress, the table.
+"""The dialogue with the user beside the robot: questions, progress, and the table of results.
 
 ``read`` asks a question and returns the answer; tests replace it.
 """
@@ -102,7 +102,7 @@ class Console:
         self.say(f"{what}: done")
 
     def table(self, title: str, findings: Sequence[Finding]) -> None:
-        """Print the table: each value with its uncertainty, and the driver's present value."""
+        """Print the results: each value with its uncertainty, and the driver's present value."""
         table = Table(title=title, title_justify="left", pad_edge=False)
         for heading in ("", "found", "±", "unit", "now"):
             table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
@@ -124,7 +124,7 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value as text.
 
-    They are rounded to the second significant digit of the uncertainty.
+    All three are rounded to the second significant digit of the uncertainty.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

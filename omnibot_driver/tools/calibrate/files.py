@@ -19,7 +19,7 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
-    """Return the given file, else the driver's calibration file, else a file in this folder.
+    """Return ``given``, else the driver's calibration file, else ``DEFAULT`` in the current folder.
 
     Raises ToolError if the file cannot be written, or is not a calibration file.
     """
@@ -41,8 +41,8 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
 def picture_file(given: str | None, subcommand: str) -> Path:
     """Return the path of the picture.
 
-    If ``given`` is a folder or None (this folder), the file is ``calibrate_<subcommand>.png`` in
-    it.
+    If ``given`` is a folder, the picture is the file ``calibrate_<subcommand>.png`` in this folder.
+    If ``given`` is None, the picture is the file of that name in the current folder.
     Raises ToolError if the file cannot be written, or if its suffix is not in ``PICTURES``.
     """
     path = Path(given or ".").expanduser()

@@ -36,9 +36,9 @@ def measured(
     go: Callable[[Drive], Column],
     measure: Callable[[Drive, Column], Measured],
 ) -> list[Measured]:
-    """Run each drive with ``go``, and return the result of ``measure`` for its poses.
+    """Run each drive with ``go``; return what ``measure`` finds from the poses of each drive.
 
-    Raises ToolError if the user does not confirm, or if a drive fails.
+    Raises ToolError if the user does not confirm that there is room, or if a drive fails.
     """
     console.confirm(
         f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"
@@ -78,7 +78,7 @@ def driven(
     turn_rad: float,
     seconds: float,
 ) -> Column:
-    """Drive the robot by this law; return the poses of the odometry, (n, 3), in m, m and rad.
+    """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
 
     ``turn_rad``: the size of the whole turn from start to end, in rad; ``seconds``: the expected
     duration. Raises ToolError if the drive fails.

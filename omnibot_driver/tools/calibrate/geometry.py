@@ -64,8 +64,9 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 def believed(now: Mapping[str, Any]) -> dict[str, float]:
     """Return the sizes in m and the scales on which ``odom`` is based, by parameter name.
 
-    With wheel counts the driver computes the odometry with its own parameters. Otherwise the board
-    computes it with the manual's sizes, and the driver scales the result.
+    If the board sends wheel counts, the driver computes the odometry from its parameters for the
+    sizes. Otherwise the board computes the odometry from the manual's sizes, and the driver scales
+    the board's result.
     """
     if now["delta_frame"] == "wheel_counts":
         return {name: now[name] for name in ("wheel_radius", "base_radius")}

@@ -111,7 +111,7 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the (n, 3) poses that the same rotations of the wheels give with other sizes.
+    """Return the poses, (n, 3), that the wheel rotations of ``path`` give with other radii.
 
     The new path begins at the origin. ``factors``: ratios of the new to the assumed wheel radii,
     (3,) or for each step (n - 1, 3); ``base``: ratio of the new to the assumed base radius.
@@ -136,7 +136,7 @@ def rims_of(path: Column, base_radius_m: float) -> Column:
 
 
 def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
-    """Return the matrix that makes the measured errors independent with unit variance."""
+    """Return the matrix that makes the errors of a reading independent, with unit variance."""
     path = reading.path
     x, y, yaw = np.linalg.inv(_rims(base_radius_m))
     middle = (path[:-1, 2] + path[1:, 2]) / 2

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Handle Ctrl-C, a lost SSH session and kill: a signal is noted, and `check` raises Interrupted.
+"""Handle Ctrl-C, a lost SSH session and kill: note the signal; then `check` raises Interrupted.
 
-A signal does not raise at once, because an exception inside ROS could leave the executor in an
-undefined state. A signal raises at once only while the program waits for the user's answer.
+A signal does not raise an exception at once, because an exception inside ROS could leave the
+executor in an undefined state. A signal raises Interrupted at once only while the program waits
+for the user's answer.
 """
 
 import signal
@@ -50,7 +51,7 @@ class Interruption:
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """A context in which a received signal has no effect until the context ends."""
+        """A context during which signals are only noted: `check` raises only afterwards."""
         self._deferred = True
         try:
             yield

@@ -109,7 +109,7 @@ class Listener(Client):
     def _begin(self, states: Sequence[str]) -> None:
         """Wait for fresh data, then start a new log.
 
-        While the user is asked, no data are received.
+        The last data may be old, because no data are received while the user is asked.
         """
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
@@ -134,9 +134,9 @@ class Listener(Client):
             )
 
     def _lost(self) -> list[str]:
-        """Return the topics without recent data.
+        """Return the required topics without recent data.
 
-        Pending messages are read first, as this program may lag.
+        Pending messages are read first, because this program may have been too slow to read them.
         """
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):
@@ -146,7 +146,7 @@ class Listener(Client):
 
 
 def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:
-    """Return the wanted topics without a recent message."""
+    """Return the topics in ``wanted`` whose last message, at ``heard_s``, is too long ago."""
     return [topic for topic in wanted if now_s - heard_s[topic] > LOST_S]
 
 

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the control method and the frame of the deltas from the odometry alone. Pure calculation.
+"""Find the control method and the frame of the odometry deltas. Pure calculation.
 
-No observer and no measured distance are needed. The signs and scales of the odometry may be wrong.
+Only the odometry is used: no observer and no measured distance are needed. The signs and scales of
+the odometry may be wrong.
 """
 
 import math
@@ -29,10 +30,10 @@ Both allow for friction and rounding.
 PURE_TURN: Final = 0.5
 """Largest ratio of sideways motion to rim speed in a turn on the spot.
 
-The ratio is 0 if the deltas are interpreted correctly, else 2 or more.
+The ratio is 0 if the odometry deltas are interpreted correctly, else 2 or more.
 """
 ALIKE: Final = 0.35
-"""Two directions are regarded as equal if they differ by less than this fraction of the turn."""
+"""Two angles are regarded as equal if they differ by less than this fraction of the turn."""
 
 
 LEAST_M: Final = 1e-3

@@ -26,16 +26,16 @@ A, B, C for ``wheel_cmd``; None ends the motion.
 """
 
 LOOK_S: Final = 1.0
-"""Interval, in s, in which a robot must follow its command."""
+"""Time, in s, over which commanded and measured motion are compared."""
 SLOW_LOOK_S: Final = 3.0
-"""``LOOK_S`` for boards that measure so rarely that odometry is predicted in between, in s."""
+"""Value of ``LOOK_S`` for boards that measure rarely, so that odometry is partly a prediction."""
 OBEYED_PART: Final = 0.2
 """The robot is regarded as not moving below this fraction of its command."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Slower commands are not checked, because friction may hold the robot.
+"""For each topic, the linear and the angular speed below which a command is not checked.
 
-In m/s and rad/s, or in rad/s of a wheel.
+At lower speeds friction may hold the robot. The units are m/s and rad/s, or rad/s of a wheel.
 """
 
 
@@ -72,7 +72,7 @@ class Bounds:
             )
 
     def require_within(self, seconds: float, pose: Pose) -> None:
-        """Raise ToolError if the robot is too far from its start, or drives for too long."""
+        """Raise ToolError if the robot is too far from its start, or has driven for too long."""
         if not pose.finite:
             raise ToolError(
                 "the robot was stopped because `odom` contains NaN or infinity: find the node"
@@ -92,7 +92,7 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """Return the command ``seconds`` after the command ``now``, on a ramp to ``wanted``."""
+        """Return the command on a ramp from ``now`` to ``wanted``, ``seconds`` after ``now``."""
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
             return a, b, c
@@ -105,7 +105,7 @@ class Obedience:
     """Checks at short intervals that the robot roughly follows its commands."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
-        """Check commands on this topic; ``parameters``: those of the driver, by name."""
+        """Check commands on this topic; ``parameters``: the driver's parameters, by name."""
         self._topic = topic
         self._look_s = SLOW_LOOK_S if "odom_rate" in parameters else LOOK_S
         self._has_scales = "linear_scale" in parameters

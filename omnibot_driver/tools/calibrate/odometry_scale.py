@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Number of straight drives; if one of the two is misread, they disagree."""
+"""Number of straight drives; if the tape is misread after one of them, their results disagree."""
 UNLIKE: Final = 4.0
 """Two ratios disagree if they differ by more than this number of standard deviations."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""Parameters for the distance per encoder count, and for the motors' units per m/s.
+"""Names of the parameters for the distance per encoder count, and for the motors' units per m/s.
 
-If the distance per count is longer, the same speed needs fewer units of the motors.
+If the distance per count is found to be longer, the units per m/s become fewer in proportion.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
-"""A parameter that the driver measures during the drives.
+"""A parameter that the driver measures during the drives: the balance of the two motors.
 
-The values are its name, its name in /diagnostics, and its standard deviation.
+The constants are its name, its name in /diagnostics, and the standard deviation of its value.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where"
@@ -142,7 +142,7 @@ def _number(text: str) -> float | None:
 def result(
     ratios: Sequence[Ratio], now: Mapping[str, Any], *, balance: float | None = None
 ) -> Result:
-    """Return the result of these drives, to show and to save.
+    """Return the result, to show and to save, from the ratios of all drives.
 
     ``now``: the driver's parameters; ``balance``: the motor balance that the driver measured, or
     None.

@@ -4,8 +4,8 @@
 
 The controller is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to the duty in
 percent, discretised by the trapezoidal rule. Its coefficients are computed for the control period
-``NOMINAL_S``, even if the real period differs. The measured speed is that of the encoder's last
-tick, in whole RPM. The calculation is vectorised over gains. Must not know how plant and gains
+``NOMINAL_S``, even if the real control period differs. The measured speed is that of the encoder's
+last tick, in whole RPM. The calculation is vectorised over gains. Must not know how plant and gains
 were found.
 """
 
@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 
 STEP_S: Final = 0.001
 NOMINAL_S: Final = 0.2
-"""Control period in the manual, in s, for which the board calculates its coefficients."""
+"""Control period of the manual, in s; the board calculates its coefficients for this period."""
 STALE_S: Final = 0.5
 SENDS_S: Final = 9 * 14 * 10 / 115200
 """Time, in s, that the public firmware needs to send its ticks and its odometry.
 
-These are nine lines of 14 characters.
+Ticks and odometry together are nine lines of 14 characters.
 """
 MOST_PERCENT: Final = 100.0
 PHASE_POINTS: Final = 600
@@ -61,7 +61,7 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Ratio of a time constant written to the board to the effective time constant."""
+        """Ratio of a time constant written to the board to the time constant that results."""
         return self.nominal_s / self.period_s
 
 
@@ -156,7 +156,8 @@ class Traits:
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
     """Return the characteristics of a response.
 
-    ``band``: as a fraction of the final speed, which is the mean of the last quarter.
+    ``band``: the allowed deviation, as a fraction of the final speed; the final speed is the mean
+    of the last quarter of the response.
     """
     comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
     overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)

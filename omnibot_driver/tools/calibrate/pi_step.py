@@ -50,7 +50,7 @@ QUIET_S: Final = 0.5
 The board does not measure ticks while it sends, so it should send as rarely as possible.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
-"""Parameters that are restored after the records."""
+"""Parameters that are restored after the wheels have been recorded."""
 
 Records = dict[str, list[Column]]
 """For each side (left or right), the times between ticks of each record, in s."""
@@ -89,7 +89,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class _Bench:
-    """A robot that records its wheels; it calls ``show`` with the number of finished records."""
+    """The robot while its wheels are recorded; ``show`` receives the number of finished records."""
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
         self.robot, self._show, self._responses, self._done = robot, show, responses, 0
@@ -158,7 +158,7 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
 
 
 def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loop:
-    """Return the loop with the feed-forward and low-pass that the user has set."""
+    """Return the loop with the feed-forward and the low-pass filter that the user has set."""
     forward, low_pass = parameters.get(f"{side}_feed_forward"), parameters.get("low_pass")
     return replace(
         loop,
@@ -168,9 +168,9 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:
-    """Measure the encoders' levels, and set their corrections in the driver.
+    """Measure how long the encoders' two levels last; set their corrections in the driver.
 
-    During the measurement both corrections are 1, because records contain corrected times.
+    During the measurement both corrections are 1, because a record contains corrected times.
     """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})
@@ -181,7 +181,7 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant; its gain and dead zone come from the speeds at two duties."""
+    """Return the plant, with gain and dead zone from the speeds at full duty and at half duty."""
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
         raise ToolError(
@@ -213,5 +213,5 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 
 
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
-    """Restore these parameters; those without a value before keep the new value until a restart."""
+    """Restore parameters to their values in ``before``; one that had none keeps its new value."""
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

@@ -6,7 +6,7 @@ Tn compensates the plant's slow time constant. The Tn written to the board is lo
 board computes its coefficients for a longer control period than it has. Kp, and Td if a phase
 margin is required, are those with the smallest sum of settling time and integrated error, among
 the gains whose overshoot is within the goal. The dead time of a plant is fitted afterwards, to
-steps recorded with such gains.
+steps recorded with the tuned gains.
 """
 
 from collections.abc import Sequence
@@ -45,8 +45,7 @@ SENT: Final = np.arange(0.0, 1.0, 0.125)
 The time decides which ticks are noticed late, which changes the response too.
 """
 DISTURBED: Final = 0.02
-"""Additional overshoot that is allowed for a step that is disturbed because the board sends ticks.
-"""
+"""Additional overshoot that is allowed for a step during which the board sends ticks."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
@@ -142,7 +141,7 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
     """Return the predicted traits of a step: largest overshoot, longest settling, mean error.
 
-    These are taken over all starting positions in ``BEGUN``.
+    The largest, the longest and the mean are taken over all starting positions in ``BEGUN``.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
@@ -169,7 +168,7 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
     """Return the dead time, in s, that explains the recorded steps of these wheels best.
 
-    It is at least ``LEAST_DEAD_S``, because gains for too short a dead time make a step overshoot.
+    The result is at least ``LEAST_DEAD_S``: if the assumed dead time is too short, steps overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
@@ -200,7 +199,7 @@ def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
 
 
 def _unlike(shown: Response, model: Response) -> float:
-    """Return the mean square of the relative difference of two responses, up to ``OVER_S``."""
+    """Return the mean square of the relative difference of two responses, until time ``OVER_S``."""
     times_s = shown.times_s[shown.times_s < OVER_S]
     told_rpm = np.interp(times_s, model.times_s, model.rpm)
     return float(np.mean((shown.rpm[: len(times_s)] / told_rpm - 1.0) ** 2))

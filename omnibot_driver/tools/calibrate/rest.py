@@ -3,7 +3,8 @@
 """Evaluate an IMU at rest: its biases, its noise, and the direction of up. Pure calculation.
 
 A measurement in one posture cannot separate an accelerometer's bias from a tilt, nor a tilt of the
-sensor from a tilt of the floor. It shows only the bias along gravity, whose magnitude is known.
+sensor from a tilt of the floor. The measurement shows only the bias along gravity, because the
+magnitude of gravity is known.
 """
 
 from collections.abc import Callable
@@ -144,7 +145,11 @@ def _within(readings: Column, size: int) -> Column:
 
 
 def _of_mean(readings: Column, noise: Column, size: int) -> Column:
-    """Return the standard deviation of the mean: from the noise or, if larger, from the blocks."""
+    """Return the standard deviation of the mean of ``readings``.
+
+    The result is the larger of two estimates: one is computed from the noise of single readings,
+    the other from the means of blocks.
+    """
     means = _blocks(readings, size).mean(axis=1)
     white = noise / np.sqrt(len(readings))
     if len(means) < 5:

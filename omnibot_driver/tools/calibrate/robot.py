@@ -102,7 +102,7 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot by the law, within the bounds, then stop it; return the log of the motion.
+        """Move the robot by the law, within the bounds, then stop it; return the motion's log.
 
         ``show`` is called with the seconds since the start. On any fault (e-stop, lost data, a
         command of another node, no motion), stop the robot and raise ToolError. If ``obeys`` is
@@ -217,7 +217,7 @@ class Robot(Listener):
             wanted = law(now_s - began_s, pose) if wanted is not None else None
 
     def _halt(self, topic: Topic) -> bool:
-        """Stop the robot; return whether the robot is at rest. A signal does not interrupt this."""
+        """Stop the robot, even during Ctrl-C; return whether the robot is at rest."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
         while now_s < (
@@ -266,7 +266,7 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError if this program was suspended, so that its commands are outdated."""
+        """Raise ToolError if this time without commands exceeds the driver's timeout."""
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(
                 f"this program did not run for {silence_s:.1f} s, so the driver stopped the"

@@ -78,7 +78,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """Return 1 if the pattern is that of a motion along +axis, -1 if it is the reverse.
+    """Return 1 for the pattern of a motion along +axis, -1 for that of a motion along -axis.
 
     Raises Contradiction for any other pattern.
     """

@@ -30,7 +30,7 @@ LEAST_SIGMA: Final = 1e-4
 CORRECTED_WITH: Final = 5
 """Number of odometry steps over which a correction of the pose is spread.
 
-These steps together are regarded as one independent measurement.
+This number of successive steps is regarded as one independent measurement.
 """
 
 
@@ -157,7 +157,7 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return, for each pose, the distance along this axis of the body at the mean heading."""
+    """Return each pose's coordinate along the body's axis ``axis``, taken at the mean heading."""
     if axis == 2:
         return np.asarray(pose[:, 2])
     heading_rad = pose[:, 2].mean() + axis * np.pi / 2

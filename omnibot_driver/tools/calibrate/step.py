@@ -80,8 +80,8 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    Each step begins at a different time within the period of the deltas. So the steps together also
-    show the response between two deltas.
+    Each step begins at a different time within the period of the odometry deltas. So the steps
+    together also show the response between the ends of two deltas.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):
@@ -100,7 +100,7 @@ def _wheels(names: str) -> str:
 
 
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
-    """Return the two speeds in rad/s, rounded to whole units of the board's command.
+    """Return the slow and the fast speed in rad/s, rounded to whole units of the board's command.
 
     Raises ToolError if the speeds are not allowed or round to the same command.
     """

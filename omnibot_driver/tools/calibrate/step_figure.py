@@ -74,7 +74,8 @@ def _draw_predictions(
 ) -> None:
     """Draw each motor's response with present and better gains.
 
-    ``load``: as a multiple of the effort that a speed of one count per tick needs.
+    ``command``: size of the step of the command; ``load``: size of the step of the load, as a
+    multiple of the effort that a speed of one count per tick needs.
     """
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):

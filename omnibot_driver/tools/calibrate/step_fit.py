@@ -29,7 +29,7 @@ from omnibot_driver.tools.needs import ToolError
 ON_THE_WAY_S: Final = 0.0015
 """Time from publishing a command to its last bit on the line, in s.
 
-It is the latency of DDS, and the time of 9 bytes at 115200 baud.
+The time is the sum of the latency of DDS and the transmission of 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
 """Number of deltas before the onset that belong to a recorded step."""
@@ -102,7 +102,10 @@ class Fit:
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion: of two fits to the same steps, the smaller is better."""
+        """Akaike's information criterion.
+
+        Of two fits to the same steps, the fit with the smaller value is better.
+        """
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Models of step responses as the odometry measures them: averaged over a delta of 40 ms.
+"""Models of step responses as the odometry measures them: averaged over an odometry delta of 40 ms.
 
 Every model gives the angle that a wheel has turned by a given time, after a unit step of its rate
 at time 0. The mean rate of a delta is not a sample: it is the difference of two such angles,
@@ -58,12 +58,12 @@ def first_order(parameters: Array, time_s: Array) -> Array:
 def second_order(parameters: Array, time_s: Array) -> Array:
     """Return the angle turned by the model of second order after a unit step, with any damping.
 
-    The model is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). It needs the zero Z, because a PI loop
-    with feed-forward around a motor of first order has one.
+    The model is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). The zero Z is needed, because a
+    PI loop with feed-forward around a motor of first order has a zero.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
-    root = root if abs(root) > 1e-4 else 1e-4  # two close poles replace two equal ones
+    root = root if abs(root) > 1e-4 else 1e-4  # two close poles replace two equal poles
     poles = omega * (-damping + root), omega * (-damping - root)
     after_s = np.maximum(0.0, time_s - delay_s)
     turned = after_s.astype(complex)
@@ -110,7 +110,7 @@ SECOND_ORDER: Final = Model(
 
 
 def motor_model(gains: Gains) -> Model:
-    """Return the model of a motor in the manual's control loop; ``gains``: in the firmware."""
+    """Return the model of a motor in the manual's control loop with the firmware's gains."""
     return Model(
         "motor in the manual's loop",
         ("gain", "PWM per count", "motor time constant", "motor delay"),

@@ -13,17 +13,21 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains
 UNLIKE_ONE: Final = 0.02
 """`calibrate scale` is recommended if a wheel's gain differs from 1 by more than this."""
 QUANTUM_RADPS: Final = 0.05
-"""Standard deviation of a delta's rate that quantisation causes, in rad/s.
+"""Standard deviation, in rad/s, that quantisation causes in the rate of an odometry delta.
 
-The quantisation is that of the encoder, and of 0.1 mm in the protocol.
+Both the encoder and the protocol, with its unit of 0.1 mm, quantise a delta.
 """
 MANY: Final = 1.5
 """The user is warned if the residuals exceed this multiple of ``QUANTUM_RADPS``.
 
-On a computer that delayed commands the multiple was 2, and the fitted delay was 4 ms too long.
+On a computer that delayed commands the residuals were twice ``QUANTUM_RADPS``, and the fitted delay
+was 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
-"""The motor model does not fit if its residuals exceed this multiple of the second order's."""
+"""Largest ratio of the motor model's residuals to the second-order model's.
+
+Above this ratio the motor model is regarded as wrong.
+"""
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:

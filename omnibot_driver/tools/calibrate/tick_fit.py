@@ -81,8 +81,8 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     """Fit a plant to ``records`` of starts from standstill, all at the same duty.
 
-    A record has the times between ticks, in s. Its first time is not used, because it includes the
-    standstill. Raises ToolError if a record is too short.
+    A record has the times between ticks, in s. The first time of a record is not used, because it
+    includes the standstill. Raises ToolError if a record is too short.
     """
     intervals = [record[1:] for record in records]
     if not intervals or min(map(len, intervals)) < FEWEST_TICKS:
@@ -96,7 +96,7 @@ def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     marks = marks_in(search.off(values), ticks_per_revolution)
     if marks is not None:
         values = search.with_marks(marks, values)
-    search.correlate(values)  # two orders can be compared only with the same correlation
+    search.correlate(values)  # both orders must be compared with the same correlation
     values = search.closely(values)
     second = _described(search, values, marks, ticks_per_revolution)
     first = _described(search, search.first_order(values), marks, ticks_per_revolution)

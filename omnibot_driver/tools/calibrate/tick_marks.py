@@ -18,13 +18,14 @@ Column = NDArray[np.float64]
 
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
-"""Largest relative error of a time that is used; a larger error means a missed edge."""
+"""Largest plausible relative error of a time between ticks; beyond it an edge was missed."""
 OUTLIER: Final = 4.5
-"""An edge is regarded as late if the error of its time exceeds this many standard deviations."""
+"""An edge is regarded as late if its time's error exceeds this number of standard deviations."""
 EXPLAINED: Final = 0.4
 """Least fraction of the variance that fitted marks must explain to be accepted.
 
-With three records of two turns, marks that do not exist explain less than a fifth by chance.
+If the marks are evenly spaced, a fit to three records of two turns each explains by chance less
+than a fifth of the variance.
 """
 
 
@@ -48,7 +49,7 @@ class Marks:
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors that the marks cause in ``count`` times from ``first`` on."""
+        """Return the relative errors of ``count`` successive times, from step ``first`` on."""
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
 
@@ -78,7 +79,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the index of the step with which this row begins, by the best agreement."""
+    """Return the index of the step with which ``row`` begins, found by the best agreement."""
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
     turned = np.arange(marks)[:, None] + np.arange(marks)

@@ -2,7 +2,8 @@
 
 """Fit a plant by least squares to the times between ticks of several starts. Pure calculation.
 
-Knows the motion of a plant, marks and noise. Must not know files, nor which order is chosen.
+Knows the motion of a plant, the marks and the noise. Must not know files, nor choose between a
+plant of first and of second order.
 """
 
 import math
@@ -37,7 +38,7 @@ LATEST_S: Final = 2.0
 MOST_OFF: Final = 0.4
 """Largest error of a mark's position, in ticks."""
 LAGS: Final = 60
-"""Number of ticks over which a changing load correlates the residuals."""
+"""Number of ticks over which the residuals are correlated because the load changes."""
 MISSED: Final = 0.42
 """A mark was missed if the relative errors of a time and the next time add up to more than this.
 
@@ -53,7 +54,7 @@ FEWEST_RECORDS: Final = 6
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the distance after a step at time 0, divided by the final speed, in s."""
+    """Return the distance turned since a step at time 0, divided by the final speed, in s."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(times_s - slow_s * (1 - slow))
@@ -67,7 +68,7 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    The search uses their sum and ratio instead, because it then has only one optimum.
+    The search uses the sum and the ratio of both instead, so that it has only one optimum.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -98,7 +99,7 @@ class Search:
         self._good = np.ones(len(self._measured), dtype=bool)
 
     def roughly(self) -> Column:
-        """Return first values, for second order, evenly spaced marks and independent noise."""
+        """Return first estimates of the values: second order, even marks, independent noise."""
         records = len(self._lengths)
         starts = []
         for total_s in STARTS_S:
@@ -113,7 +114,7 @@ class Search:
     def first_order(self, values: Column) -> Column:
         """Continue the search with a plant of first order, from values of second order.
 
-        Set ``order`` to 1.
+        This call sets ``order`` to 1.
         """
         self.order = 1
         return self._best([np.array([*values[:2], *values[3:]])])
@@ -121,7 +122,7 @@ class Search:
     def off(self, values: Column) -> list[Column]:
         """Return the relative difference of each time from that with evenly spaced marks.
 
-        The result has a row for each record. It has NaN for the two distances beside a missed mark.
+        The result has a row for each record. A row is NaN for the distances beside a missed mark.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -132,7 +133,7 @@ class Search:
         return found
 
     def find_missed(self, values: Column) -> bool:
-        """Find the marks that the board missed, and count them; return whether any were missed."""
+        """Find marks that the board missed, and correct the counts; return whether any exist."""
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
             both = row + np.append(row[1:], 0.0)
@@ -158,7 +159,7 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """From now on, whiten the residuals by the correlation that they have at these values.
+        """From now on, whiten all residuals by the correlation of the residuals at these values.
 
         If the positions of the marks are not known, the marks cause the correlation, otherwise the
         load.
@@ -222,7 +223,7 @@ class Search:
             bounds=(low, high),
             loss="soft_l1",
             x_scale=0.1,
-            tr_solver="lsmr",  # no matrix decomposition, for which BLAS starts threads
+            tr_solver="lsmr",  # avoids a matrix decomposition, for which BLAS starts threads
             jac_sparsity=self._sparsity(),
             max_nfev=40,
             ftol=1e-7,
@@ -265,7 +266,7 @@ class Search:
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)
         last_s = (max(self._lengths) + 5) / rate + 2 * (slow_s + fast_s)
-        grid_s = last_s * np.linspace(0.0, 1.0, GRID) ** 2  # denser near the start
+        grid_s = last_s * np.linspace(0.0, 1.0, GRID) ** 2  # closer points near the start
         way = rate * turned(grid_s, slow_s, fast_s)
         begins_s = values[1 + order : 1 + order + records]
         if off is None:

@@ -3,8 +3,8 @@
 """Find gains of the manual's control law that suit a motor, and predict their effect.
 
 The criterion is the integral of absolute error after a step of the command, and after a step of
-the load (a floor, a sagging battery, dry friction). Each is divided by its value with the present
-gains, and both have the same weight. The limits are:
+the load (a floor, a sagging battery, dry friction). Each of the two integrals is divided by its
+value with the present gains, and both have the same weight. The limits are:
 
 - Ms, the peak of the sensitivity, is at most 1.6. This tolerates an error of a factor 2.6 in gain,
   or of 36° in phase.
@@ -78,8 +78,8 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the gains within the limits that are best for all these motors together.
 
-    They are found by a grid search that narrows in each round. ``now``: the gains with which the
-    behaviour is compared.
+    The gains are found by a grid search that narrows in each round. ``now``: the present gains,
+    with whose behaviour each candidate is compared.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)
@@ -121,6 +121,6 @@ def _around(value: float, reach: float, low: float, high: float) -> tuple[float,
 
 
 def _near(span: tuple[float, float], value: float) -> tuple[float, float]:
-    """Return the range of one grid step to both sides of a value, within the present range."""
+    """Return the range from one grid step below to one above ``value``, clipped to ``span``."""
     factor = (span[1] / span[0]) ** (1.0 / (CANDIDATES - 1))
     return max(span[0], value / factor), min(span[1], value * factor)

@@ -43,7 +43,7 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The response of a wheel: speed and effort at each tick, from the first that can respond."""
+    """A wheel's response: speed and effort at each tick, from the first tick that can show it."""
 
     speed: Array
     effort: Array
@@ -105,7 +105,7 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     def way(share: float) -> float:
         """Return the counts turned from rest after ``share`` ticks.
 
-        The effort is that for one count per tick.
+        The effort is the one that finally turns the wheel by one count per tick.
         """
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 

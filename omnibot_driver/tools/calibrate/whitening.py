@@ -14,8 +14,9 @@ Column = NDArray[np.float64]
 def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the autocorrelation of residuals, for lags from 0 to ``lags``.
 
-    With one lag it is -0.5 if marks are displaced, and 0 if the errors of successive times are
-    independent. With more lags it is tapered towards the last one.
+    If ``lags`` is 1, the value at lag 1 is nearly -0.5 for displaced marks, and 0 for independent
+    errors of successive times. If ``lags`` is larger, the estimate is tapered linearly to the last
+    lag.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -37,7 +38,8 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 def whitener(of_lags: Column, length: int) -> Column:
     """Return the matrix that makes residuals with this autocorrelation independent.
 
-    It is the inverse of the Cholesky factor. For a shorter row, use its upper left part.
+    The matrix is the inverse of the Cholesky factor. For a shorter row, use the upper left part of
+    the matrix.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]

@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options, ros_arguments = _parse(arguments)
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # question marks where there are no bars
+        sys.stdout.reconfigure(errors="replace")  # prints ? for bars that the encoding lacks
     try:
         return _run(options, ros_arguments)
     except ToolError as error:

@@ -63,7 +63,7 @@ class Robot(Protocol):
 
 
 class Release(ModalScreen[bool]):
-    """A question whether to release the e-stop: y releases it, every other key does not."""
+    """A question whether to release the e-stop: y releases the e-stop, every other key does not."""
 
     def compose(self) -> ComposeResult:
         """Build the question."""
@@ -128,7 +128,7 @@ class Monitor(App[None]):
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.exit)
-        # Called during a write, Textual's own handler would wait for the end of this write.
+        # A signal during a write must not call Textual's handler, which waits for the write to end.
         if callable(leave := signal.getsignal(signal.SIGTSTP)):
             loop.add_signal_handler(signal.SIGTSTP, leave, signal.SIGTSTP, None)
         loop.add_signal_handler(signal.SIGCONT, self._come_back)
@@ -138,7 +138,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        ``suspend`` ends the thread that reads keys; otherwise a second one would run beside it.
+        ``suspend`` ends the thread that reads keys. Without it, a second thread that reads keys
+        would run beside the first.
         """
         with self.suspend():
             pass

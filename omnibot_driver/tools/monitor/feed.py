@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Connect the monitor to the driver: topics update a model, requests and ``cmd_vel`` are sent.
+"""Connect the monitor to the driver: feed a model from topics, send requests and ``cmd_vel``.
 
 Callbacks run on a separate executor thread, so the screen does not delay them.
 """
@@ -188,7 +188,7 @@ class Feed:
         self._learned = False
 
     def _learn(self) -> None:
-        """Read the parameter names after each change of state, as another driver may run now."""
+        """Read the parameter names after each change of state: a different driver may run now."""
         if not self._learned and self._list.service_is_ready():
             self._learned = True
             listing = self._list.call_async(ListParameters.Request())

@@ -24,7 +24,7 @@ DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
 """Time in which a command is valid, in s: the driver's ``cmd_vel_timeout``."""
 SILENT_S: Final = 3.0
-"""Age of diagnostics, in s, above which they are outdated. They are published every second.
+"""Age, in s, above which diagnostics are outdated; the driver publishes them every second.
 
 A driver that has sent nothing for this time is regarded as silent.
 """

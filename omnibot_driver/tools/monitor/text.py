@@ -81,7 +81,7 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """Return lines with levels: one for each status that is not OK, and one for all that are OK."""
+    """Return lines with their levels: one per status that is not OK, one for all OK statuses."""
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)

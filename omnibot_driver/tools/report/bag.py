@@ -80,7 +80,7 @@ def _messages(
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
-    """Return the readers that could be opened, and the reasons why others could not."""
+    """Return readers of all files that can be opened, and a text for each defect of the bag."""
     if not path.exists():
         raise ToolError(f"there is no {path}: give the folder of a bag, or its .mcap or .db3 file")
     files, troubles = [path], []
@@ -112,7 +112,7 @@ def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
 
 
 def _open_file(file: Path, stack: ExitStack, troubles: list[str]) -> Reader:
-    """Open a file, or a repaired copy of it if it is broken or has a journal."""
+    """Open a file of a bag; if it is broken or has a journal, open a repaired copy instead."""
     broken = file.suffix == ".mcap" and salvage.breaks_off(file)
     whole = file
     if broken or salvage.has_journal(file):

@@ -71,7 +71,7 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Whether the driver kept publishing in this state."""
+    """Whether the driver still published diagnostics ``SILENT_S`` after this state began."""
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
         for status in log.diagnostics

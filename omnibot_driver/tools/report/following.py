@@ -27,7 +27,7 @@ AFTER_STOP_S: Final = 1.5
 class Pair:
     """A command topic and the measurements of its effect.
 
-    ``weights`` convert the axes to speeds of a rim in m/s.
+    ``weights``: factors that convert the values on the axes to the speed of a wheel's rim, in m/s.
     """
 
     topic: str
@@ -56,7 +56,7 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """Return the parameters that correct wrong speeds; they differ for a base with two wheels."""
+    """Return the names of the parameters that correct wrong speeds, for this number of wheels."""
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"
@@ -105,7 +105,7 @@ class Answer:
 
 
 def answer(pair: Pair, usable: Mask) -> Answer | None:
-    """Return the response, with the lag that fits the measurements best; None without commands."""
+    """Return the response, with the lag that fits best; None if no command was active."""
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
     best_s, least = 0.0, np.inf
@@ -128,7 +128,7 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge the commands: invalid, interrupted, followed or not; and motion without a command."""
+    """Judge the commands (valid, uninterrupted, followed), and motion without a command."""
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(
             Level.NOTE,
@@ -164,8 +164,8 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
-    """Return the commanded and the measured speed of a rim in m/s, and the times of the first
-    pair's measurements in s."""
+    """Return the commanded and the measured speed of a wheel's rim in m/s, and the times of the
+    first pair's measurements in s."""
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
     times_s = found[0].measured.stamp_s
@@ -188,7 +188,7 @@ def _stopped(log: Log, at_s: Array) -> Mask:
 
 
 def _sustained(times_s: Array, rows: Mask) -> list[Span]:
-    """Return the stretches in which these rows are true for ``SUSTAINED_S`` or longer."""
+    """Return the spans of time in which ``rows`` is true for ``SUSTAINED_S`` or longer."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
     return [item for item in spans if item.length_s >= SUSTAINED_S]

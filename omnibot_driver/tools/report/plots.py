@@ -136,7 +136,7 @@ def inertia(log: Log) -> Figure:
 
 
 def spectra(log: Log) -> Figure:
-    """Draw amplitude spectral densities at rest and in motion."""
+    """Draw the amplitude spectral densities of the IMU's readings, at rest and in motion."""
     figure = new_figure(4.2)
     columns = figure.subplots(1, 2)
     imu = log.imu.only(log.imu.finite & np.isfinite(log.imu.stamp_s))
@@ -164,7 +164,7 @@ def spectra(log: Log) -> Figure:
 
 
 def timing(log: Log) -> Figure:
-    """Draw intervals of timestamps, and arrival delays above the smallest one.
+    """Draw the intervals between timestamps, and the arrival delays above the smallest delay.
 
     Both are drawn over time and as histograms.
     """
@@ -250,7 +250,7 @@ def timeline(log: Log) -> Figure:
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
     """Yield a span and a colour for each status.
 
-    A span lasts until the next status, or 1 s if the next one is late.
+    The span of a status lasts until the next status, or 1 s if the next status is late.
     """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0

@@ -81,7 +81,7 @@ class _Column:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
         self.rows: list[Row] = []
-        """Rows of values; their common width may be known at the end only."""
+        """Rows of values; the width that they should have may become known only at the end."""
 
     def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
@@ -121,7 +121,7 @@ class Recorder:
         self.count = 0
 
     def hear(self, role: str, kind: str, arrived_ns: int, message: Any) -> None:
-        """Record a message of this type on the topic of this role."""
+        """Record a message of the type ``kind`` that arrived on the topic with this role."""
         if role in self._columns:
             column = self._columns[role]
             joints = role == "joint_states"
@@ -140,7 +140,7 @@ class Recorder:
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
-        """Return all messages in the order of arrival, as a log; at least one must exist."""
+        """Return a log of all messages in the order of arrival; at least one must exist."""
         times = [
             *(time for column in self._columns.values() for time in column.arrived_ns),
             *(time for events in self._events.values() for time, _ in events),

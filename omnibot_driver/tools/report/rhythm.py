@@ -22,7 +22,7 @@ LONG_GAP_S: Final = 0.5
 MANY_LOST: Final = 0.01
 RATE_TOLERANCE: Final = 0.05
 UNEVEN: Final = 0.1
-"""Standard deviation of the steps, in periods, above which timestamps are not sampling times."""
+"""Standard deviation of timestamp steps, in periods, above which the steps are uneven."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
@@ -35,8 +35,8 @@ RECOVERY_S: Final = 0.75
 class Stream:
     """The expected timing of a topic.
 
-    Keys in the driver's diagnostics: ``lost`` for the counts of lost messages, ``rates`` for the
-    expected rates, the best first.
+    ``lost``, ``rates``: keys in the driver's diagnostics, for the counts of lost messages, and for
+    the expected rate. The first key of ``rates`` that has a value is used.
     """
 
     name: str
@@ -82,10 +82,10 @@ class FrameSchedule:
     """The timing of a stream.
 
     ``steps_s``: steps between successive timestamps, from ``at_s`` on; ``period_s``: their median.
-    Gaps: where they begin, how long they are, how many messages are missing; gaps that the driver's
-    state explains are left out. Leaps: wide steps that later short steps
-    compensate, so nothing is missing.
-    ``late_s``: arrival after the timestamp, at ``arrived_s``.
+    ``gap_at_s``, ``gap_s``, ``missing``: beginning and length of each gap, and number of missing
+    messages, without the gaps that the driver's state explains. ``leap_at_s``, ``leap_s``:
+    beginning and length of each wide step that later short steps compensate, so that no message is
+    missing. ``late_s``: arrival after the timestamp, at ``arrived_s``.
     """
 
     at_s: Array
@@ -145,7 +145,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each wide step, the end of the rows that may compensate it."""
+    """Return, for each wide step, the end of the range of steps that may compensate it.
+
+    The range ends before the next wide step, and has at most ``most`` steps.
+    """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
     return ends

@@ -33,7 +33,7 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return, for each role that this topic may have, its namespace and whether its type fits."""
+    """Return, for each possible role of ``topic``, the namespace and whether ``kind`` fits."""
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
         if topic.endswith(f"/{role}"):
@@ -46,7 +46,7 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 
 
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
-    """Return the wanted robot, or the only one. Raises ToolError, which lists the robots found."""
+    """Return the wanted robot, or the only one. Raises ToolError that lists the robots found."""
     names = ", ".join(robots)
     if not robots:
         raise ToolError(

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Repair files of bags that were never finished, in a copy.
+"""Repair files of bags whose recording was never finished; only a copy is changed.
 
 An mcap (mcap.dev/spec) is a sequence of records: an operation of one byte, a length of eight bytes,
 and that many bytes of content. An index follows; the records can also be read without it. The

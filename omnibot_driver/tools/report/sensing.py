@@ -27,7 +27,7 @@ BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
 """Rate, in rad/s, above which the robot is taken to turn if odometry is missing.
 
-A constant rate above it might also be a bias, but such a bias is rare.
+A constant rate above this value might also be a bias, but so large a bias is rare.
 """
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
