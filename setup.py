@@ -38,7 +38,7 @@ class CompileCore(build_ext):
     """
 
     def run(self) -> None:
-        """Compile the core. Never raises, because plain Python is complete without it."""
+        """Compile the core. Never raises, because the package also works as plain Python."""
         if self.inplace:
             print(f"{NAME}: a development installation runs its sources; core: interpreted")
             return

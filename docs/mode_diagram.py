@@ -58,7 +58,7 @@ def _curve(before: Mode, after: Mode) -> tuple[Point, Point, Point]:
 
 
 def _border(centre: Point, towards: Point) -> Point:
-    """Return the point where the box around this centre ends in that direction."""
+    """Return the point where the line from ``centre`` to ``towards`` leaves the box."""
     dx, dy = towards[0] - centre[0], towards[1] - centre[1]
     part = min(
         (BOX_WIDTH / 2 + 4) / abs(dx) if dx else math.inf,
@@ -93,7 +93,7 @@ def _arrow(before: Mode, after: Mode) -> list[str]:
 def _label(before: Mode, after: Mode) -> list[str]:
     """Return an arrow's label: at the middle of a horizontal arrow, near the start of any other.
 
-    In these places no two labels overlap.
+    In these positions no two labels overlap.
     """
     lying = PLACES[before][1] == PLACES[after][1]
     x, y = _at(_curve(before, after), 0.5 if lying else 0.3)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Launch file that starts the driver with a parameter file; launch arguments override it."""
+"""Launch file that starts the driver with a parameter file; launch arguments override the file."""
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction

@@ -2,7 +2,6 @@
 
 """The demo: simulated board and driver as separate processes, and a robot that drives a square.
 
-Like any ROS program, the demo uses the driver through its topics. It uses the simulator through
-its console.
-The demo must not know the bytes on the wire.
+Like any ROS program, the demo uses the driver through the driver's topics. It uses the simulator
+through the simulator's console. The demo must not know the bytes on the wire.
 """

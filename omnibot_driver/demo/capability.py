@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the demo must know of a board, read from its profile before anything starts.
+"""What the demo must know of a board; it is read from the board's profile before anything starts.
 
-This module must not know any board by name, ROS or processes.
+This module must not name any board, and must not use ROS or processes.
 """
 
 from dataclasses import dataclass

@@ -13,8 +13,8 @@ from omnibot_driver.tools.monitor.screen import has_screen
 class Dashboard:
     """The tool ``monitor`` on this terminal, until the user quits it or ``close`` is called.
 
-    It shows the driver of this namespace as soon as that driver runs. ``possible``: whether the
-    terminal and the installed libraries allow it.
+    The monitor shows the driver in ``namespace`` as soon as the driver runs. ``possible``: whether
+    the terminal and the installed libraries allow the monitor to run.
     """
 
     def __init__(self, namespace: str) -> None:

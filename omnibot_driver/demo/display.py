@@ -80,7 +80,7 @@ class Drive:
     """The results of a drive: distance, message rates, the pose by odometry, and the true pose.
 
     ``imu_hz`` is None without an IMU. ``real``: the driver's arguments for the real robot;
-    ``page``: the document of its board.
+    ``page``: the document of the robot's board.
     """
 
     seconds: float

@@ -15,7 +15,7 @@ PATIENCE_S: Final = 15.0
 
 
 class DemoFailed(Exception):
-    """The demo cannot continue; the text says why."""
+    """The demo cannot continue; the exception's message says why."""
 
 
 class Program:

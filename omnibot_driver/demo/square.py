@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steering of the robot around the square: a pure function of its pose and leg."""
+"""Steer the robot around the square: a pure function of the robot's pose and the present leg."""
 
 import math
 from typing import Final

@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find drivers by the topics that every driver publishes, whatever its board."""
+"""Find drivers, whatever their boards are, by the topics that every driver publishes."""
 
 from collections.abc import Iterable
 from typing import Any, Final
 
 SIGNS: Final = {"state": "std_msgs/msg/String", "estop_active": "std_msgs/msg/Bool"}
-"""Topics under a driver's own name, and their types."""
+"""Topics that every driver publishes under its own name, and the types of these topics."""
 
 
 def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the full names of the drivers among these pairs of topic and type."""
+    """Return the full names of the drivers; ``topics``: pairs of the name and type of a topic."""
     pairs = set(topics)
     names = {topic.rpartition("/")[0] for topic, _kind in pairs}
     return sorted(

@@ -2,11 +2,11 @@
 
 """Fit the robot's geometry to drives whose ends were measured with a tape. Pure calculation.
 
-Each path of the odometry is converted to the distances that the wheels rolled. From these the path
-is computed again with other radii of the wheels and of the base, until the ends fit the tape. Any
-mixture of lines, turns and squares can be used, if it determines the radii. The method is that of
-J. Borenstein and L. Feng, "UMBmark: a benchmark test for measuring odometry errors in mobile
-robots" (1995), extended to three wheels.
+Each path of the odometry is converted to the distances that the wheels rolled. From these distances
+the path is computed again with other radii of the wheels and of the base, until the ends fit the
+tape. Any mixture of lines, turns and squares can be used, if it determines the radii. The method is
+that of J. Borenstein and L. Feng, "UMBmark: a benchmark test for measuring odometry errors in
+mobile robots" (1995), extended to three wheels.
 """
 
 import math
@@ -45,7 +45,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Sizes as ratios to the assumed sizes.
+    """The robot's sizes, as ratios to the assumed sizes.
 
     ``wheels``: mean radius of the wheels; ``base``: base radius; ``unlike``: (3,) relative
     difference of each wheel's radius from the mean. ``covariance``: (4, 4) covariance matrix of

@@ -33,7 +33,7 @@ PURE_TURN: Final = 0.5
 The ratio is 0 if the odometry deltas are interpreted correctly, else 2 or more.
 """
 ALIKE: Final = 0.35
-"""Two angles are regarded as equal if they differ by less than this fraction of the turn."""
+"""Two angles are equal if they differ by less than this fraction of the angle of the turn."""
 
 
 LEAST_M: Final = 1e-3
@@ -111,9 +111,9 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     """Return whether the odometry shows the same body direction before and after a turn.
 
-    ``before``, ``after``: motions with the same command. With the wrong choice between the frames
-    "earth" and "body", the direction changes by the turn. Raises ToolError if the direction
-    neither stays the same nor changes by the turn.
+    ``before``, ``after``: motions with the same command. If the wrong one of the frames "earth"
+    and "body" is set, the direction changes by the angle of the turn. Raises ToolError if the
+    direction neither stays the same nor changes by this angle.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

@@ -78,12 +78,12 @@ def answer(
 ) -> Array:
     """Return the speed in RPM after a step of the set-point from standstill.
 
-    The first dimension of the result is time, in steps of ``STEP_S``. The others are the common
-    shape of the gains, ``dead_s``, ``begun`` and ``sent_s``. ``dead_s``: dead times to use instead
-    of the loop's; ``begun``: starting position between two marks, as a fraction of their distance;
-    ``sent_s``: time at which the board first sends ticks (None: it sends nothing). If a tick comes
-    while the board sends, the board notices this tick only afterwards. The speed of this tick is
-    then too low, and the speed of the next tick too high.
+    The first dimension of the result is time, in steps of ``STEP_S``. The other dimensions are the
+    common shape of the gains, ``dead_s``, ``begun`` and ``sent_s``. ``dead_s``: dead times to use
+    instead of the loop's; ``begun``: starting position between two marks, as a fraction of their
+    distance; ``sent_s``: time at which the board first sends ticks (None: it sends nothing). If a
+    tick comes while the board sends, the board notices this tick only afterwards. The speed of this
+    tick is then too low, and the speed of the next tick too high.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(

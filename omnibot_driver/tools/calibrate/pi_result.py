@@ -62,8 +62,8 @@ class Measured:
 class WheelTuned:
     """The result for one wheel.
 
-    ``loop``: its control loop, with the fitted dead time; ``before``, ``after``: steps recorded
-    with the previous and with the new gains.
+    ``loop``: the wheel's control loop, with the fitted dead time; ``before``, ``after``: steps
+    recorded with the previous and with the new gains.
     """
 
     name: str

@@ -213,5 +213,8 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 
 
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
-    """Restore parameters to their values in ``before``; one that had none keeps its new value."""
+    """Restore the parameters ``names`` to their values in ``before``.
+
+    A parameter whose value in ``before`` is None keeps its new value until a restart.
+    """
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

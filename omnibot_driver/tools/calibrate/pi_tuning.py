@@ -35,7 +35,7 @@ ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
-"""Positions between two marks at which a simulated wheel starts, as fractions of their distance.
+"""Starting positions of a simulated wheel between two marks, as fractions of the marks' distance.
 
 The position decides when ticks come relative to the control periods, which changes the response.
 """
@@ -97,8 +97,8 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
         found = _foreseen(plant, gains, loop, goals)
         tame = found.overshoot <= goals.overshoot
         tame &= _disturbed(plant, gains, loop, goals) <= goals.overshoot + DISTURBED
-        # Gains above the first that overshoots too much are not allowed, even if saturation hides
-        # their overshoot.
+        # Gains above the first gain that overshoots too much are not allowed, even if saturation
+        # hides their overshoot.
         allowed = np.isfinite(found.settled_s) & np.logical_and.accumulate(tame, axis=0)
         if goals.phase_margin_deg is not None:
             margin = phase_margin_deg(plant, gains, loop, target)

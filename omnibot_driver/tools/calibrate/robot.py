@@ -217,7 +217,7 @@ class Robot(Listener):
             wanted = law(now_s - began_s, pose) if wanted is not None else None
 
     def _halt(self, topic: Topic) -> bool:
-        """Stop the robot, even during Ctrl-C; return whether the robot is at rest."""
+        """Stop the robot, even after Ctrl-C; return whether the robot is at rest."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
         while now_s < (
@@ -266,7 +266,7 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError if this time without commands exceeds the driver's timeout."""
+        """Raise ToolError if ``silence_s`` without commands exceeds the driver's timeout."""
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(
                 f"this program did not run for {silence_s:.1f} s, so the driver stopped the"

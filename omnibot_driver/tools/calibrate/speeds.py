@@ -3,9 +3,9 @@
 """Plan commands, measure the speeds that result, and fit the scale. Pure calculation.
 
 The board takes whole counts, so only whole counts are commanded. A measured speed is compared with
-its counts, so there is no rounding error. A speed is measured as the slope of the odometry's pose,
-in which rounding errors do not accumulate. A twist comes from a single displacement, whose rounding
-error does not average out.
+the commanded counts, so the command has no rounding error. A speed is measured as the slope of the
+odometry's pose, in which rounding errors do not accumulate. The odometry's twist is not used: it
+comes from a single displacement, whose rounding error does not average out.
 """
 
 from collections.abc import Sequence

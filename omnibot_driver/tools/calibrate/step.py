@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 RUN_UP_S: Final = 2.0
 """Time to reach the first speed from rest, in s.
 
-This part of a record is not evaluated, because of friction.
+This part of a record is not evaluated, because friction affects a start from rest.
 """
 
 

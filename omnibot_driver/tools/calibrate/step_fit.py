@@ -32,7 +32,7 @@ ON_THE_WAY_S: Final = 0.0015
 The time is the sum of the latency of DDS and the transmission of 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
-"""Number of deltas before the onset that belong to a recorded step."""
+"""Number of odometry deltas before the onset that belong to a recorded step."""
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
@@ -42,7 +42,7 @@ UNLIKE: Final = 3.0
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
-"""Times, in s, at which a model is evaluated for its traits."""
+"""Times, in s, at which a model is evaluated to find rise time and overshoot."""
 DRAWS: Final = 100
 
 
@@ -51,9 +51,9 @@ class Step:
     """One step from one commanded rate to another, in rad/s.
 
     ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: mean
-    rate of each delta, over the four ticks before its end. ``last_radps``: the rate commanded
-    before ``before_radps``. The change between these two was ``last_ticks`` ticks before the onset;
-    the response to this change may not have ended.
+    rate of each odometry delta, that is, of the four ticks before its end. ``last_radps``: the rate
+    commanded before ``before_radps``. The change between these two was ``last_ticks`` ticks before
+    the onset; the response to this change may not have ended.
     """
 
     before_radps: float
@@ -68,7 +68,7 @@ class Step:
         return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
 
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
-        """Return the predicted rates of this step's deltas, in rad/s.
+        """Return the predicted rates of this step's odometry deltas, in rad/s.
 
         ``mean``: a function of the ticks at which deltas end; it returns the mean response of each
         delta to a unit step.
@@ -109,7 +109,7 @@ class Fit:
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:
-        """Return the model's prediction of a step's deltas, in rad/s."""
+        """Return the model's prediction of a step's odometry deltas, in rad/s."""
         told = step.told_by(lambda ticks: self.model.mean(self.values[1:], ticks * TICK_S))
         return np.asarray(self.values[0] * told)
 
@@ -133,7 +133,7 @@ class Fit:
 def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
     """Return the steps of one wheel in which the command changed between two rates of ``levels``.
 
-    Raises ToolError if gaps in the deltas leave no complete step.
+    Raises ToolError if gaps in the odometry leave no complete step.
     """
     told = commands.values[:, wheel]
     heard = np.isfinite(wheels.rate_radps[:, wheel])
@@ -213,7 +213,11 @@ class WheelFound:
 
 
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
-    """Fit all three models to a wheel's steps; ``now`` are the gains in the firmware."""
+    """Fit the three models to a wheel's steps.
+
+    The models are those of first order, of second order, and of a motor in the manual's loop.
+    ``now``: the gains in the firmware.
+    """
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
         fit(model, whole) for model in (FIRST_ORDER, SECOND_ORDER, motor_model(now))

@@ -29,7 +29,7 @@ It returns the angle turned after a unit step of the rate (1 rad/s), in rad.
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model of a step response; names, units, starting values and bounds of its parameters.
+    """A model of a step response, with names, units, starting values and bounds of its parameters.
 
     The first parameter is always the gain.
     """
@@ -43,7 +43,7 @@ class Model:
     turned: Turned
 
     def mean(self, parameters: Array, end_s: Array) -> Array:
-        """Return, for each delta that ends at ``end_s``, the mean rate after a unit step."""
+        """Return the mean rate of each delta after a unit step; ``end_s``: times of their ends."""
         turned = self.turned(parameters, np.concatenate((end_s, end_s - SPAN_S)))
         return np.asarray((turned[: len(end_s)] - turned[len(end_s) :]) / SPAN_S)
 
@@ -76,7 +76,7 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 def motor_in_loop(gains: Gains) -> Turned:
     """Return the model of a motor in the manual's control loop with these gains.
 
-    Its parameters are PWM per count, time constant and delay.
+    The model's parameters are PWM per count, time constant and delay.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

@@ -20,7 +20,7 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest fraction of a record's times that may be missing."""
 UNLIKE: Final = 1.5
-"""Largest ratio of a time to the median; beyond it an edge was missed or came late."""
+"""Largest ratio of a time to the median time; beyond it an edge was missed or came late."""
 SMOOTHED: Final = 4
 """Number of ticks over which a speed is averaged.
 
@@ -54,10 +54,10 @@ def read(path: Path) -> dict[str, Column]:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Corrections of an encoder's two levels, and the speed at which they were measured.
+    """Corrections of the two levels of an encoder's signal, and the speed at the measurement.
 
-    ``short``, ``long``: factors that make each level as long as the mean of both. ``sigma``: their
-    standard deviation. ``rpm``: the wheel's speed.
+    ``short``, ``long``: factors that make the duration of each level equal to the mean of both.
+    ``sigma``: standard deviation of the factors. ``rpm``: the wheel's speed.
     """
 
     short: float
@@ -67,7 +67,7 @@ class Levels:
 
 
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
-    """Return the corrections of an encoder's levels, from a wheel that turns at a constant duty.
+    """Return the corrections of an encoder's two levels, for a wheel that turns at constant duty.
 
     The record must be made with corrections of 1. The two levels alternate; the one with the
     shorter mean is the short level. After a missed edge the levels are assigned again. Raises

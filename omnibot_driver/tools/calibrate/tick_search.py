@@ -31,7 +31,9 @@ GRID: Final = 1500
 STARTS_S: Final = (0.1, 0.5)
 """Starting values for the sum of both time constants, in s."""
 RATIOS: Final = (0.15, 0.4, 0.8)
-"""Starting values for the ratio of the fast to the slow time constant; at 1 the search would stop.
+"""Starting values for the ratio of the fast to the slow time constant.
+
+A search that starts at 1 would stop there.
 """
 LATEST_S: Final = 2.0
 """Largest time from the start to the first mark, in s."""
@@ -133,7 +135,7 @@ class Search:
         return found
 
     def find_missed(self, values: Column) -> bool:
-        """Find marks that the board missed, and correct the counts; return whether any exist."""
+        """Find missed marks, and correct the counts; return whether the board missed any."""
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
             both = row + np.append(row[1:], 0.0)
@@ -161,8 +163,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """From now on, whiten all residuals by the correlation of the residuals at these values.
 
-        If the positions of the marks are not known, the marks cause the correlation, otherwise the
-        load.
+        If the positions of the marks are not known, the marks cause the correlation; otherwise the
+        changing load causes it.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)

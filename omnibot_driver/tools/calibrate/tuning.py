@@ -6,8 +6,8 @@ The criterion is the integral of absolute error after a step of the command, and
 the load (a floor, a sagging battery, dry friction). Each of the two integrals is divided by its
 value with the present gains, and both have the same weight. The limits are:
 
-- Ms, the peak of the sensitivity, is at most 1.6. This tolerates an error of a factor 2.6 in gain,
-  or of 36° in phase.
+- Ms, the peak of the sensitivity, is at most 1.6. This limit tolerates an error of a factor 2.6 in
+  gain, or of 36° in phase.
 - The overshoot after a step of the command is at most 5 %.
 - One encoder count changes the effort by no more than the effort for a speed of one count per tick.
 """
@@ -35,7 +35,7 @@ HORIZON_TICKS: Final = 400
 SETTLED: Final = 1e-3
 """Largest relative error of a stable loop after ``HORIZON_TICKS``."""
 CANDIDATES: Final = 24
-"""Number of values of each gain in one round."""
+"""Number of values of each gain in one round of the search."""
 ROUNDS: Final = 3
 
 

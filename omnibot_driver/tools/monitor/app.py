@@ -44,7 +44,7 @@ class Robot(Protocol):
     dead_man: DeadMan | None
 
     def view(self) -> View:
-        """Return the present view of the robot."""
+        """Return the values to show now."""
 
     def estop(self) -> None:
         """Latch the e-stop."""
@@ -74,7 +74,7 @@ class Release(ModalScreen[bool]):
         )
 
     def on_key(self, event: events.Key) -> None:
-        """Take the key as the answer."""
+        """Take the key as the answer to the question."""
         event.stop()
         self.dismiss(event.key == "y")
 
@@ -138,7 +138,7 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        ``suspend`` ends the thread that reads keys. Without it, a second thread that reads keys
+        ``suspend`` ends the thread that reads keys. Without ``suspend``, a second such thread
         would run beside the first.
         """
         with self.suspend():
@@ -204,7 +204,7 @@ class Monitor(App[None]):
             dead_man.change_speed(1 if event.key == "plus" else -1)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Hide and disable the keys of actions that the robot's board does not have."""
+        """Hide and disable the keys of actions that the robot's board does not support."""
         return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:

@@ -53,11 +53,11 @@ IMU_PARAMETER: Final = "imu_frame"
 
 
 class Feed:
-    """The connection to the driver ``name`` in this namespace, until ``close``.
+    """The connection to the driver ``name`` in ``namespace``, until ``close`` is called.
 
-    With a dead man, ``cmd_vel`` is published as long as a key is held. Any thread may call
-    ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``; the view shows their
-    result. Raises ToolError for invalid names.
+    With ``dead_man``, a dead man's switch, ``cmd_vel`` is published as long as a key is held. Any
+    thread may call ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``; the view
+    shows their result. Raises ToolError for invalid names.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Feed:
         self._spinner.start()
 
     def close(self) -> None:
-        """Stop a robot that was steered from here, and leave ROS."""
+        """Stop the robot if this monitor has steered it, and leave ROS."""
         if self.dead_man:
             self.dead_man.stop()
         self._ending.set()
@@ -106,7 +106,7 @@ class Feed:
         rclpy.try_shutdown(context=self._context)
 
     def view(self) -> View:
-        """Return the present view of the driver."""
+        """Return the values to show now."""
         with self._lock:
             return self._model.view(
                 time.monotonic(), steers=self._velocity.steers, lacks=self._lacks()
@@ -117,7 +117,7 @@ class Feed:
         return running_drivers(self._node)
 
     def namesakes(self) -> str:
-        """Return a warning if several drivers have this name, else an empty string."""
+        """Return a warning if several drivers share this driver's name, else an empty string."""
         count = self._node.count_publishers(f"{self.driver}/state")
         if count < 2:
             return ""

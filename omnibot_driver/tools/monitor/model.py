@@ -34,8 +34,8 @@ JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
 """Largest speed, in m/s, that is regarded as motion of the robot.
 
-A pose that is further away than ``JUMP_M`` and this speed allow shows a reset of the odometry, and
-begins a new path.
+A pose that is further from the pose before than ``JUMP_M`` and this speed allow shows a reset of
+the odometry, and begins a new path.
 """
 
 
@@ -52,7 +52,7 @@ class Flow:
 class View:
     """The values to show at one moment; unknown or outdated ones are None or empty.
 
-    ``steers``: whether another node receives the commands sent here; ``lacks``: those of ``imu``,
+    ``steers``: whether another node receives the monitor's commands; ``lacks``: those of ``imu``,
     ``start`` and ``pause`` that the robot's board does not have.
     """
 
@@ -88,7 +88,7 @@ class View:
         return ""
 
     def missing(self, diagnostics: bool) -> list[str]:
-        """Return the topics that a driver publishes in this state, but that are not received."""
+        """Return the topics that a driver in this state publishes, but that are not received."""
         wanted = {
             "state": bool(self.state),
             "estop_active": self.estop is not None,
@@ -158,11 +158,11 @@ class Model:
         self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
 
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
-        """Store a ``cmd_vel``. It does not show that the driver runs: other nodes publish it."""
+        """Store a message of ``cmd_vel``, which does not show that the driver runs."""
         self._commanded = twist, now_s
 
     def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:
-        """Store a ``/diagnostics`` of this driver."""
+        """Store the driver's statuses, which came in a message of ``/diagnostics``."""
         self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
 
     def view(
@@ -207,5 +207,5 @@ class Model:
 
 
 def level(byte: int) -> Level:
-    """Return the level of a diagnostic_msgs/DiagnosticStatus; an unknown one counts as ERROR."""
+    """Return the level of a diagnostic_msgs/DiagnosticStatus; an unknown value counts as ERROR."""
     return Level(byte) if byte in tuple(Level) else Level.ERROR

@@ -22,7 +22,7 @@ LARGEST_M: Final = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture of rows of equal length, and their width in m."""
+    """A picture: rows of equal length, and the width of the picture in m."""
 
     rows: list[str]
     width_m: float

@@ -27,7 +27,7 @@ class Rate:
         self._seconds[-1] += 1
 
     def hz(self, now_s: float) -> float:
-        """Return the rate over ``WINDOW_S``, or since the beginning while that is shorter."""
+        """Return the rate over the last ``WINDOW_S``, or since ``began_s`` if that is later."""
         self._forget(now_s)
         span_s = min(WINDOW_S, now_s - self._began_s)
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0

@@ -14,7 +14,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 FIRST_S: Final = 0.6
 """Time for which a newly pressed key moves the robot, in s.
 
-Most keyboards repeat after 0.25 s to 0.6 s.
+Most keyboards begin to repeat a held key after 0.25 s to 0.6 s.
 """
 REPEAT_S: Final = 0.3
 """Time for which a repeated key moves the robot, in s; several repetitions may be lost or late."""
@@ -22,7 +22,7 @@ ASLEEP_S: Final = 0.5
 """Time between two calls of ``command``, in s, that shows that the program was suspended; older
 keys are then discarded."""
 DEAF_S: Final = 0.3
-"""Time after a suspension, in s, in which keys do not steer, because older keys are still read."""
+"""Time after a suspension, in s, in which keys do not steer, because earlier keys still arrive."""
 ZEROS: Final = 5
 """Number of zero commands after a motion. Then nothing is published: other nodes may want to
 drive."""
@@ -77,12 +77,12 @@ class DeadMan:
         self._held = NOTHING
 
     def change_speed(self, steps: int) -> None:
-        """Change the speed in tenths of the fastest, from one to ten."""
+        """Change the speed level by ``steps``; level 10 is the fastest speed, level 1 a tenth."""
         self.level = min(max(self.level + steps, 1), LEVELS)
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """Speeds at this level, in m/s and rad/s."""
+        """Linear and angular speed at the present level, in m/s and rad/s."""
         part = self.level / LEVELS
         return part * self.fastest[0], part * self.fastest[1]
 

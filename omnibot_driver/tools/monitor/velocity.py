@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Receive ``cmd_vel`` of any node, and publish the commands of a dead man. Knows only ROS."""
+"""Receive ``cmd_vel`` of any node, and publish commands of a dead man's switch. Knows only ROS."""
 
 import time
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class VelocityTopic:
     """The topic ``cmd_vel``, with the message type to which the driver subscribes.
 
     A topic cannot have two types in one process, so subscription and publisher share the type.
-    ``heard`` receives each command. Without a dead man nothing is published.
+    ``heard`` receives each command. Without ``dead_man`` nothing is published.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class VelocityTopic:
     ) -> None:
         self.dead_man = dead_man
         self.steers = False
-        """Whether another node receives what is published here."""
+        """Whether another node receives the ``cmd_vel`` that this object publishes."""
         self._node, self._driver, self._heard = node, driver, heard
         self._subscription: Any = None
         self._publisher: Any = None

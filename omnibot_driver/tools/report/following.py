@@ -40,7 +40,7 @@ class Pair:
 
 
 def twists(log: Log) -> Pair:
-    """Return cmd_vel and the twist of odom, finite values only."""
+    """Return the pair of cmd_vel and the twist of odom, with finite values only."""
     odom = _sampled(log.odom)
     linear, angular = _scales(log)
     scales = linear, linear, angular
@@ -56,14 +56,14 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """Return the names of the parameters that correct wrong speeds, for this number of wheels."""
+    """Return the names of the parameters that correct wrong speeds of a base with these wheels."""
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"
 
 
 def pairs(log: Log) -> list[Pair]:
-    """Return the pairs of commands and measurements that the log has, finite values only."""
+    """Return the pairs of commands and measurements in the log, with finite values only."""
     count = len(log.wheels)
     wheels = Pair(
         "wheel_cmd",
@@ -96,7 +96,7 @@ def _sampled(series: Series) -> Series:
 class Answer:
     """The robot's response to commands: its delay and, for each axis, its gain and rms error.
 
-    A gain is measured divided by commanded motion; it is NaN if it is not known.
+    A gain is the ratio of measured to commanded motion, NaN if not known.
     """
 
     lag_s: float

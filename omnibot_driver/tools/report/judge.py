@@ -16,7 +16,7 @@ WITHOUT = {
 
 
 def judge(log: Log) -> list[Finding]:
-    """Return all findings by level; findings of one level stay in the order of the subjects."""
+    """Return all findings, the most severe first; within a level they keep the order of judging."""
     return sorted(_all(log), key=lambda finding: -finding.level)
 
 
@@ -56,7 +56,7 @@ def _all(log: Log) -> Iterator[Finding]:
 def _has_no_imu(log: Log) -> bool:
     """Return whether diagnostics were received and show a board without an IMU.
 
-    If the board has an IMU, the driver's Stream status counts its frames.
+    If the board has an IMU, the driver's Stream status counts the IMU's frames.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     return bool(streams) and not any("IMU" in key for item in streams for key in item.values)

@@ -35,7 +35,10 @@ Progress = Callable[[int, int], None]
 def listen(
     seconds: float, namespace: str | None, progress: Progress, asked_to_end: Callable[[], bool]
 ) -> Log:
-    """Return the log of one robot's messages for ``seconds``. Raises ToolError without a robot."""
+    """Return the log of one robot's messages for ``seconds``.
+
+    Raises ToolError if no robot is found.
+    """
     rclpy.init(
         args=["--ros-args", "--disable-external-lib-logs"],
         signal_handler_options=SignalHandlerOptions.NO,
@@ -106,7 +109,7 @@ def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str)
     latched = role in EVENTS and role != DIAGNOSTICS
     qos = QoSProfile(
         depth=DEPTH,
-        # A commander may publish as best effort; a best-effort subscription receives every kind.
+        # A commander may publish as best effort; a best-effort subscription receives from all.
         reliability=ReliabilityPolicy.BEST_EFFORT
         if role in COMMANDS
         else ReliabilityPolicy.RELIABLE,

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 COMMAND_TIMEOUT_S: Final = 0.5
-"""The driver's default of ``cmd_vel_timeout``; an older command has no effect."""
+"""The driver's default of ``cmd_vel_timeout``, in s; an older command has no effect."""
 SETTLING_S: Final = 0.2
 """Time around a change of state, in s, in which a stream may begin or end."""
 
@@ -116,7 +116,7 @@ class Log:
         return inside
 
     def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
-        """Whether a change of state explains a gap between these times."""
+        """Whether a change of state explains a gap from ``begin_s`` to ``end_s``."""
         begin_s, end_s = begin_s - SETTLING_S, end_s + SETTLING_S
         touched = [span for span in self.states if span.begin_s < end_s and span.end_s > begin_s]
         return len(touched) > 1 or any(span.what not in running for span in touched)

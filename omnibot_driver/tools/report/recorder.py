@@ -50,7 +50,7 @@ def _wheels(message: Any) -> Row:
 class Role:
     """The role of a topic: number of values in a row, and a function to read each message type.
 
-    A width of None is the number of the robot's wheels, which ``joint_states`` names.
+    A ``width`` of None means the number of the robot's wheels, which ``joint_states`` names.
     """
 
     width: int | None

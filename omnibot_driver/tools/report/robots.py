@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find robots among topics, by name and type alone."""
+"""Find robots by the names and types of topics alone."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Final

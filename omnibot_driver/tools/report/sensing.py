@@ -83,7 +83,7 @@ class Spectrum:
 
 
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
-    """Return Welch's mean spectrum over stretches without a gap; None if none is long enough."""
+    """Return Welch's mean spectrum over stretches without a gap; None if all are too short."""
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
     changes = np.flatnonzero(np.diff(rows.astype(np.int8))) + 1
