@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 WHEELS_ALIKE: Final = 0.01
 """Relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
 UNKNOWN: Final = 0.2
-"""Largest relative error of an assumed radius; a larger one means that the readings are wrong."""
+"""Largest relative error of an assumed radius; beyond it the readings are regarded as wrong."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,8 +89,9 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod |
     ``slow``: the motion with the command for ``slow_mps``; ``fast``: the motion with twice that
     command. In velocity control the speed is constant, and doubles with the command. In positional
     control the command is a position a few millimetres from the origin of the board's frame: the
-    robot drives there and stops, or is still driving there at the same speed. Returns None if the
-    motion fits neither, for example because a busy computer delayed the commands.
+    robot drives there and stops, or is still driving there, with both commands at the same speed.
+    Returns None if the motion fits neither control method, for example because a busy computer
+    delayed the commands.
     """
     both = slow, fast
     if any(one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both):

@@ -30,7 +30,7 @@ LOOK_S: Final = 1.0
 SLOW_LOOK_S: Final = 3.0
 """Value of ``LOOK_S`` for boards that measure rarely, so that odometry is partly a prediction."""
 OBEYED_PART: Final = 0.2
-"""The robot is regarded as not moving below this fraction of its command."""
+"""The robot is regarded as not moving if it moves less than this fraction of its command."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 """For each topic, the linear and the angular speed below which a command is not checked.

@@ -96,7 +96,7 @@ class _Bench:
         self.ticks = int(robot.parameters["ticks_per_revolution"])
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """Set these parameters, and wait until the board has received them."""
+        """Set parameters of the driver, and wait until the board has received the values."""
         self.robot.set_parameters(values)
         self.robot.rest(WRITTEN_WITHIN_S)
 
@@ -111,7 +111,7 @@ class _Bench:
         return found
 
     def steps(self, rpm: Sequence[float]) -> Records:
-        """Record steps of the set-point from rest to these speeds of the wheels, in RPM."""
+        """Record steps of the set-point from rest to the wheel speeds ``rpm``."""
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)
 

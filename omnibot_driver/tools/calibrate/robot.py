@@ -135,7 +135,7 @@ class Robot(Listener):
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
-        """Let the driver record the response to this command, then stop the robot.
+        """Let the driver record the response to ``command``, then stop the robot.
 
         Return the path of the record. The record is requested while the robot is at rest, so that
         it begins before the motion. Raises ToolError on any fault, as `drive` does, and with the

@@ -71,7 +71,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
-    """Return the result from these speeds, to show and to save.
+    """Return the result, to show and to save, from the measured speeds.
 
     ``now``: the driver's parameters before the calibration.
     """

@@ -44,8 +44,9 @@ LAGS: Final = 60
 MISSED: Final = 0.42
 """A mark was missed if the relative errors of a time and the next time add up to more than this.
 
-If a mark was only noticed late, the next time is too short by the same amount. (The board's clock
-loses up to 6 ms at a missed mark, so the time is not twice as long.)
+If a mark was only noticed late, one time is too long, and the next is too short by the
+same amount. (The board's clock loses up to 6 ms at a missed mark, so the time is not twice as long
+as usual.)
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start that cannot contain a missed mark, because the wheel is slow."""

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Format a view of the robot as text and as JSON. Must not know ROS, nor where it is shown."""
+"""Format a view of the robot as text and as JSON. Must not know ROS, or where a text is shown."""
 
 import json
 import math

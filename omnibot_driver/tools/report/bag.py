@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Read a rosbag2 without ROS: a folder or a file of it, sqlite3 or mcap, also compressed."""
+"""Read a rosbag2 without ROS: a bag's folder or one file, sqlite3 or mcap, also compressed."""
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack

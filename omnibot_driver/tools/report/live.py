@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Record a running robot in the same form as a bag. Knows ROS, not how logs are judged."""
+"""Record the messages of a running robot as a log. Knows ROS, not how logs are judged."""
 
 import time
 from collections.abc import Callable
