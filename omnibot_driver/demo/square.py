@@ -17,7 +17,7 @@ QUARTER_RAD: Final = math.pi / 2
 CORNER_M: Final = 0.01
 """Distance from a corner, in m, at which the corner is reached."""
 GAIN_PER_S: Final = 3.0
-"""Speed per distance, and yaw rate per angle error, in 1/s."""
+"""Gain from distance to speed, and from angle error to yaw rate, in 1/s."""
 ON_COURSE_RAD: Final = 0.3
 """Course error, in rad, above which a robot turns on the spot before it drives on."""
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)

@@ -33,7 +33,7 @@ PURE_TURN: Final = 0.5
 The ratio is 0 if the odometry deltas are interpreted correctly, else 2 or more.
 """
 ALIKE: Final = 0.35
-"""Two angles are equal if they differ by less than this fraction of the angle of the turn."""
+"""Angles are regarded as equal if they differ by less than this fraction of the robot's turn."""
 
 
 LEAST_M: Final = 1e-3

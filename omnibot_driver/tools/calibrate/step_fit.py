@@ -3,9 +3,9 @@
 """Fit models with uncertainties to recorded steps of one wheel. Pure calculation.
 
 Time 0 of a step is its *onset*: the board's first control tick that could use the command. The
-ticks are known from the timestamps. If a command arrives close to a tick, or a busy computer delays
-the command, it may take effect at a tick other than the calculated one. The recorded step then
-shows at which tick.
+times of the ticks are known from the timestamps. If a command arrives close to a tick, or a busy
+computer delays the command, it may take effect at a tick other than the calculated one. The
+recorded step then shows at which tick.
 """
 
 import math

@@ -44,7 +44,7 @@ MOTIONS: Final = {
 class DeadMan:
     """Turns pressed keys into commands; ``command`` must be called regularly.
 
-    Keys may come from another thread, because a key press changes a single reference only.
+    Keys may come from another thread. This is safe, because a key press replaces one reference.
     """
 
     def __init__(self) -> None:

@@ -16,7 +16,7 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""After this time without /diagnostics, in s, the driver is taken to be absent."""
+"""Time without /diagnostics, in s, after which the driver is regarded as ended."""
 
 
 def judge(log: Log) -> Iterator[Finding]:
