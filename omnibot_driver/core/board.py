@@ -71,7 +71,7 @@ class ReadingClock(Protocol):
         """Rate error of the board's clock in ppm; positive if it is faster than the host's."""
 
     def restart(self) -> None:
-        """Forget all readings so far; the times of later readings are unrelated to them."""
+        """Forget all earlier readings: they do not help to find the times of later readings."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
@@ -83,7 +83,7 @@ class ReadingClock(Protocol):
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of a reading that arrived alone; this takes less time than ``stamps``.
+        """Return the stamp of a reading that arrived alone, in less time than ``stamps`` takes.
 
         Return None, and change nothing, if the stamp is uncertain; the caller then calls ``stamps``
         instead.
@@ -138,7 +138,7 @@ class Board(Protocol):
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Return advice on the settings if ``gravity_mps2`` is not gravity; empty if it is.
+        """Return advice on the settings if ``gravity_mps2`` differs from gravity; else empty text.
 
         ``gravity_mps2``: specific force measured at rest, in m/s².
         """
@@ -164,8 +164,8 @@ class Board(Protocol):
     def stalled(self) -> None:
         """Record that this process stalled, so the guard may have sent the stop commands.
 
-        The guard is the process that sends ``last_words`` when this process hangs. Motors other
-        than the wheels, such as a brush, may then be off as well.
+        The guard is the process that sends ``last_words`` when this process hangs. These
+        commands may also switch off other motors than those of the wheels, such as a brush.
         """
         return
 

@@ -45,10 +45,10 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes, and return the estimates to publish at once; call ``process`` afterwards.
 
-        A command that arrives between the two calls is handled as if it came before the bytes. That
-        would be wrong if the bytes change the mode. In this case this method calls ``process``
-        itself and returns an empty list, and the caller's ``process`` returns True. Requests other
-        than commands call ``process`` first.
+        A command between the calls of ``hear`` and ``process`` is handled as if it came before the
+        bytes. That would be wrong if the bytes change the mode: then ``hear`` calls ``process``
+        itself and returns an empty list, and the caller's call of ``process`` returns True.
+        Requests other than commands call ``process`` before they begin.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -94,7 +94,7 @@ class Inbound:
     def elapse(self, now: float) -> None:
         """Process readings that follow from time alone, such as predicted odometry.
 
-        OdometryReadings and NoticeReadings among them do not show that the board is alive.
+        OdometryReadings and NoticeReadings do not show that the board is alive.
         """
         before = self._board.mode
         readings = self._board.elapse(now)
@@ -108,7 +108,7 @@ class Inbound:
             self._safety.set_out(now)
 
     def end(self, now: float) -> None:
-        """Process the remaining readings, as the port is lost."""
+        """Process the remaining readings, because the port was lost."""
         if readings := self._board.flush(now):
             self._last = readings[-1]
         self._reporter.events += self._measurement.hear(readings, now)

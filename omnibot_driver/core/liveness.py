@@ -2,8 +2,8 @@
 
 """Liveness of the board: when it last sent data, and whether its silence is too long.
 
-This module knows two times and two limits. It does not know what the data means, or what follows
-from a silence. Time is an argument.
+This module knows two times and two limits. It does not know what the data means, or how the
+driver reacts to a silence. Time is an argument.
 """
 
 import math
@@ -15,7 +15,8 @@ class Liveness:
     """The arrival times of a board's last data, and the limits above which silence is a fault.
 
     ``heard_at``: arrival of the last reading, in s; ``came_at``: arrival of the last bytes, valid
-    or not. ``unheard_s`` and ``silence_s`` are those of ``Traits``.
+    or not. ``unheard_s`` and ``silence_s`` have the same
+    meaning as in ``Traits``.
     """
 
     def __init__(self, traits: Traits) -> None:

@@ -50,7 +50,7 @@ class LongTask:
         return self.active and self._token is token
 
     def end(self, token: object, success: bool, message: str) -> None:
-        """End the task as done or failed; no effect if it has ended before."""
+        """End the task as done or failed; no effect if the task has already ended."""
         if self.is_current(token):
             self.answers.append(RequestDone(token, success, message))
             self._token, self._begun_at, self.wake_at = None, math.inf, math.inf

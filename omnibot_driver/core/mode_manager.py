@@ -64,7 +64,7 @@ a slow function call."""
 class ModeManager:
     """The requested and the confirmed mode of a board.
 
-    ``run``: whether to start the board whenever it is connected; otherwise it stays as it is.
+    ``run``: whether to start the board whenever it is connected; if not, it keeps its mode.
     ``answers``: answers to requests that the session has not taken yet.
     """
 
@@ -237,8 +237,9 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether a P may be in flight, or the received data may be wrong. P is then sent
-        only after data has flowed for ``PAUSE_RETRY_S``, because a second P would resume the board.
+        ``with_p``: whether a P may be in flight, or the received data may be wrong. If True, P is
+        sent only after data has flowed for ``PAUSE_RETRY_S``, because a second P would resume the
+        board.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

@@ -2,7 +2,7 @@
 
 """The reports of a session: events in order, notices when they are due, state and figures.
 
-The reporter reads every part of a session and changes none. It must not know who receives the
+The reporter reads every part of a session and changes none of them. It must not know who receives the
 reports.
 """
 
@@ -61,7 +61,7 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """The values from which ``shown`` was computed; comparing these is faster."""
+        """The values from which ``shown`` was computed; comparing them is faster."""
 
     @property
     def state(self) -> str:

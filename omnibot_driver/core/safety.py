@@ -91,7 +91,7 @@ class SafetyStops:
     def estop(self, active: bool, now: float, *, by: str) -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: who asked for it, as named in the notice. Raises RequestRefused for a release while
+        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a release while
         the e-stop button on the robot is held.
         """
         latched = self._policy.latched
@@ -122,7 +122,7 @@ class SafetyStops:
         return "e-stop released; robot stopped until the next command"
 
     def set_out(self, now: float) -> None:
-        """Stop the robot, as the board has begun to run and may carry out an old command."""
+        """Stop the robot, because the board has begun to run and may carry out an old command."""
         self._policy.proof.begin()
         self._policy.halt(now)
 

@@ -192,7 +192,7 @@ class Session:
         """Command a body velocity. If it raises CommandRefused, nothing changes.
 
         ``age_s``: age of the command by its sender's stamp, in s; negative for a stamp in the
-        future. ``planar``: whether the sender asked for no motion out of the plane.
+        future. ``planar``: False if the sender also asked for motion out of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
         sideways = self._commanding.shaper.sideways
@@ -210,7 +210,7 @@ class Session:
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset the board; a RequestDone answers later.
 
-        Raises RequestRefused at once if that is not possible now.
+        Raises RequestRefused at once if the request is not possible now.
         """
         if reason := self.interlocks.why_not_request():
             raise RequestRefused(reason)
@@ -224,7 +224,7 @@ class Session:
     def calibrate_gyro(self, token: object, now: float) -> None:
         """Measure the gyro's bias; a RequestDone answers later.
 
-        Raises RequestRefused at once if that is not possible now.
+        Raises RequestRefused at once if a measurement is not possible now.
         """
         if reason := self.interlocks.why_not_calibrate():
             raise RequestRefused(reason)
@@ -251,7 +251,7 @@ class Session:
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: who asked for it, as named in the notice. Raises RequestRefused for a release while
+        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a release while
         the e-stop button on the robot is held.
         """
         return self._safety.estop(active, now, by=by)

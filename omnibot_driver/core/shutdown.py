@@ -40,7 +40,7 @@ class Shutdown:
 
     @property
     def owed(self) -> bool:
-        """Whether motion was commanded, and nothing has shown since then that the robot stands."""
+        """Whether motion was commanded, and no standstill has been shown since then."""
         return self._policy.proof.owed
 
     @property
@@ -51,8 +51,8 @@ class Shutdown:
     def fall_silent(self, now: float) -> bool:
         """Stop repeating Stop, and demand a new proof that the robot stands still.
 
-        The last Stop may have been damaged on the line, and be obeyed as another command.
-        Return whether the board can give such a proof.
+        The line may have damaged the last Stop, and the board may obey it as another command.
+        Return whether displacements of this board can prove a standstill.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
             return False

@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion commands: from a received command to the packets that carry it out, and their times."""
+"""Motion commands: which packets a received command becomes, and when they are sent."""

@@ -2,10 +2,10 @@
 
 """The interface between the command policy and a board's encoding of motion.
 
-The policy decides what the robot should do and for how long. An actuator makes the packets for it:
-set-points that are repeated (`set_point_stream.py`), or an exchange specific to the board. The
-actuator reports each stop and motion that it sends to the stop proof. It reads no clock and never
-refuses an order of the policy.
+The policy decides what the robot should do and for how long. An actuator makes the packets that
+carry out the decision: set-points that are repeated (`set_point_stream.py`), or an exchange
+specific to the board. The actuator reports each stop and motion that it sends to the stop proof. An
+actuator reads no clock and never refuses an order of the policy.
 """
 
 from typing import Protocol
@@ -51,7 +51,7 @@ class Actuator(Protocol):
         """Send ``wanted`` from now on, in place of the previous order."""
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that packets of a request, such as start, were sent; they order no motion."""
+        """Record that packets of a request, such as a start, were sent; they command no motion."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now, possibly none, and regard them as written."""

@@ -31,7 +31,7 @@ class SpeedLimits:
     angular_radps2: float = 0.0
 
     def stricter_than(self, other: "SpeedLimits") -> bool:
-        """Return whether any of these speed limits is lower than that of ``other``."""
+        """Return whether any speed limit here is lower than the same limit in ``other``."""
         return (
             self.linear_mps < other.linear_mps
             or self.angular_radps < other.angular_radps
@@ -39,7 +39,7 @@ class SpeedLimits:
         )
 
     def allow(self, twist: BodyTwist) -> bool:
-        """Return whether the twist is below the speed limits; NaN and infinity never are."""
+        """Return whether the twist is below the speed limits; False with NaN or infinity."""
         return (
             twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
             < self.linear_mps * self.linear_mps
@@ -53,9 +53,9 @@ class SpeedLimits:
         return BodyTwist(vx, vy, yaw_rate)
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
-        """Return the velocity that limited acceleration from ``now`` reaches in ``duration_s``.
+        """Return the twist that is reached in ``duration_s`` with limited acceleration.
 
-        ``now`` is the present twist. The velocity changes along a straight line to ``wanted``.
+        ``now`` is the present twist. The twist changes along a straight line to ``wanted``.
         """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),
@@ -101,7 +101,7 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
 
 
 def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
-    """Return the vector with a Euclidean length of at most ``limit``, without overflow."""
+    """Shorten the vector to a length of at most ``limit``, and return it; never overflows."""
     largest = max(map(abs, vector))
     if largest == 0.0:
         return tuple(vector)

@@ -2,8 +2,8 @@
 
 """The motion interlock: refuses motion after the motion monitor has stopped the robot.
 
-This module knows when commands arrive and when the monitor stopped the robot; it does not know why,
-nor what is commanded. Time is an argument.
+This module knows when commands arrive and when the monitor stopped the robot. It does not know the
+reason for a stop, nor what is commanded. Time is an argument.
 """
 
 import math
@@ -15,7 +15,7 @@ AGAIN_S: Final = 60.0
 
 
 class Until(Enum):
-    """The condition that ends the refusal."""
+    """The condition that ends the refusal of motion commands."""
 
     NOTHING = "Motion is allowed"
     RELEASE = "Motion is refused until a zero command, or no command for `cmd_vel_timeout`"
@@ -40,14 +40,14 @@ class MotionInterlock:
         self._tripped_at = self._commanded_at = -math.inf
 
     def trip(self, now: float) -> None:
-        """Refuse motion, as the robot did not move as commanded and was stopped."""
+        """Refuse motion, because the robot was stopped for not moving as commanded."""
         again = now - self._tripped_at <= AGAIN_S or self.until is self._for_good
         self.until = self._for_good if again else Until.RELEASE
         self.trips += 1
         self._tripped_at = now
 
     def start(self) -> None:
-        """End the refusal, as the user has called ~/start."""
+        """End the refusal, because the user has called ~/start."""
         self.until, self._tripped_at = Until.NOTHING, -math.inf
 
     def release(self) -> None:
@@ -56,7 +56,7 @@ class MotionInterlock:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Restart the pause that ends a refusal, because a sender may be active.
+        """Restart the measurement of the pause that ends a refusal: a sender may be active.
 
         A refused command shows that its sender is active, whatever the reason for the refusal.
         While this process stalls, the driver cannot see whether a sender pauses.
@@ -66,8 +66,8 @@ class MotionInterlock:
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Record a command, and return the reason why it is refused; empty if it is allowed.
 
-        ``stands``: whether it is a command to stand still, which is always allowed. The pause of
-        ``timeout_s`` that ends a refusal begins after the last motion command or ``be_active``.
+        ``stands``: whether the command is to stand still, which is always allowed. A pause of
+        ``timeout_s`` since the last motion command or call of ``be_active`` ends the refusal.
         """
         silent = now - self._commanded_at >= timeout_s
         if not stands:

@@ -159,8 +159,7 @@ class CommandPipeline:
         return self.shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that packets of a request, such as start, were sent: they are not a motion
-        command."""
+        """Record that packets of a request, such as a start, were sent; they command no motion."""
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
@@ -177,7 +176,7 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Record that ``count`` displacements so far were impossible; return the user's notices."""
+        """Record that ``count`` displacements so far were impossible; return notices to the user."""
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
             return []
@@ -186,7 +185,7 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Return the fault shown by the newest estimate or, without estimates, the displacement."""
+        """Return the fault that the newest estimate shows or, without estimates, the displacement."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()
@@ -233,7 +232,7 @@ class CommandPipeline:
         return f" (commanded {commanded}; measured {measured})"
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
-        """Drop a goal if its frame has changed or the robot drives away from it; return notices."""
+        """Drop a goal if ``odom`` was reset or the robot drives away from it; return notices."""
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):
             return []

@@ -19,9 +19,9 @@ from omnibot_driver.core.packets import Packets
 STOPPING_S: Final = 1.0
 """Shortest time for which Stop is repeated, in s."""
 UNPROVED_S: Final = 5.0
-"""Longest time, in s, for which Stop is repeated while nothing shows that the robot stands."""
+"""Longest time, in s, for which Stop is repeated without proof that the robot stands still."""
 ROUNDING_S: Final = 1e-6
-"""Margin added to a wake-up time, in s, so that rounding cannot make it too early."""
+"""Margin added to a wake-up time, in s, so that rounding cannot make the wake-up too early."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

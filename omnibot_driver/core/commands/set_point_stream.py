@@ -20,8 +20,8 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 PACE_S: Final = 0.01
 """Shortest time between frames, in s; more frequent ones would only fill the board's buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Shortest time between two set-points, in s. More set-points would increase the fraction of time
-that a lost byte can affect (docs/internals/integrity.md); commands at 50 Hz are not slowed."""
+"""Shortest time between two set-points, in s. With a shorter pause, a lost byte could
+spoil a larger share of the time (docs/internals/integrity.md). Commands at 50 Hz are not slowed."""
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
 
@@ -46,7 +46,7 @@ class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
     ``proof`` is notified of each stop and motion that is sent. ``heard``, if given, is called with
-    all packets that are written, including those of requests, and the time.
+    the time and all packets that are written, including the packets of requests.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class SetpointStream:
         self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the order in effect; if the authority changes, Stop is sent first."""
+        """Replace the order in effect; if another topic commands now, Stop is sent first."""
         rested = now - self._stop_at >= PACE_S
         if wanted is None or isinstance(wanted, Stop | EmergencyStop):
             begins = wanted is not self._standing

@@ -18,7 +18,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 LONGEST_STEP_S: Final = 0.05
-"""Longest time, in s, for which one ramp step accelerates, even if its frame is sent later."""
+"""Longest time, in s, by which one step advances a ramp, even if more time has passed."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
@@ -28,7 +28,7 @@ far, so beyond these limits the robot is driving away from the goal."""
 
 
 class Authority(Enum):
-    """The topic that commands the robot, by name; the newest command is in effect."""
+    """The topics that can command the robot, by name; the newest command is in effect."""
 
     BASE = "cmd_vel"
     WHEELS = "wheel_cmd"
@@ -54,15 +54,15 @@ class Setpoint(Protocol):
         """Return the order for this time."""
 
     def check_anew(self) -> None:
-        """Check the order against new settings. Raises CommandRefused if they cannot encode it."""
+        """Check the order with new settings. Raises CommandRefused if it cannot be encoded."""
 
 
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    ``is_zero``: the actuator's method, which may raise CommandRefused. ``before``: the previous
-    set-point; a ramp starts at its velocity if it is a BaseSetpoint too, otherwise at rest.
-    ``since``: earliest time from which the first ramp step is counted, in s.
+    ``is_zero``: ``Actuator.is_zero``, which may raise CommandRefused. ``before``: the previous
+    set-point. If ``before`` is a BaseSetpoint, a ramp starts at its velocity, otherwise at rest.
+    ``since``: earliest time, in s, at which a ramp can begin.
     """
 
     authority: Final = Authority.BASE
@@ -100,7 +100,7 @@ class BaseSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Update ``is_zero`` for new settings; end the ramp if it leads to a standstill now."""
+        """Update ``is_zero`` for new settings; end the ramp if its final velocity is now zero."""
         self.is_zero = self._is_zero(Drive(self._wanted))
         if self.is_zero:
             self._setpoint, self.settled = self._wanted, True
@@ -110,7 +110,7 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    ``is_zero``: the actuator's method, which may raise CommandRefused.
+    ``is_zero``: ``Actuator.is_zero``, which may raise CommandRefused.
     """
 
     settled: Final = True
@@ -134,11 +134,11 @@ class SteadySetpoint:
 class GoalSetpoint:
     """A pose to drive to.
 
-    * ``goal``: in the odometry frame.
+    * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
     * ``alignment``: ``Odometry.alignments`` at the time of the command; identifies the
       relation between the two frames.
-    * ``check``: the actuator's method, which raises CommandRefused if the order cannot be encoded.
+    * ``check``: an actuator's method that raises CommandRefused if the order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """
 

@@ -14,22 +14,21 @@ from omnibot_driver.core.readings import DisplacementReading
 
 STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
-"""Largest speeds of a robot at rest, in m/s and rad/s: above two encoder counts of a wheel in 40
-ms, below the slowest linear command (0.014 m/s)."""
+"""Largest speeds that count as standstill, in m/s and rad/s: more than two encoder counts of a
+wheel in 40 ms, and less than the slowest linear command (0.014 m/s)."""
 STILL_S: Final = 0.1
 """Default duration of standstill for a proof, in s: three displacements of 40 ms, rounded down."""
 SLACK_S: Final = 1e-6
-"""Tolerance for rounding, in s: three times 0.2 s are a little less than 0.6 s in floating
-point."""
+"""Tolerance for rounding, in s: in floating point, a sum of ten times 0.1 s is less than 1 s."""
 AT_LEAST: Final = 2
 """Smallest number of displacements in a proof, even if one lasts long enough: a single displacement
 may be damaged, or may date from before the wheels turned."""
 PROOFS: Final = 2.0
 """Factor by which the duration of standstill is multiplied to get the time to wait for a proof."""
 RAREST_S: Final = 1.0
-"""Longest period of displacements, in s; a longer displacement spans lost ones."""
+"""Longest assumed period of displacements, in s; a longer displacement includes lost ones."""
 UNDER_WAY_S: Final = 0.05
-"""Time after Stop in which displacements are ignored, in s: their motion may have ended before Stop
+"""Time after Stop in which displacements are ignored, in s: they may describe the time before Stop
 arrived."""
 
 

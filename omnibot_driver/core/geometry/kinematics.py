@@ -3,8 +3,8 @@
 """The interface that every arrangement of wheels offers to the driver.
 
 Axes are REP-103's: x forward, y left, yaw counter-clockwise. Rates are those of the driven wheels,
-in rad/s, in the order of ``joints``. The same equations turn small displacements into wheel angles
-and back. Time, noise and bytes do not appear here.
+in rad/s, in the order of ``joints``. The equations also convert small displacements into
+wheel angles and back. Time, noise and bytes do not appear here.
 """
 
 from collections.abc import Sequence

@@ -41,7 +41,7 @@ class Pose:
         return all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad)))
 
     def turned(self, angle_rad: float) -> "Pose":
-        """Return this displacement in axes turned by ``-angle_rad``; its yaw does not change."""
+        """Return this displacement rotated by ``angle_rad``; its yaw component does not change."""
         cos, sin = math.cos(angle_rad), math.sin(angle_rad)
         return Pose(cos * self.x_m - sin * self.y_m, sin * self.x_m + cos * self.y_m, self.yaw_rad)
 
@@ -66,7 +66,7 @@ class Pose:
         )
 
     def over(self, duration_s: float) -> BodyTwist:
-        """Return the constant twist that makes this tangent in ``duration_s``."""
+        """Return the constant twist that, times ``duration_s``, is this tangent."""
         return BodyTwist(self.x_m / duration_s, self.y_m / duration_s, self.yaw_rad / duration_s)
 
 

@@ -43,7 +43,7 @@ class BiasCorrector:
         self._correction = correction
 
     def estimate(self, reading: ImuReading, stamp_s: float) -> ImuEstimate:
-        """Return the reading minus the biases, and pass it to the calibration."""
+        """Return the reading minus the biases, and pass the reading to the calibration."""
         (x, y, z), (bias_x, bias_y, bias_z) = reading.specific_force, self._correction.accel_bias
         force = x - bias_x, y - bias_y, z - bias_z
         (u, v, w) = rate = reading.angular_velocity
@@ -57,7 +57,7 @@ class BiasCorrector:
 
     @property
     def advice(self) -> str:
-        """Advice on settings that the measured gravity contradicts; empty if there are none."""
+        """Advice on settings that the measured gravity contradicts; empty if there is none."""
         gravity_mps2 = self.calibration.gravity_mps2
         return "" if gravity_mps2 is None else self._board.gravity_advice(gravity_mps2)
 

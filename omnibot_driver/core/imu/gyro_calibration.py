@@ -24,15 +24,15 @@ BLOCK_S: Final = 1.0
 GAP_S: Final = 0.2
 """Longest pause between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
-"""Time in s within which a request is answered, of the five seconds that a service may take.
+"""Time in s within which a request is answered.
 
-The other second is for writing a file."""
+A service call may take five seconds; the remaining second is for writing a file."""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
-"""Largest standard deviations at rest, ten times the noise of one reading.
+"""Largest standard deviations of the gyro and the accelerometer at rest: ten times their noise.
 
-A robot that is touched shows more."""
+If the robot is touched, the deviations are larger."""
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
 """Largest displacement at rest, in m and rad: resting wheels may report one count back and
@@ -40,7 +40,7 @@ forth."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """Largest bias: the initial zero-rate output in the MPU-6050 product specification, section 6.1."""
 REFINEMENT: Final = 0.05
-"""Fraction of the bias error that one block of ``BLOCK_S`` corrects: half of the error in 14 s."""
+"""Fraction of the bias error that one block of ``BLOCK_S`` corrects; 14 s correct half of it."""
 
 
 class Look:
@@ -120,7 +120,7 @@ class GyroCalibration:
         return self.wake_at < math.inf
 
     def measure(self, token: object, now: float) -> None:
-        """Measure the bias in the next two seconds; the answer comes in ``answers``."""
+        """Measure the bias in the next two seconds; the answer appears in ``answers``."""
         self._look = Look()
         self._token, self.wake_at = token, now + ANSWER_WITHIN_S
 

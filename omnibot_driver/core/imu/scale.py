@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversion of an MPU6050's counts into SI units, in the sensor's axes, and a check by gravity.
+"""Conversion of an MPU6050's counts into SI units, in the sensor's axes, and a check with gravity.
 
 Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale factors).
 """
@@ -23,13 +23,13 @@ _RADPS_PER_COUNT: Final = {
 }
 
 ACCEL_TOLERANCE: Final = 0.1
-"""Relative deviation from gravity that a sound sensor may have: initial tolerance and bias."""
+"""Largest relative deviation from gravity of a working sensor, due to tolerance and bias."""
 
 Counts = tuple[int, int, int]
 
 
 def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
-    """Return advice on settings if the force at rest is not gravity; empty if it is."""
+    """Return advice on settings if ``gravity_mps2`` differs from gravity; empty if it does not."""
     if abs(gravity_mps2 / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
         return ""
     wrong = f"at rest the accelerometer measures {gravity_mps2:.2f} m/s² instead of gravity: "
@@ -42,7 +42,7 @@ def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuScale:
-    """The ranges that the sensor is set to; keys of the two tables above."""
+    """The full scales that are set: keys of ACCEL_COUNTS_PER_G and of GYRO_COUNTS_PER_DPS."""
 
     accel_range_g: int = 2
     gyro_range_dps: int = 250

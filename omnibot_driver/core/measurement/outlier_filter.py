@@ -41,23 +41,23 @@ OUT_OF_PROPORTION: Final = 3.0
 CALMING: Final = 0.95
 """Factor by which each reading reduces the largest recent step; 20 readings leave a third of it."""
 STILL: Final = 0.08
-"""Fraction of a leap by which the sensor's other values may change during the leap.
+"""Largest change of the sensor's other values in a spike, as a fraction of the spike's leap.
 
-After the leap, each value may differ by this fraction of the leap from its value before.
+After the spike, each value may still differ from its value before by the same fraction.
 """
 END_OF_SCALE: Final = 0.99996
-"""Fraction of full scale that is just below the largest positive word."""
+"""Value just below the largest positive word, as a fraction of full scale."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a leaping displacement, and the poses after it."""
 BACK: Final = 0.25
-"""Fraction of a leap of the motion that may remain when the leap is over."""
+"""Largest change of the speed that may remain after a spike, as a fraction of the spike's leap."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    ``force_step_mps2``: least change of specific force between two readings that is checked;
+    ``force_step_mps2``: change of specific force between two readings that is always allowed;
     ``full_scale_mps2``: full scale of the accelerometer, infinite where its readings are not
     integers.
     """
@@ -84,7 +84,8 @@ class OutlierFilter:
 
     ``limits`` may be replaced at any time; ``tick_s``: time between two ImuReadings in s.
     ``corrected``: whether displacements are steps of the board's own estimate, which leaps when the
-    board corrects it. An impossible step is then passed on with ``measured`` False.
+    board corrects it. If they are, an impossible step is not rejected, but passed on
+    with ``measured`` False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -101,7 +102,7 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Return the readings that are certain now, each kind in the order in which it came."""
+        """Return the readings that are certain now, those of one kind in their order of arrival."""
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):
@@ -123,7 +124,7 @@ class OutlierFilter:
         return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
-        """Return the readings that waited, as a later reading cannot contradict them any more."""
+        """Return the waiting readings, because no later reading will contradict them."""
         released = [*self._held_imu, *self._held_motion]
         self._held_imu, self._held_motion = [], []
         self._imu_leaps.forget()
@@ -194,9 +195,9 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; to the losses of a pose, add the displacements rejected before it.
+        """Return the reading; if it is a pose, add the displacements rejected before to ``lost``.
 
-        The pose includes the motion of these displacements.
+        The pose includes the motion of the rejected displacements.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -217,10 +218,11 @@ class OutlierFilter:
 
 
 class _Spikes:
-    """Finds spikes in a series of values, which are in units of a step that is always allowed.
+    """Finds spikes in a series of readings, each of which is a list of values.
 
-    ``left``: fraction of a leap that may remain when the leap is over; ``knocked``: a knock may
-    move the first ``knocked`` values for one reading, but no value after them.
+    The unit of a value is a change that is always allowed. ``left``: fraction of a leap that may
+    remain after a spike; ``knocked``: number of values, from the first on, that a knock may change
+    for a single reading.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -229,7 +231,7 @@ class _Spikes:
         self.forget()
 
     def forget(self) -> None:
-        """Forget earlier readings, as the next ones are unrelated."""
+        """Forget earlier readings, because later readings are unrelated to them."""
         self._sure: Sequence[float] | None = None
         self._leaping: Sequence[float] | None = None
         self._restless = 0.0
@@ -247,7 +249,7 @@ class _Spikes:
         if leaping is not None and self._sure is not None:
             leapt = max(_steps(self._sure, leaping))
             was_single = max(_steps(self._sure, values)) <= self._left * leapt
-            if was_single:  # another leap is a shock, unless it is larger
+            if was_single:  # an equal leap is now a shock; a larger one may be a spike
                 self._restless = max(self._restless, leapt / OUT_OF_PROPORTION)
             else:
                 self._restless = max(self._restless, leapt)

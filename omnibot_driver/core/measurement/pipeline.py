@@ -87,7 +87,7 @@ class MeasurementPipeline:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """Return the IMU estimates that become certain with the readings, which arrived at ``now``.
+        """Return the IMU estimates that these readings make certain; ``now``: their arrival time.
 
         Other readings wait for ``flush``, and IMU readings after them wait too, to keep the order.
         Most reads of a board with an IMU bring one IMU reading and nothing else. Such a reading is
@@ -131,7 +131,7 @@ class MeasurementPipeline:
         return measured
 
     def release(self) -> list[Measured]:
-        """Return the measurements that waited for readings that will not come."""
+        """Return the measurements that still wait for later readings, because none will come."""
         measured, released = self.flush(), self._outliers.release()
         return measured + [(sure, self._estimates(sure, at_s)) for sure, at_s in released]
 

@@ -35,13 +35,13 @@ class StreamStatistics:
     lost_imu: int = 0
     lost_displacements: int = 0
     gaps: int = 0
-    """Number of stretches of lost displacements."""
+    """Number of times that one or more displacements in a row were lost."""
     last_gap: int = 0
-    """Number of displacements lost in the last stretch of lost displacements."""
+    """Number of displacements in a row that were lost the last time."""
     reads: int = 0
     """Number of reads whose last reading was an IMU sample or a displacement."""
     delay_s: float = 0.0
-    """Sum over ``reads`` of the age of the newest sample in s; the least possible age is 0."""
+    """Sum of the ages of the newest samples, in s, over all ``reads``; an age is at least 0."""
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0
@@ -49,7 +49,7 @@ class StreamStatistics:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
-    """``imu`` plus ``lost_imu`` at the last displacement; None if there is none to count from."""
+    """``imu`` plus ``lost_imu`` at the last displacement; None without such a displacement."""
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
@@ -80,7 +80,7 @@ class StreamStatistics:
                 self._sent_imu = None
 
     def _miss_imus(self, reading: DisplacementReading) -> None:
-        """Count IMU readings lost together with displacements; frames do not show these losses."""
+        """Count the lost IMU readings that displacements show, beyond those already counted."""
         if self.imu_period_s is None:
             return
         if reading.duration_s is None or reading.restarted:

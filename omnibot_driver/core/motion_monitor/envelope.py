@@ -45,7 +45,7 @@ YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Normals of 16 half-planes around a hull; they underestimate a distance by 2 % at most."""
+"""Normals of 16 half-planes around a hull; the distance from them is at most 2 % too small."""
 
 
 def outside(
@@ -53,8 +53,8 @@ def outside(
 ) -> tuple[float, float]:
     """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
 
-    ``explained``: velocities that the set-points explain, that of the current set-point first. If
-    the heading is unknown, only the magnitude of the linear velocity is checked.
+    ``explained``: velocities that the set-points explain; the current set-point's velocity is first.
+    If the heading is unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0

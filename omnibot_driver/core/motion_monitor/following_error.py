@@ -15,13 +15,14 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s. A robot that is slower than all set-points of this time is regarded as held."""
+"""Time in s: a robot that is slower than all set-points of the last 0.16 s is regarded as held."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of these limits that one displacement, or one long displacement, adds.
+"""Largest fraction of ``UNEXPLAINED_M`` or ``UNEXPLAINED_RAD`` that one displacement can add.
 
-So a limit is exceeded after three displacements in a row, or two long ones, at the earliest.
+The second value is for a long displacement. So a limit is exceeded after three displacements in a
+row, or after two long ones, at the earliest.
 """
 
 

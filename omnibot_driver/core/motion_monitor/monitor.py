@@ -32,7 +32,7 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time in s at rest after which a robot has obeyed a stop; later motion has another cause."""
+"""Time in s at rest that shows that a robot has obeyed a stop; later motion has another cause."""
 STOPS_S: Final = 5.0
 """Time in s for which one Stop is repeated automatically while the robot moves."""
 
@@ -78,7 +78,7 @@ ADVICE: Final[Mapping[Fault, str]] = {
     Fault.BLOCKED: "check motor power, and whether the wheels are blocked",
     Fault.HELD_BY_ESTOP: "check whether the board itself still holds an e-stop",
 }
-"""Advice for any board; ``Traits.advice`` of a board names its own parameters."""
+"""Advice on each fault for any board; a board may replace it by its own ``Traits.advice``."""
 
 
 class MotionMonitor:
@@ -190,8 +190,8 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if a robot moves without a command and Stop is due, else None.
 
-        If the robot was at rest after its last command, a person may be pushing the robot. Then
-        the pauses between the Stops become longer.
+        If the robot was at rest after its last command, a person may be pushing the robot. In this
+        case Stop is due at longer intervals.
         """
         if not self._error.outside:
             self._stood_s += seconds

@@ -35,7 +35,7 @@ FADED_S: Final = 1.1
 UNKNOWN_S: Final = 0.8
 """Time in s after the first known set-point until motion by unknown commands has ended."""
 HISTORY_S: Final = 3.0
-"""Length of the history in s; a computer that reads displacements later than this has stalled."""
+"""Length of the history in s; displacements arrive later than this only if the computer stalls."""
 
 
 class SetpointHistory:

@@ -48,16 +48,15 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m lost in a first long displacement, if the next has not confirmed it; else
-        0.
+        """Distance in m that was lost in a single long displacement, and is not yet added.
 
-        None: the robot was not held in the last displacement.
+        0: the distance has been added. None: the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract motion outside the envelope; return whether the wind-up was larger than it.
+        """Subtract motion outside the envelope; return whether the wind-up explains the motion.
 
-        A larger wind-up explains that motion. ``way_mps``, ``turn_radps``: speeds outside the
+        A wind-up explains any smaller motion. ``way_mps``, ``turn_radps``: speeds outside the
         envelope, for ``seconds``.
         """
         self._unproved_m = None

@@ -27,7 +27,7 @@ INITIAL_VARIANCE: Final = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
-    """How fast the uncertainty grows. Each wheel has errors of its own, which move the body.
+    """How fast the uncertainty grows. Each wheel has its own errors, which add to the body's error.
 
     * ``wheel_drift``: standard deviation, in m, of a random walk after 1 m of motion at the rim.
     * ``wheel_scale``: standard deviation of the relative size error of one wheel.
@@ -98,7 +98,7 @@ class Covariance:
     def carried(self, dx_m: float, dy_m: float) -> "Covariance":
         """Return the covariance after a displacement given in the odometry frame.
 
-        The error of the yaw moves the position.
+        The error of the yaw adds to the error of the position.
         """
         return Covariance(
             xx=self.xx - 2 * dy_m * self.x_yaw + dy_m * dy_m * self.yaw_yaw,
@@ -161,8 +161,8 @@ class Uncertainty:
         """Add a gap in the reports; ``fastest_mps`` and ``fastest_radps`` limit the motion in it.
 
         The speeds before and after the gap are known. A robot that accelerates and brakes again in
-        between deviates by at most a·t²/4 from constant speed, and never by more than its speed
-        allows.
+        between deviates by at most a·t²/4 from motion at constant speed, and never by more than its
+        largest speed allows.
         """
         square = duration_s * duration_s / 4
         self.gap += Covariance.diagonal(

@@ -4,7 +4,7 @@
 
 The main idea: ``_board`` is the robot's pose in the board's frame. Displacements update it at once,
 and the board's poses correct it. The target of the ``CorrectionSmoother`` is the robot's pose in
-the odometry frame. Both always move by the same tangent in the body's axes, so motion that was lost
+the odometry frame. ``_board`` and this target always move by the same tangent in the body's axes, so motion that was lost
 on the line is recovered with the next pose. This module knows SE(2). It does not know bytes, clocks
 or ROS.
 """
@@ -29,7 +29,7 @@ LONG_GAP_S: Final = 1.0
 """Lost board time, in s, above which the next displacements wait for a pose that shows the lost
 motion."""
 POSE_DUE_S: Final = 0.24
-"""Board time, in s, within which the next pose arrives unless it is lost as well."""
+"""Board time, in s, within which the next pose arrives unless that pose is lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation in rad, from open gaps, of a heading that counts as known."""
 UNKNOWN_S: Final = 0.5
@@ -44,8 +44,8 @@ class OdometrySettings:
     * ``use_board_pose``: whether the board's poses correct the odometry. If not, the poses only
       give the initial heading, which displacements in the earth frame need.
     * ``fastest_mps``, ``fastest_radps``: speeds that the robot can never exceed, even if pushed.
-    * ``linear_scale``, ``angular_scale``: true distance and turn, divided by those that the board
-      computes from the nominal sizes of its wheels.
+    * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the distance and turn
+      that the board computes from the nominal sizes of its wheels.
     """
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)
@@ -65,7 +65,7 @@ class OdometryEstimate:
       time) in the board's axes.
     * ``rolling``: rate of ``rolled``; None if unknown.
     * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s²; None to use
-      those of the parameters.
+      the variances from the parameters.
     """
 
     stamp_s: float
@@ -172,7 +172,7 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Return ``place``, a pose in the odometry frame, as a pose in the board's frame.
 
-        The turn from the robot's heading to ``place`` is the shorter one. None if no pose of the
+        Of the two ways to turn to the heading of ``place``, the shorter one is used. None if no pose of the
         board shows yet where the odometry frame lies in the board's frame.
         """
         if self._board is None or self._restarted is not None or not self._settles:

@@ -31,7 +31,7 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """Return the tangents of the lost displacements and of this one, in the board's body axes.
+        """Return the tangents of the lost displacements and of ``reading``, in the body's axes.
 
         A tangent is twist x time. ``heading_rad``: heading of the board before the lost
         displacements. If it is None, the board has never reported a pose, and displacements are

@@ -2,8 +2,8 @@
 
 """Displacements that wait for a pose of the board, and their sum in the board's frame.
 
-This module knows how a displacement moves a pose; it does not know why one waits, nor how the
-result is used.
+This module knows how a displacement moves a pose; it does not know why a displacement waits,
+nor how the result is used.
 """
 
 import math

@@ -23,7 +23,7 @@ The deviation that open gaps explain is allowed in addition.
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5
-"""Limits of a plausible pose: beyond 100 km or 16,000 turns it is made of misread bytes."""
+"""Limits of a plausible pose: a pose beyond 100 km or 16,000 turns comes from misread bytes."""
 
 
 class PoseGate:

@@ -36,7 +36,7 @@ class PoseTracker:
     ) -> None:
         """Use new settings from the next motion on.
 
-        ``scale``: true distance and turn, divided by those that the board reports; ``fastest``:
+        ``scale``: true distance and turn, divided by the reported ones; ``fastest``:
         speeds that the robot cannot exceed, in m/s and rad/s.
         """
         x, y, yaw = self._axis_signs
@@ -51,7 +51,7 @@ class PoseTracker:
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
-        """Return the twist of a motion that took ``seconds``, in REP-103's and the board's axes."""
+        """Return the twist of a motion of ``seconds``, first in REP-103's axes, then in the board's."""
         rolling = _times(tangent, self._size).over(seconds)
         if self._signed_size == self._size:
             return rolling, rolling

@@ -124,10 +124,10 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended in the stream of IMU samples; None while that is uncertain.
+        """Where the last read ended in the stream of IMU samples; None while this is uncertain.
 
-        The bytes held after the last decoded frame show this: whether they begin or complete an IMU
-        frame, and how many bytes follow.
+        The position follows from the bytes held after the last decoded frame: whether they begin or
+        complete an IMU frame, and how many bytes come after that IMU frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -203,7 +203,7 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
-        """Do nothing after a stall: the board has only wheels, which the driver stops itself."""
+        """Do nothing after a stall: the board drives only wheels, which the driver stops anyway."""
 
     def due(self, now: float) -> Packets:
         """Return no packets, because the board sends without polling."""
@@ -228,7 +228,7 @@ class OmniBot:
         return packed(STOP)
 
     def start_requested(self) -> None:
-        """Do nothing more: ``start`` is the same, whether the user or the driver requests it."""
+        """Do nothing: ``start`` is the same, whether the user or the driver requests the start."""
 
     def start(self) -> Packets:
         """Return the letter S, which starts the board."""

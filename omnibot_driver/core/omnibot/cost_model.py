@@ -40,7 +40,7 @@ BAD_RUN: Final = 6.0
 BAD_TAIL: Final = 2.5
 """Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
 UNKNOWN_START: Final = 1.0
-"""Cost if the first bytes are the rest of a frame: after a silence, a whole one is likelier."""
+"""Cost if the first bytes are the rest of a frame: after a silence, a whole frame is likelier."""
 BAD_BYTE: Final = 0.35
 """Cost of each byte of a bad run; ``BAD_RUN`` and 14 bytes cost more than any true IMU frame."""
 BAD_HEADER: Final = 0.5
@@ -52,19 +52,19 @@ BAD_TEXT: Final = 4.0
 KNOWN_GAP: Final = 11.0
 """Cost of a pause within a frame, on a line that so far paused only between frames.
 
-Too high to accept the frame; low enough to allow for a pause that misleads.
+The cost is too high to accept the frame at once, but low enough to accept it on more evidence.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
 ENDS_IN_NOISE: Final = 2.0
-"""Cost of a line that falls silent within a bad run; normally a line does so after a frame."""
+"""Cost of a line that falls silent within a bad run; a line normally falls silent after a frame."""
 
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 """Cost of an IMU frame, by the number of words that differ much from the frame before.
 
-One such word makes a frame odd; a shock moves several.
+One such word makes a frame odd; a shock changes several words.
 """
 AFTERSHOCK: Final = 1.5
 """Cost of an odd IMU frame after another odd one, because a shock lasts several frames."""
@@ -111,7 +111,7 @@ DELTAS_MISSED: Final = 2
 
 
 class Context(NamedTuple):
-    """What is known before a frame, from the frames before it. None means unknown."""
+    """What the earlier frames show, before a frame is judged. None means unknown."""
 
     imu: ImuFrame | None = None
     seq: int | None = None

@@ -93,8 +93,9 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a frame follows at position ``at``.
 
-    If so, odd content before ``at`` is a shock, not damage. The frame must be complete, and the
-    bytes after it must not contradict another frame. At the end of ``held``, return ``closed``.
+    If a frame follows, odd content before ``at`` is a shock, not damage. The frame must be
+    complete, and the bytes after it must be able to begin another frame. At the end of ``held``,
+    return ``closed``.
     """
     if at == len(held):
         return closed

@@ -142,7 +142,7 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
 def measure(data: bytes | bytearray, at: int) -> int:
     """Return the length in bytes of the frame that begins at position ``at``.
 
-    INCOMPLETE if more bytes may complete a frame, NO_FRAME if a frame cannot begin like this.
+    INCOMPLETE if more bytes may complete a frame, NO_FRAME if no frame begins with these bytes.
     """
     if data[at] == _TEXT_BEGIN:
         return _measure_paused(data, at)
@@ -187,7 +187,7 @@ def decode_measured(data: bytes | bytearray, pose_byte_order: ByteOrder = "big")
 
 
 def decode(data: bytes, pose_byte_order: ByteOrder = "big") -> Frame | CommandFrame:
-    """Decode one frame or command. Raises FrameError unless ``data`` is exactly one."""
+    """Decode one frame or command. Raises FrameError for any other ``data``."""
     if data and measure(data, 0) == len(data):
         return decode_measured(data, pose_byte_order)
     if data[:2] == COMMAND_HEADER and len(data) == _COMMAND.size:

@@ -29,7 +29,7 @@ from omnibot_driver.core.omnibot.late_reads import (
 LATE_S: Final = 0.011
 """Longest idle time in s of a line, while the board runs and no bytes are lost.
 
-An adapter that collects bytes for longer shows pauses of its own.
+An adapter that collects bytes for a longer time causes pauses of its own.
 """
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
@@ -47,8 +47,8 @@ class InterFrameGaps:
     * ``gaps``: the pauses within the bytes held.
     * ``sharp``: normally, the first byte after a pause begins a frame.
     * ``between``: normally, a frame begins somewhere in the read after a pause.
-    * ``certain``: ``sharp`` and ``between`` were confirmed often enough that one more pause changes
-      nothing.
+    * ``certain``: ``sharp`` and ``between`` were confirmed so often that one more confirmation
+      changes nothing.
     * ``at_pace``: the bytes of the last read came without a pause before them.
     * ``collected``: the last read brought the bytes of more than a tick. So the read may have ended
       anywhere in a tick; an end right after the first byte of a frame is unlikely.
@@ -97,7 +97,7 @@ class InterFrameGaps:
             self._trust(sharp=True, between=True)
 
     def stands_out(self, pause_s: float, arrived: int) -> bool:
-        """Return whether the line was idle before these bytes longer than within any frame."""
+        """Return whether the line was idle before these bytes for longer than within any frame."""
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
@@ -153,7 +153,7 @@ class InterFrameGaps:
         self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
 
     def clear(self) -> None:
-        """Forget all pauses among the bytes held, and the times of the reads since."""
+        """Forget all pauses among the bytes held, and the times of all reads."""
         self.gaps, self._reads = [], []
 
     def _within(self, start: int, end: int) -> Iterator[Gap]:

@@ -46,14 +46,14 @@ PACE_S: Final = 2e-4
 FEW_BYTES: Final = 2
 """Up to this number of bytes, the pace at which bytes arrive cannot be measured."""
 TICKS_TO_PROVE: Final = 2
-"""Number of ticks after a first late one that prove lost bytes.
+"""Number of late ticks, after a first late tick, that prove lost bytes.
 
-They must be read one by one, and be as late as the first one.
+The ticks must be read one by one, and be as late as the first late tick.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Number of bytes after a frame, within which the cause of a pause in the frame is decided.
 
-Without proof of an idle line by then, the reader is taken to have been late.
+Without proof of an idle line by then, the reader is assumed to have been late.
 """
 
 

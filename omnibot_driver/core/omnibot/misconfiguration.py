@@ -30,7 +30,7 @@ LARGEST: Final = 1e7
 A value outside the limits was misread from bytes in another order.
 """
 POSE_PERIODS: Final = 2
-"""Longest time between two compared poses, in periods of the poses; one in between may be lost."""
+"""Longest time between two compared poses, in pose periods; one pose in between may be lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """Limits above which a pose contradicts the configured frame of the deltas.
@@ -42,7 +42,7 @@ frame. ``TIMES`` limits the ratio of this distance to the distance in the other 
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Least number and duration in s of consecutive deltas that prove the configured rate wrong."""
+"""Least number of consecutive deltas, and their least duration in s, to prove the rate wrong."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}

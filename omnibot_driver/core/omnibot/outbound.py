@@ -58,7 +58,7 @@ _WORD_FOLLOWED: Final = struct.Struct(">hB").pack
 
 
 def transmission(*parts: bytes) -> bytes:
-    """Return the bytes of frames and letters in this order, with zeros before each."""
+    """Return the bytes of frames and letters in the given order, with zeros before each."""
     return b"".join([ZEROS + part for part in parts])
 
 

@@ -17,7 +17,7 @@ POSE_PERIOD_S: Final = 0.2
 DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
 """Possible periods of the deltas in s: multiples of a tick that divide the period of the poses."""
 DELTAS_MISSING: Final = 6
-"""Number of missing deltas after which the board is in IMU-only mode."""
+"""Number of missing deltas after which the board is assumed to be in IMU-only mode."""
 FEWEST_ALONE: Final = 25
 """Least number of IMU frames without a delta that show IMU-only mode.
 

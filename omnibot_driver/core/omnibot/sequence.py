@@ -16,7 +16,7 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Largest difference in s between elapsed time and the time by the count, without a restart.
+"""Largest difference in s, without a restart, between the elapsed time and the counted time.
 
 The drift of the board's clock is allowed in addition.
 
@@ -24,14 +24,15 @@ If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, arrival 
 0.24 s. The limit is about twice this error.
 """
 DRIFT: Final = 0.01
-"""Largest relative error of the board's clock, by which a long gap differs from the elapsed time.
+"""Largest relative error of the board's clock, and so of the counted time of a long gap.
 
 After a silence of minutes, the count therefore says little about a restart, and the pose decides.
 """
 EARLY_S: Final = 0.2
-"""Time in s by which a count from zero may exceed the time since the last delta.
+"""Largest excess in s of the counted time since a restart over the time since the last delta.
 
-The last delta may have been read late. A restart of the board takes longer than this.
+An excess is possible because the last delta may have been read late. A restart of the board takes
+longer than this excess.
 """
 
 
@@ -62,8 +63,8 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Whether a pose ever came after the expected number of deltas; else its count is
-        ignored."""
+        """Whether a pose ever came after the expected number of deltas; until then the counts of
+        poses are ignored."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
         """The last delta's count if it was too high for the elapsed time, else None.
@@ -72,7 +73,7 @@ class Sequence:
         flipped, or the frame may be false.
         """
         self._left: tuple[int, float, int] | None = None
-        """Before a supposed restart: last count and its time in s; after it: the first count."""
+        """Last count before a supposed restart, its time in s, and the first count afterwards."""
 
     def pause(self) -> None:
         """Record that the board paused: its next count continues the old one, or restarts."""
@@ -85,7 +86,7 @@ class Sequence:
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
         """Return what the counter of a delta that arrived at ``now`` in s shows about losses.
 
-        ``count``: the counter; ``imus``: number of IMU frames since the delta before.
+        ``count``: the counter; ``imus``: number of IMU frames since the previous delta.
         """
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose

@@ -86,7 +86,7 @@ class Translation:
         return readings
 
     def apply(self, happening: Happening) -> None:
-        """Apply an event to the mode. Raises RequestRefused if it is not allowed in the mode."""
+        """Apply an event to the mode. Raises RequestRefused if the mode forbids it."""
         self._catch_up()
         self.modes.apply(happening)
 

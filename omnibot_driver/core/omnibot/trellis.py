@@ -14,7 +14,8 @@ context at the end of the cheapest path to that node.
 
 Most edges are on no path that is nearly as cheap as the best. So the search omits edges whose total
 cost would exceed a limit even if the remaining bytes cost as little as possible (``lower_bound``).
-The limit is raised until no omitted edge can change the result, which is that of a complete search.
+The limit is raised until no omitted edge can change the result, so the result is the same as
+without omissions.
 """
 
 from bisect import bisect_left

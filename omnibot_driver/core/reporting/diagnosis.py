@@ -38,7 +38,7 @@ OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "Odometry": ("Odometry frames lost", "Odometry readings refused"),
     "Pose": ("Poses refused",),
 }
-"""Figures that are left out for a board that does not send this kind of reading."""
+"""For each kind of reading, the figures to leave out if the board does not send that kind."""
 
 
 class Diagnosis:

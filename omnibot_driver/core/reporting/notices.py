@@ -105,8 +105,8 @@ class Notices:
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
         """Return the notice that Stop was repeated for its full time without a measured standstill.
 
-        ``measured``: whether displacements arrived meanwhile; ``blind``: whether the board does not
-        measure its wheels after such a command.
+        ``measured``: whether displacements arrived while Stop was repeated; ``blind``: whether the
+        board did not measure its wheels after the last command.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)

@@ -16,9 +16,9 @@ of little use, and is not kept.
 With earliest points, every pair of a latest and an earliest point bounds the slope, and the line
 runs in the middle of all bounds. If an adapter's timer hides the true arrival times for seconds,
 the error is at most half of the time that it hides. Without earliest points, or if the bounds
-contradict each other (which shows that reads were late), the line is laid under the latest points
-as close as possible: on an edge of their lower convex hull. A read that ends within a sample cuts
-it; a cut sample has not waited. So if any latest points are of cut samples, only these are used. If
+contradict each other (which shows that reads were late), the line is laid as closely as possible
+under the latest points: along an edge of their lower convex hull. A read that ends within a sample
+cuts that sample; a cut sample has not waited to be read. So if any latest points are of cut samples, only these are used. If
 every block has one, the line is always laid under them, without the earliest points.
 
 This module knows ticks and times, in s of the host's steady clock; it does not know what is
@@ -33,7 +33,7 @@ from typing import Final
 BLOCK_TICKS: Final = 100
 """Number of ticks in a block: one second of 10 ms ticks."""
 BLOCKS_KEPT: Final = 75
-"""Number of blocks that are kept.
+"""Number of blocks that are kept, which is more than three times the 20 s explained here.
 
 If an adapter's timer and the board's tick differ by 100 ppm, their phases repeat every 20 s.
 """
@@ -53,7 +53,7 @@ WIDEST: Final = 0.2
 """Largest distance of an earliest point below a latest one, as a fraction of a period.
 
 An earliest point that is farther below is not kept. With a 16 ms timer in the adapter, reads occur
-at phases of the 10 ms tick that are 2 ms apart.
+at phases of the 10 ms tick that are 2 ms apart, a fifth of the period.
 """
 
 Point = tuple[int, float]
@@ -84,7 +84,7 @@ class ClockFit:
     def see(self, latest: Point, *, cut: bool) -> None:
         """Add an upper bound: the newest tick of a read, and a time in s by which it had arrived.
 
-        ``cut``: the read ended within this tick's sample.
+        ``cut``: whether the read ended within this tick's sample.
         """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor

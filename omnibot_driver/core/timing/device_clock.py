@@ -39,15 +39,15 @@ BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
 If an adapter delivers every 16 ms, the phase of the tick at which reads occur repeats after five
-reads.
+reads, so 12 reads see each phase twice.
 """
 CALM: Final = 0.45
 """Largest distance of a read from the line, as a fraction of a period, at which its tick is sure.
 
-Two reads in a row must be this near. The limit must be less than half a period.
+Two reads in a row must be this near to the line. The limit must be less than half a period.
 """
 LARGEST_RISE: Final = 0.02
-"""Largest fraction of a period that the stamps gain per tick, after the line moved later."""
+"""Largest extra step of the stamps per tick, as a fraction of a period, if the line moved later."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
@@ -87,14 +87,14 @@ class DeviceClock:
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
-        Ticks that are seen soon after a late tick had waited together with that tick.
+        If the next tick is seen soon after a late tick, both ticks had waited to be read.
         """
         self._awaited: Point | None = None
         """The tick after the newest one, and a time in s until which no read had brought it."""
         self._cut_off: Point | None = None
         """Lower bound for the tick whose sample the last read cut; None if no sample was cut.
 
-        The bound holds if the rest of the sample arrives, and was not lost.
+        The bound is valid only if the rest of the sample arrives.
         """
 
     @property
@@ -108,8 +108,8 @@ class DeviceClock:
     ) -> list[float]:
         """Return the sampling times in s of the readings that a read at ``now`` completed.
 
-        ``edge``: where the read ended among the samples, None if unknown. From tick to tick stamps
-        increase, and none is later than ``now``; a displacement has the stamp of its tick's
+        ``edge``: where the read ended among the samples, None if unknown. Stamps increase from
+        tick to tick, and no stamp is later than ``now``; a displacement has the stamp of its tick's
         ImuReading.
         """
         ticks = self._count(readings)
@@ -173,7 +173,7 @@ class DeviceClock:
         return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """Return each reading's tick by known losses; the displacements' counter overrides them."""
+        """Return each reading's tick, counted with the known losses; a displacement corrects it."""
         ticks: list[int] = []
         for reading in readings:
             if isinstance(reading, ImuReading):
@@ -195,9 +195,9 @@ class DeviceClock:
         return self._displaced_tick + passed - self._tick
 
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
-        """Compare the newest tick with its arrival; return how many ticks the count lacked.
+        """Compare the newest arrival with the line; return how many ticks had not been counted.
 
-        ``counted``: a displacements' counter has confirmed this tick.
+        ``counted``: whether the counter of the displacements has confirmed this tick.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
