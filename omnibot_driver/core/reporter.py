@@ -2,8 +2,8 @@
 
 """The reports of a session: events in order, notices when they are due, state and figures.
 
-The reporter reads every part of a session and changes none of them. It must not know who receives the
-reports.
+The reporter reads every part of a session and changes none of them. It must not know who receives
+the reports.
 """
 
 import math

@@ -91,8 +91,8 @@ class SafetyStops:
     def estop(self, active: bool, now: float, *, by: str) -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a release while
-        the e-stop button on the robot is held.
+        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a
+        release while the e-stop button on the robot is held.
         """
         latched = self._policy.latched
         if active:

@@ -251,8 +251,8 @@ class Session:
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a release while
-        the e-stop button on the robot is held.
+        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a
+        release while the e-stop button on the robot is held.
         """
         return self._safety.estop(active, now, by=by)
 

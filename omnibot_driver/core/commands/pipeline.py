@@ -176,7 +176,7 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Record that ``count`` displacements so far were impossible; return notices to the user."""
+        """Record that ``count`` displacements so far were impossible; return notices to show."""
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
             return []
@@ -185,7 +185,7 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Return the fault that the newest estimate shows or, without estimates, the displacement."""
+        """Return the fault that the newest estimate shows or, without one, the displacement."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()

@@ -53,8 +53,8 @@ def outside(
 ) -> tuple[float, float]:
     """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
 
-    ``explained``: velocities that the set-points explain; the current set-point's velocity is first.
-    If the heading is unknown, only the magnitude of the linear velocity is checked.
+    ``explained``: velocities that the set-points explain; that of the current set-point is first. If
+    the heading is unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0

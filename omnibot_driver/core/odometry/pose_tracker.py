@@ -51,7 +51,7 @@ class PoseTracker:
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
-        """Return the twist of a motion of ``seconds``, first in REP-103's axes, then in the board's."""
+        """Return the twist of a motion of ``seconds``: in REP-103's axes, and in the board's."""
         rolling = _times(tangent, self._size).over(seconds)
         if self._signed_size == self._size:
             return rolling, rolling

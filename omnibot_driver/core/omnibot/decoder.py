@@ -150,7 +150,7 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Accept the new bytes if all are calm frames that were due; return whether this was done."""
+        """Accept the new bytes if all are calm frames that were due; return True if accepted."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
@@ -263,7 +263,7 @@ class FrameDecoder:
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
-        """Accept certain frames and discard uncertain bytes; return False if nothing was decided."""
+        """Accept certain frames, discard uncertain bytes; return False if nothing was decided."""
         state = self.context, self.expectation, self.pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0

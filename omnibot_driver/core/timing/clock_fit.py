@@ -18,8 +18,9 @@ runs in the middle of all bounds. If an adapter's timer hides the true arrival t
 the error is at most half of the time that it hides. Without earliest points, or if the bounds
 contradict each other (which shows that reads were late), the line is laid as closely as possible
 under the latest points: along an edge of their lower convex hull. A read that ends within a sample
-cuts that sample; a cut sample has not waited to be read. So if any latest points are of cut samples, only these are used. If
-every block has one, the line is always laid under them, without the earliest points.
+cuts that sample; a cut sample has not waited to be read. So if any latest points are of
+cut samples, only these points are used. If every block has such a point, the line is always laid
+under them, without the earliest points.
 
 This module knows ticks and times, in s of the host's steady clock; it does not know what is
 sampled, nor how ticks are counted.
