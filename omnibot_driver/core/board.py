@@ -105,7 +105,7 @@ class Board(Protocol):
     """Settings of this board that its data does not reveal; may be replaced at any time."""
 
     clock: ReadingClock | None = None
-    """Clock for readings that carry the board's time; None: stamp by IMU tick or by arrival."""
+    """Clock for readings that carry the board's time. None: stamps come from ticks or arrivals."""
 
     @property
     def mode(self) -> Mode:
@@ -138,7 +138,7 @@ class Board(Protocol):
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Return advice on the settings if ``gravity_mps2`` differs from gravity; else empty text.
+        """Return advice on the settings if ``gravity_mps2`` differs from gravity; empty if not.
 
         ``gravity_mps2``: specific force measured at rest, in m/s².
         """
@@ -155,11 +155,11 @@ class Board(Protocol):
         """
 
     def flush(self, now: float) -> list[Reading]:
-        """Decode the bytes held back so far, as the line is closed; return their readings."""
+        """Decode the bytes that are still held when the line is closed; return their readings."""
         return []
 
     def silence(self) -> None:
-        """Forget the mode, as the board has been silent for ``Traits.silence_s``."""
+        """Forget the mode, because the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
         """Record that this process stalled, so the guard may have sent the stop commands.
@@ -247,7 +247,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def switch_off(self) -> Packets:
-        """Return the packets that switch other devices off; sent after Stop and ``on_exit``."""
+        """Return the packets that switch off devices other than the wheels; sent after Stop."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:

@@ -2,8 +2,8 @@
 
 """Liveness of the board: when it last sent data, and whether its silence is too long.
 
-This module knows two times and two limits. It does not know what the data means, or how the
-driver reacts to a silence. Time is an argument.
+This module knows two times and two limits. It does not know what the data means, or how the driver
+reacts to a silence. Time is an argument.
 """
 
 import math
@@ -15,8 +15,7 @@ class Liveness:
     """The arrival times of a board's last data, and the limits above which silence is a fault.
 
     ``heard_at``: arrival of the last reading, in s; ``came_at``: arrival of the last bytes, valid
-    or not. ``unheard_s`` and ``silence_s`` have the same
-    meaning as in ``Traits``.
+    or not. ``unheard_s`` and ``silence_s`` have the same meaning as in ``Traits``.
     """
 
     def __init__(self, traits: Traits) -> None:
@@ -32,7 +31,7 @@ class Liveness:
         self._silent_since = None
 
     def stalled(self, now: float) -> None:
-        """Restart the measurement of silence, as this process stalled and could not receive."""
+        """Restart the measurement of silence, because this process stalled and did not receive."""
         if self._silent_since == self.heard_at:
             self._silent_since = now
         self.heard_at = now

@@ -101,12 +101,12 @@ class ModeManager:
         return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
-        """Begin with an open port; the board may be in any state, even within a command."""
+        """Begin with an open port; the board may be in any state, even inside a command."""
         self.output = NO_PACKETS
         self._begin(now)
 
     def closed(self, why: str) -> None:
-        """Fail every request for the reason ``why``, as the port is lost or closed."""
+        """Fail a request for the reason ``why``, because the port is lost or closed."""
         self.phase = Phase.CLOSED
         self._answer(False, why)
 

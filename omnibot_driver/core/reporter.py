@@ -38,8 +38,8 @@ class Reporter:
     * ``news_at``: time of the next ``look_for_news``, in s.
     * ``missing``: which lines are missing, as a sentence; empty if none.
     * ``overruns``: how often a port has lost bytes, counted over all connections.
-    * ``shown``: public state and e-stop as of the last ``take``; a state that lasts only during one
-      input is never shown.
+    * ``shown``: public state, and whether the e-stop was latched, at the last ``take``; a state
+      that lasts only during one input is never shown.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """The values from which ``shown`` was computed; comparing them is faster."""
+        """Values from which ``shown`` was computed; it is computed again only if they change."""
 
     @property
     def state(self) -> str:

@@ -3,8 +3,8 @@
 """Safety stops: what stops the robot at once, whatever the source of its commands.
 
 A stop follows from the e-stop, from a board that restarts, is paused or falls silent, and from a
-stall of this process. This module applies measurements to commands and requests where safety
-demands it. It must not know bytes, or who commands. Two other stops are elsewhere: the command
+stall of this process. In this module, measurements act on commands and requests. The module
+must not know bytes, or who commands. Two other stops are elsewhere: the command
 policy stops the robot when a command expires, and the motion monitor stops a robot that does not
 move as commanded.
 """
@@ -71,7 +71,7 @@ class SafetyStops:
             elif isinstance(reading, PausedReading):
                 commanding.begin(now)
                 self._policy.proof.paused()
-                if self._board.mode.running:  # it paused and ran again within one read
+                if self._board.mode.running:  # the board paused and ran again within one read
                     self._policy.halt(now)
                 self._mode_manager.heard_paused(now, continues=reading.continues)
             elif isinstance(reading, EStopButtonReading):
@@ -146,7 +146,7 @@ class SafetyStops:
             self._mode_manager.heard_nothing(now)
 
     def stalled(self, seconds: float, now: float) -> None:
-        """Stop the robot and fail the task in progress, as this process stalled for ``seconds``."""
+        """Stop the robot and fail the task in progress: this process stalled for ``seconds``."""
         self._liveness.stalled(now)
         self._task.give_up("the driver stalled meanwhile; call again")
         self._board.stalled()

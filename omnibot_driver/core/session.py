@@ -92,7 +92,7 @@ class Session:
 
     @property
     def shown(self) -> tuple[str, bool]:
-        """Public state and e-stop as of the last ``take_events``."""
+        """Public state, and whether the e-stop was latched, at the last ``take_events``."""
         return self._reporter.shown
 
     @property
@@ -127,7 +127,7 @@ class Session:
             self._task.wake_at,
         )
 
-    # Inputs of the link and of time
+    # Inputs from the link and from the clock
 
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
         """Apply new settings to later commands and frames; stricter limits stop the robot.
@@ -143,8 +143,8 @@ class Session:
     def opened(self, now: float, *, missing: str = "") -> None:
         """Begin with an open port; ``missing`` names the lines that are not open, as a sentence.
 
-        While a line is missing the robot is stopped and not driven, as it would receive only a part
-        of its commands.
+        While a line is missing, the robot is stopped and not driven, because the board would
+        receive only a part of its commands.
         """
         self._board.connect()
         self._commanding.begin(now)
@@ -157,7 +157,7 @@ class Session:
             self._commands.halt(now)
 
     def closed(self, now: float) -> None:
-        """End the connection, as the port is lost or closed."""
+        """End the connection, because the port is lost or closed."""
         self.inbound.end(now)
         self.interlocks.missing = self._reporter.missing = ""
         why = self.interlocks.why_not_request()  # empty unless the driver shuts down
@@ -180,7 +180,7 @@ class Session:
         self._task.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
-        """Stop the robot, as this process or its watchdog stalled for ``seconds``."""
+        """Stop the robot, because this process or its watchdog stalled for ``seconds``."""
         if self._mode_manager.phase is not CLOSED:
             self._safety.stalled(seconds, now)
 
@@ -245,7 +245,7 @@ class Session:
         return self._task.is_current(token)
 
     def end_task(self, token: object, success: bool, message: str) -> None:
-        """End the task as done or failed; no effect if it has ended before."""
+        """End the task as done or failed; no effect if the task has already ended."""
         self._task.end(token, success, message)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:

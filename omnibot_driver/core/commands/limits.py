@@ -101,7 +101,7 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
 
 
 def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
-    """Shorten the vector to a length of at most ``limit``, and return it; never overflows."""
+    """Return the vector, shortened to a length of at most ``limit``; never overflows."""
     largest = max(map(abs, vector))
     if largest == 0.0:
         return tuple(vector)

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Time, in s, within which a second stop shows that the cause of the first was not removed."""
+"""Time, in s, within which a second stop shows that the cause of the first stop remains."""
 
 
 class Until(Enum):

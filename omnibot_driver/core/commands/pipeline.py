@@ -176,7 +176,7 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Record that ``count`` displacements so far were impossible; return notices to show."""
+        """Record that ``count`` displacements so far were impossible; return user notices."""
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
             return []

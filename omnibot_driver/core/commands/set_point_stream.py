@@ -2,8 +2,8 @@
 
 """An actuator for boards that follow set-points: decides when to send or repeat which frame.
 
-Boards do not acknowledge these frames, so each is repeated. This module does not know what is in a
-frame; time is an argument.
+These boards do not acknowledge frames, so each frame is repeated. This module does not know
+what is in a frame; time is an argument.
 """
 
 import math
@@ -18,10 +18,10 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 PACE_S: Final = 0.01
-"""Shortest time between frames, in s; more frequent ones would only fill the board's buffer."""
+"""Shortest time between frames, in s; more frequent frames would only fill a buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Shortest time between two set-points, in s. With a shorter pause, a lost byte could
-spoil a larger share of the time (docs/internals/integrity.md). Commands at 50 Hz are not slowed."""
+"""Shortest time between two set-points, in s. With a shorter pause, lost bytes would affect
+a larger share of the time (docs/internals/integrity.md). Commands at 50 Hz are not slowed."""
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
 

@@ -51,7 +51,7 @@ class Setpoint(Protocol):
         """Whether all later orders are the same as the present one."""
 
     def order(self, now: float) -> Order:
-        """Return the order for this time."""
+        """Return the order for the time ``now``."""
 
     def check_anew(self) -> None:
         """Check the order with new settings. Raises CommandRefused if it cannot be encoded."""
@@ -90,7 +90,7 @@ class BaseSetpoint:
                 self._reached_at = settled_at if before.settled else before._reached_at
 
     def order(self, now: float) -> Order:
-        """Return the order for this time, and advance the ramp to it."""
+        """Advance the ramp to the time ``now``, and return the order for that time."""
         if not self.settled:
             duration_s = min(now - self._reached_at, LONGEST_STEP_S)
             self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)

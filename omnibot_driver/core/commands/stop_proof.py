@@ -48,7 +48,7 @@ class StopProof:
         self.begin()
 
     def begin(self) -> None:
-        """Discard the proof so far, as the robot's motion is unknown, and begin a new one."""
+        """Discard the proof so far, because the robot's motion is unknown; begin a new proof."""
         self.proved = self.measured = False
         self._stopped_at = math.inf
         self._still_s, self._still = 0.0, 0

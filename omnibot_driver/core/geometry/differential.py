@@ -2,8 +2,8 @@
 
 """Kinematics of a body with two driven wheels on one axle.
 
-The body turns about a point on the line of the axle, its instantaneous centre of rotation. Its
-frame has its origin in the middle of the axle.
+The body turns about a point on the line of the axle, its instantaneous centre of rotation. The
+origin of the body's frame is the middle of the axle.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 @dataclass(frozen=True, slots=True)
 class DifferentialKinematics:
-    """Wheels of radius ``wheel_radius_m``, ``track_m`` apart; positive rates drive forward."""
+    """Two wheels of radius ``wheel_radius_m``, ``track_m`` apart; positive rates drive forward."""
 
     wheel_radius_m: float
     track_m: float
@@ -24,7 +24,7 @@ class DifferentialKinematics:
 
     @property
     def rims(self) -> "DifferentialKinematics":
-        """The same kinematics with wheels of 1 m radius, whose rates are the rims' speeds."""
+        """These kinematics with wheels of 1 m radius: rates in rad/s are then rim speeds in m/s."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

@@ -3,8 +3,8 @@
 """The interface that every arrangement of wheels offers to the driver.
 
 Axes are REP-103's: x forward, y left, yaw counter-clockwise. Rates are those of the driven wheels,
-in rad/s, in the order of ``joints``. The equations also convert small displacements into
-wheel angles and back. Time, noise and bytes do not appear here.
+in rad/s, in the order of ``joints``. The equations also convert small displacements into wheel
+angles and back. Time, noise and bytes do not appear here.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class Kinematics(Protocol):
 
     @property
     def rims(self) -> "Kinematics":
-        """The same kinematics with wheels of 1 m radius, whose rates are the speeds of the rims."""
+        """These kinematics with wheels of 1 m radius: rates in rad/s are then rim speeds in m/s."""
 
     @property
     def joints(self) -> tuple[str, ...]:

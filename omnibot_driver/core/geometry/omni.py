@@ -28,7 +28,7 @@ class OmniKinematics:
 
     @property
     def rims(self) -> "OmniKinematics":
-        """The same kinematics with wheels of 1 m radius, whose rates are the rims' speeds."""
+        """These kinematics with wheels of 1 m radius: rates in rad/s are then rim speeds in m/s."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

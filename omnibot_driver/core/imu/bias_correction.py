@@ -30,7 +30,7 @@ class ImuEstimate:
 
 
 class BiasCorrector:
-    """Finds and removes the gyro's bias. ``calibration`` handles explicit requests."""
+    """Removes the IMU's biases; ``calibration`` finds the gyro's bias, also on request."""
 
     def __init__(self, board: Board, correction: ImuCorrection) -> None:
         self._board = board
@@ -38,7 +38,7 @@ class BiasCorrector:
         self.calibration = GyroCalibration(correction.gyro_bias, refine=correction.auto_gyro_bias)
 
     def configure(self, correction: ImuCorrection) -> None:
-        """Use new settings, but keep the gyro's bias, which may have been measured since."""
+        """Use new settings, but keep the gyro's bias, which may have been measured meanwhile."""
         self.calibration.refine = correction.auto_gyro_bias
         self._correction = correction
 

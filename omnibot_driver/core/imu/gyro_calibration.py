@@ -40,7 +40,7 @@ forth."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """Largest bias: the initial zero-rate output in the MPU-6050 product specification, section 6.1."""
 REFINEMENT: Final = 0.05
-"""Fraction of the bias error that one block of ``BLOCK_S`` corrects; 14 s correct half of it."""
+"""Fraction of the bias error that one block of ``BLOCK_S`` corrects; in 14 s, half is corrected."""
 
 
 class Look:
@@ -116,7 +116,7 @@ class GyroCalibration:
 
     @property
     def measuring(self) -> bool:
-        """Whether a caller waits for an answer."""
+        """Whether a requested measurement is running."""
         return self.wake_at < math.inf
 
     def measure(self, token: object, now: float) -> None:

@@ -84,8 +84,8 @@ class OutlierFilter:
 
     ``limits`` may be replaced at any time; ``tick_s``: time between two ImuReadings in s.
     ``corrected``: whether displacements are steps of the board's own estimate, which leaps when the
-    board corrects it. If they are, an impossible step is not rejected, but passed on
-    with ``measured`` False.
+    board corrects it. If they are, an impossible step is not rejected, but passed on with
+    ``measured`` False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -195,7 +195,7 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; if it is a pose, add the displacements rejected before to ``lost``.
+        """Return the reading; count the displacements rejected before a pose as its losses.
 
         The pose includes the motion of the rejected displacements.
         """

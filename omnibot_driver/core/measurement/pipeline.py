@@ -83,7 +83,7 @@ class MeasurementPipeline:
         return self._clock.skew_ppm
 
     def restart(self) -> None:
-        """Forget the state of the clock, as the board begins a new stream of readings."""
+        """Forget the state of the clock, because the board begins a new stream of readings."""
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:

@@ -41,7 +41,7 @@ class StreamStatistics:
     reads: int = 0
     """Number of reads whose last reading was an IMU sample or a displacement."""
     delay_s: float = 0.0
-    """Sum of the ages of the newest samples, in s, over all ``reads``; an age is at least 0."""
+    """Sum of the newest sample's age at each of the ``reads``, in s; an age is never negative."""
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0

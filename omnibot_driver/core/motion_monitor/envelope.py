@@ -21,18 +21,18 @@ NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """Noise in m/s and rad/s that is always allowed.
 
-This covers encoder counts, rounding, and a slope on which a slow controller lets the robot roll.
+The causes are encoder counts, rounding, and a slope on which a slow controller lets the robot roll.
 """
 SIDEWAYS: Final = 0.1
 """Fraction of a speed, or of a yaw rate, that is allowed in any direction.
 
-The heading is uncertain, and wheels differ. This error is independent of the noise, so the squares
-of both are added.
+The heading is uncertain, and wheels differ. The resulting error is independent of the noise, so the
+squares of both are added.
 """
 OVERSHOOT: Final = 0.15
 """Fraction of a change of set-point by which a robot may overshoot, in any direction.
 
-This is allowed only if the robot leaves a set-point other than rest.
+Overshoot is allowed only if the robot leaves a set-point other than rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
@@ -53,7 +53,7 @@ def outside(
 ) -> tuple[float, float]:
     """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
 
-    ``explained``: velocities that the set-points explain; that of the current set-point is first. If
+    ``explained``: velocities that the set-points explain, first that of the current set-point. If
     the heading is unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]

@@ -23,7 +23,7 @@ Velocity = tuple[float, float, float]
 HELD_S: Final = 0.3
 """Time in s for which a replaced set-point explains its full velocity.
 
-This covers the delay of the line, a lost repetition, and a controller's dead time.
+This time covers the delay of the line, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
 """Time constant in s of the decay after ``HELD_S``.

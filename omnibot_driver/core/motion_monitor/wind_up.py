@@ -27,15 +27,15 @@ FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """Time constants in s with which the wind-up is forgotten, in motion and at rest.
 
-A robot whose set-point is rest may still be held, and then its wind-up does not decrease.
+It is forgotten more slowly at rest, because a robot that is still held keeps its wind-up.
 """
 HELD_PART: Final = 0.7
-"""Fraction of its set-points below which a robot's speed shows that something holds it."""
+"""A robot whose speed is below this fraction of its set-points is regarded as held."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""Speeds, in m/s and rad/s, opposite to the set-point; above them a robot is not held.
+"""Speeds against the set-point, in m/s and rad/s, above which a robot is not regarded as held.
 
-Such motion does not add to the wind-up.
+Faster motion against the set-point does not add to the wind-up.
 """
 LEVER_M: Final = 0.15
 """Approximate distance in m of the wheels from the centre: converts a turn to rim motion."""
@@ -48,7 +48,7 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m that was lost in a single long displacement, and is not yet added.
+        """Distance in m that was lost in a single long displacement, not yet added to ``way_m``.
 
         0: the distance has been added. None: the robot was not held in the last displacement.
         """

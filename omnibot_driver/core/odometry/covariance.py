@@ -126,8 +126,8 @@ class Uncertainty:
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.
 
-        ``heading_rad``: heading before the move. Computed with plain numbers, because Pose objects
-        would take a third of the time of an odometry message.
+        ``heading_rad``: heading before the move. The code computes with plain numbers, because Pose
+        objects would take a third of the time of an odometry message.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return
@@ -171,11 +171,11 @@ class Uncertainty:
         )
 
     def settle(self) -> None:
-        """Remove the uncertainty of all gaps, as the motion in them is known now."""
+        """Remove the uncertainty of all gaps, because the motion in them is known now."""
         self.gap = NOTHING
 
     def give_up(self) -> None:
-        """Keep the uncertainty of all gaps permanently, as the motion in them stays unknown."""
+        """Keep the uncertainty of all gaps permanently: the motion in them stays unknown."""
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:

@@ -4,8 +4,8 @@
 
 The main idea: ``_board`` is the robot's pose in the board's frame. Displacements update it at once,
 and the board's poses correct it. The target of the ``CorrectionSmoother`` is the robot's pose in
-the odometry frame. ``_board`` and this target always move by the same tangent in the
-body's axes, so motion that was lost on the line is recovered with the next pose. This module knows
+the odometry frame. ``_board`` and this target always move by the same tangent in the body's
+axes, so motion that was lost on the line is recovered with the next pose. This module knows
 SE(2). It does not know bytes, clocks or ROS.
 """
 
@@ -114,7 +114,7 @@ class Odometry:
         )
 
     def reset(self) -> list[OdometryEstimate]:
-        """Begin the odometry frame at the robot's pose; return the estimates that still waited."""
+        """Begin the odometry frame at the robot's pose; return estimates that were still due."""
         self.alignments += 1
         due = []
         if self._board is not None:
@@ -172,8 +172,8 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Return ``place``, a pose in the odometry frame, as a pose in the board's frame.
 
-        Of the two ways to turn to the heading of ``place``, the shorter one is used. None if no pose
-        of the board shows yet where the odometry frame lies in the board's frame.
+        Of the two ways to turn to the heading of ``place``, the shorter one is used. None if no
+        pose of the board shows yet where the odometry frame lies in the board's frame.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None

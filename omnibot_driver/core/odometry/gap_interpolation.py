@@ -14,7 +14,7 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest board time that is interpolated, in s; a robot without data is soon stopped."""
+"""Longest board time that is interpolated, in s; a robot without data stops earlier."""
 NO_WAY: Final = Pose()
 
 

@@ -2,8 +2,8 @@
 
 """Displacements that wait for a pose of the board, and their sum in the board's frame.
 
-This module knows how a displacement moves a pose; it does not know why a displacement waits,
-nor how the result is used.
+This module knows how a displacement moves a pose; it does not know why a displacement waits, nor
+how the result is used.
 """
 
 import math
@@ -32,7 +32,7 @@ class PendingDisplacements:
         return waiting
 
     def forget_losses(self) -> None:
-        """Set the losses before the first displacement to 0, as their motion is known now."""
+        """Set the losses before the first displacement to 0: their motion is known now."""
         if self._waiting:
             reading, stamp_s = self._waiting[0]
             self._waiting[0] = replace(reading, lost=0), stamp_s

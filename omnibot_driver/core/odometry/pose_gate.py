@@ -64,7 +64,7 @@ class PoseGate:
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
         """Return whether a pose confirms ``doubted``, the last unexpected pose.
 
-        If it does not, ``doubted`` is refused.
+        If ``told`` does not confirm it, ``doubted`` is refused.
         """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)
@@ -78,8 +78,8 @@ class PoseGate:
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
         """Return whether the robot can have reached a pose since the last accepted one.
 
-        ``mps``, ``radps``: largest speeds in m/s and rad/s; ``seconds``: time in addition to that
-        noted by ``passed``.
+        ``mps``, ``radps``: largest speeds in m/s and rad/s; ``seconds``: time in addition to
+        the time recorded by ``passed``.
         """
         if self.proved is None:
             return False

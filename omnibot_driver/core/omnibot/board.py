@@ -45,8 +45,8 @@ TRAITS: Final = Traits(
     authorities=frozenset(Authority),
     requests=frozenset(Request),
     wheels=("A", "B", "C"),
-    unheard_s=0.3,  # it may be restarting
-    silence_s=1.5,  # it sends something at least once a second
+    unheard_s=0.3,  # the board may be restarting
+    silence_s=1.5,  # the board sends something at least once a second
     advice={
         Fault.WRONG_WAY: (
             "check `control_method`, `axis_signs`, `delta_frame` and the wiring of the wheels"
@@ -124,7 +124,7 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended in the stream of IMU samples; None while this is uncertain.
+        """Where the last read ended in the stream of IMU samples; None if this is unknown.
 
         The position follows from the bytes held after the last decoded frame: whether they begin or
         complete an IMU frame, and how many bytes come after that IMU frame.
@@ -199,7 +199,7 @@ class OmniBot:
         return readings + self._translation.readings(found, self._decoder.skipped, now)
 
     def silence(self) -> None:
-        """Forget the mode, as the board has been silent for too long."""
+        """Forget the mode, because the board has been silent for too long."""
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:

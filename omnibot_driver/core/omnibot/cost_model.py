@@ -3,8 +3,8 @@
 """The cost of an interpretation of the bytes: all evidence for and against it in one unit.
 
 A cost is about the negative logarithm of a probability: a cost of 1 is a factor of three. This
-module knows what a board is likely to send next, and how likely the line is to damage it. It does
-not know how interpretations are searched (``trellis``) or when one is accepted (``decoder``).
+module knows what a board is likely to send next, and how likely the line is to damage frames. It
+does not know how interpretations are searched (``trellis``) or when one is accepted (``decoder``).
 
 Content is soft evidence: the cost of a frame's content stays below the cost of calling the frame
 damaged, so a true shock between two complete frames is delivered.
@@ -77,7 +77,7 @@ A gyro word of -6 has these bytes. In a run of IMU frames, such words are the he
 shifted run of false frames, in which gyro words take the place of accelerations.
 """
 JUMP: Final = 2.5
-"""Cost of a counter that is not the next one: a frame before this one was lost."""
+"""Cost of a counter that did not advance by one: a frame before this frame was lost."""
 IMPOSSIBLE: Final = 2.0
 """Cost of a movement that a robot of this kind cannot make."""
 OFF_BEAT: Final = 1.0
@@ -95,7 +95,7 @@ ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
 """Largest rounding error of a sum of deltas in 0.1 mrad: a constant part, and a part per delta.
 
-Five deltas have an error of 4 at most.
+The error of five deltas is at most 4.
 """
 FASTEST: Final = 1e5
 """Largest possible speed in 0.1 mm/s or 0.1 mrad/s: 10 m/s or 10 rad/s."""
@@ -157,7 +157,7 @@ class Expectation:
 
         The limits are the least and the greatest squared norm of the acceleration, and the largest
         steps of an acceleration word and of a gyro word. They are integers, which Python compares
-        twice as fast.
+        twice as fast as floats.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:

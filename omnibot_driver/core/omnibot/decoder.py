@@ -12,7 +12,7 @@ header alone proves nothing. A frame is accepted because of the bytes around it,
 * *Uncertain* bytes are interpreted in all possible ways (``trellis``). Each interpretation has a
   cost, which sums up the evidence against it (``cost_model``). A frame of the cheapest
   interpretation is returned when every interpretation without this frame costs clearly more.
-  Otherwise the bytes wait for more evidence, until ``DOUBT_BYTES`` are held at most.
+  Otherwise the bytes wait for more evidence, at most until ``DOUBT_BYTES`` are held.
 
 This module reads no clock and never raises on input. It holds fewer than ``DOUBT_BYTES`` bytes
 between calls, and looks at each byte a bounded number of times.
@@ -54,7 +54,7 @@ On such a line, less evidence is needed that the last byte of a frame is not par
 header.
 """
 FRAMES_TO_SETTLE: Final = 3
-"""Number of certain frames that must follow an uncertain frame before it is discarded."""
+"""An uncertain frame is discarded if at least this number of certain frames follow."""
 
 
 @dataclass(slots=True)
@@ -289,8 +289,8 @@ class FrameDecoder:
     ) -> Iterator[tuple[Segment, bool]]:
         """Yield the pieces up to the first undecided one, each with whether to accept it.
 
-        A piece is decided if later bytes cannot change the result, or if it ends at or before the
-        position ``until``, because it has waited long enough.
+        A piece is decided if later bytes cannot change the result. A piece that ends at or before
+        the position ``until`` has waited long enough, and is decided as well.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

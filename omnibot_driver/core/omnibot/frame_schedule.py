@@ -61,7 +61,7 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: number of bytes right before the frame that were not a frame. IMU frames lost
+        ``skipped``: number of bytes right before the frame that belong to no frame. IMU frames lost
         before a pose are returned with the frame after the pose. A delta resets the count of lost
         IMU frames, because the SEQ of the delta shows losses.
         """

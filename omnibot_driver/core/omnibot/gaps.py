@@ -103,8 +103,8 @@ class InterFrameGaps:
     def compare(self, ends: Sequence[int]) -> None:
         """Learn from accepted frames whether the pauses of this line are between frames.
 
-        If so, the line causes the pauses, and not the adapter. ``ends``: the ends of the accepted
-        frames among the bytes held.
+        The line causes pauses between frames; an adapter causes pauses anywhere. ``ends``: the ends
+        of the accepted frames among the bytes held.
         """
         start = 0
         for end in ends:

@@ -21,7 +21,7 @@ REACH: Final = 15 + 2
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""Costs of the last bytes of an unexplained run, as far as they are below ``DAMAGE``."""
+"""Costs of the remaining bytes of a bad run, from about ``DAMAGE`` down to the cost of one byte."""
 
 
 def least_costs(data: bytes) -> list[float]:

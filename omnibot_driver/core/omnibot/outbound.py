@@ -88,7 +88,7 @@ def nearest(a: float, b: float, c: float) -> Words:
 def begins_with_a_letter(word: int) -> bool:
     """Return whether the high byte of ``word`` is S, P or R.
 
-    Neighbouring values have the same high byte, so they do not avoid the letter.
+    A neighbouring value has the same high byte, so it does not avoid the letter.
     """
     return word >> 8 & 0xFF in _LETTERS
 

@@ -3,7 +3,7 @@
 """The rates at which a running board sends each kind of frame.
 
 The manual contradicts itself about deltas: 25 Hz in its frame table, 10 Hz in its mode list. So
-their period is a setting, from which the other numbers follow. This module knows rates; it does not
+their period is a setting, from which the other rates follow. This module knows rates; it does not
 know what a frame contains.
 """
 

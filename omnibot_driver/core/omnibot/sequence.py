@@ -29,10 +29,10 @@ DRIFT: Final = 0.01
 After a silence of minutes, the count therefore says little about a restart, and the pose decides.
 """
 EARLY_S: Final = 0.2
-"""Largest excess in s of the counted time since a restart over the time since the last delta.
+"""Tolerance in s by which the counted time since a restart may exceed the elapsed time.
 
-An excess is possible because the last delta may have been read late. A restart of the board takes
-longer than this excess.
+The elapsed time is too short if the last delta before the restart was read late. A restart of the
+board takes longer than this tolerance.
 """
 
 

@@ -68,7 +68,7 @@ class Translation:
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
         """Return the readings of the frames that one read brought.
 
-        ``skipped``: for each frame, the number of bytes before it that were not a frame; ``now``:
+        ``skipped``: for each frame, the number of bytes before it that belong to no frame; ``now``:
         time of the read in s. The bytes of one read did not arrive all at once, so the arrival time
         of each frame is estimated.
         """

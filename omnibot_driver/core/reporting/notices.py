@@ -96,7 +96,7 @@ class Notices:
         return news
 
     def once(self, sentence: str) -> list[str]:
-        """Return the sentence as a list; an empty list if it was given before."""
+        """Return the sentence as a list; an empty list if the sentence was given before."""
         if sentence in self._told:
             return []
         self._told.add(sentence)

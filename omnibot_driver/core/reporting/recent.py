@@ -30,7 +30,7 @@ class RecentFigures:
             self._window.popleft()
 
     def grew(self, name: str, count: int, now: float) -> bool:
-        """Store the count of this name; return whether it has grown within RECENT_S."""
+        """Store the count of this name; return whether the count has grown within RECENT_S."""
         before, at = self._counts.get(name, (count, -math.inf))
         if count > before:
             at = now
@@ -38,7 +38,7 @@ class RecentFigures:
         return now - at < RECENT_S
 
     def waiting_share(self, link: LinkFigures, now: float) -> float:
-        """Return the share of the recent time in which the reader was ready but did not run."""
+        """Return the share of recent time in which the reader waited for the processor."""
         if link.waited_s is None:
             return 0.0
         self._waits.append((now, link.waited_s))

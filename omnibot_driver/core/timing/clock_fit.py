@@ -18,9 +18,9 @@ runs in the middle of all bounds. If an adapter's timer hides the true arrival t
 the error is at most half of the time that it hides. Without earliest points, or if the bounds
 contradict each other (which shows that reads were late), the line is laid as closely as possible
 under the latest points: along an edge of their lower convex hull. A read that ends within a sample
-cuts that sample; a cut sample has not waited to be read. So if any latest points are of
-cut samples, only these points are used. If every block has such a point, the line is always laid
-under them, without the earliest points.
+cuts that sample; a cut sample has not waited to be read. So if any latest points are of cut
+samples, only these points are used. If every block has such a point, the line is always laid under
+these points, without the earliest points.
 
 This module knows ticks and times, in s of the host's steady clock; it does not know what is
 sampled, nor how ticks are counted.
@@ -34,16 +34,18 @@ from typing import Final
 BLOCK_TICKS: Final = 100
 """Number of ticks in a block: one second of 10 ms ticks."""
 BLOCKS_KEPT: Final = 75
-"""Number of blocks that are kept, which is more than three times the 20 s explained here.
+"""Number of blocks that are kept; together they cover 75 s.
 
-If an adapter's timer and the board's tick differ by 100 ppm, their phases repeat every 20 s.
+If an adapter's timer and the board's tick differ by 100 ppm, their phases repeat every 20 s. So the
+blocks cover several repetitions.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest relative deviation of the board's crystal from the host's: 100 ppm, with a margin."""
 SUPPORT: Final = 0.75
 """Place at which the line touches the hull of the points, as a fraction of their time span.
 
-Late enough to follow recent points, early enough not to follow the jitter of the last second.
+The place is late enough to follow recent points, and early enough not to follow the jitter of the
+last second.
 """
 FEWEST_READS: Final = 12
 """Least number of reads in a block that is enough to find out which of them were late."""

@@ -42,7 +42,7 @@ If an adapter delivers every 16 ms, the phase of the tick at which reads occur r
 reads, so 12 reads see each phase twice.
 """
 CALM: Final = 0.45
-"""Largest distance of a read from the line, as a fraction of a period, at which its tick is sure.
+"""Distance of a read from the line, as a fraction of a period, up to which its tick is sure.
 
 Two reads in a row must be this near to the line. The limit must be less than half a period.
 """
