@@ -165,7 +165,7 @@ class Board(Protocol):
         """Record that this process stalled, so the guard may have sent the stop commands.
 
         The guard is the process that sends ``last_words`` when this process hangs. These
-        commands may also switch off other motors than those of the wheels, such as a brush.
+        commands may also switch off motors that do not drive wheels, such as that of a brush.
         """
         return
 
@@ -253,8 +253,8 @@ class Board(Protocol):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return what the guard sends if this process fails: Stop, and emergency stop with Stop.
 
-        The guard sends the second item if the e-stop is latched. Called after each input and before
-        each output, because what stops a board may depend on its state.
+        The guard sends the second item if the e-stop is latched. This method is called after each
+        input and before each output, because the right packets may depend on the board's state.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -64,7 +64,7 @@ a slow function call."""
 class ModeManager:
     """The requested and the confirmed mode of a board.
 
-    ``run``: whether to start the board whenever it is connected; if not, it keeps its mode.
+    ``run``: whether to start the board whenever it is connected; if not, the mode stays.
     ``answers``: answers to requests that the session has not taken yet.
     """
 

@@ -61,7 +61,7 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """Values from which ``shown`` was computed; it is computed again only if they change."""
+        """Values from which ``shown`` was computed; ``shown`` is computed again if they change."""
 
     @property
     def state(self) -> str:

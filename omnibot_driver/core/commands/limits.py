@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed limits for commands; every limit keeps the direction of motion.
+"""Speed limits for commands; no speed limit changes the direction of the linear velocity.
 
 This module does pure arithmetic on finite numbers; ``require_finite`` rejects NaN and infinity.
 """
@@ -31,7 +31,7 @@ class SpeedLimits:
     angular_radps2: float = 0.0
 
     def stricter_than(self, other: "SpeedLimits") -> bool:
-        """Return whether any speed limit here is lower than the same limit in ``other``."""
+        """Return whether any speed limit is lower than the same limit of ``other``."""
         return (
             self.linear_mps < other.linear_mps
             or self.angular_radps < other.angular_radps

@@ -24,21 +24,21 @@ class EmergencyStop:
 
 @value(frozen=True, slots=True)
 class Drive:
-    """The order to move with this body velocity."""
+    """The order to move with the body velocity ``twist``."""
 
     twist: BodyTwist
 
 
 @value(frozen=True, slots=True)
 class TurnWheels:
-    """The order to turn the wheels at these rates in rad/s, in the order of ``Traits.wheels``."""
+    """The order to turn the wheels at given rates in rad/s, one for each of ``Traits.wheels``."""
 
     rates_radps: tuple[float, ...]
 
 
 @value(frozen=True, slots=True)
 class GoTo:
-    """The order to drive to this pose in the board's earth frame, and stay there."""
+    """The order to drive to the pose ``place`` in the board's earth frame, and stay there."""
 
     place: Pose
 

@@ -3,8 +3,8 @@
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
 A gyro at rest measures only its bias and noise. Three sources show whether the robot is at rest:
-the wheels (displacements whose sum is zero), the gyro (readings that hardly vary) and the
-accelerometer (the same test). Without the wheels, a steady turn is not detected, so the result must
+the wheels (displacements whose sum is zero), and the gyro and the accelerometer (readings that
+hardly vary). Without the wheels, a steady turn is not detected, so the result must
 also be a bias that the sensor's specification allows. The measurement yields the magnitude of
 gravity as well.
 
@@ -95,7 +95,7 @@ class Look:
 
 
 class GyroCalibration:
-    """Calibration of the gyro; ``bias``: its reading at rest, in rad/s.
+    """Calibration of the gyro; ``bias``: the gyro's mean reading at rest, in rad/s.
 
     ``refine``: whether standstills refine the bias. ``answers``: a RequestDone for every
     measurement that came to an end.

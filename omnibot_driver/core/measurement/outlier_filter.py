@@ -3,7 +3,7 @@
 """The outlier filter: rejects physically impossible readings, though their frames are valid.
 
 Two things are impossible: a displacement faster than the robot can move, and a spike. A spike is a
-single reading that leaps away from all readings before it, while the next one leaps back. A leap
+single reading that leaps away from all earlier readings, while the next reading leaps back. A leap
 that lasts, or that is followed by more leaps, is a real shock. So a reading that leaps waits for
 the next one of its kind, which shows whether to release or to reject it. Poses after a waiting
 displacement wait as well; nothing else ever waits.
@@ -195,7 +195,7 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; count the displacements rejected before a pose as its losses.
+        """Return the reading; if it is a pose, add earlier rejected displacements to ``lost``.
 
         The pose includes the motion of the rejected displacements.
         """

@@ -3,8 +3,8 @@
 """The history of set-points, and the velocities of the robot that they explain.
 
 A robot follows a set-point late, and leaves it smoothly. So a set-point that was replaced explains
-its full velocity for ``HELD_S``, and then less and less. This module knows velocities in the
-board's own axes, and times; it does not know how the robot moves.
+its full velocity for ``HELD_S``, and less and less of it afterwards. This module knows velocities in
+the board's own axes, and times; it does not know how the robot moves.
 """
 
 import math

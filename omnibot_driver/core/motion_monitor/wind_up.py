@@ -3,8 +3,8 @@
 """The wind-up of wheel controllers while a robot is held or pushed, and the motion it explains.
 
 The wheel controllers integrate their errors. A robot that is held falls behind its set-point; a
-robot whose set-point is rest may be pushed away. Once released, the robot makes up for that
-distance. It then moves faster than commanded or backwards, even if the command has changed
+robot whose set-point is rest may be pushed away. Once released, the robot makes up for the lost
+distance: it moves faster than commanded, or backwards, even if the command has changed
 meanwhile or is a stop. This module knows velocities; it does not know what is inside the envelope.
 """
 
@@ -21,7 +21,7 @@ MOST_M: Final = 0.6
 LONG_S: Final = 0.06
 """Duration in s from which a displacement is regarded as long.
 
-A single long displacement does not prove that the robot is held, as the robot may have reversed.
+A single long displacement does not prove that the robot is held: the robot may have reversed.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0

@@ -88,7 +88,7 @@ class Odometry:
         self.heading_assumed = False
         """Whether heading 0 was assumed because the board sent no pose."""
         self.alignments = 0
-        """How often the odometry frame has changed its place in the board's frame."""
+        """Number of times that the place of the odometry frame in the board's frame has changed."""
         self._track = PoseTracker(axis_signs)
         self.configure(settings)
         self._board: Pose | None = None
@@ -248,11 +248,11 @@ class Odometry:
         self._board, self._restarted, self._belief.doubted = board, None, None
 
     def _judge(self, told: Pose, confirmed: bool) -> None:
-        """Accept a pose that is reachable and expected, or that confirms the last unexpected one.
+        """Accept a pose that is reachable and expected, or that confirms the last unexpected pose.
 
         A confirmed pose that is out of reach changes the place of the odometry frame in the board's
-        frame; the odometry itself does not change. Any other pose waits for the next one to confirm
-        it.
+        frame; the odometry itself does not change. Any other pose must be confirmed by the next
+        pose.
         """
         assert self._board is not None
         way = self._board.way_to(told)

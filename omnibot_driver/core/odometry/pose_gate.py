@@ -47,7 +47,7 @@ class PoseGate:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Move the unconfirmed pose ``doubted`` along with an assumed motion, in its own axes."""
+        """Move the unconfirmed pose ``doubted`` along with an assumed motion in its axes."""
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)
 

@@ -77,7 +77,7 @@ class PoseTracker:
         move(chord, self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
 
     def miss(self, duration_s: float) -> None:
-        """Add the uncertainty of a gap in the reports, which lasted ``duration_s``."""
+        """Add the uncertainty of a gap in the reports that lasted ``duration_s``."""
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:

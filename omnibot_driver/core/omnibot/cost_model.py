@@ -64,7 +64,7 @@ ENDS_IN_NOISE: Final = 2.0
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 """Cost of an IMU frame, by the number of words that differ much from the frame before.
 
-One such word makes a frame odd; a shock changes several words.
+One word that differs much makes a frame odd; a shock changes several words.
 """
 AFTERSHOCK: Final = 1.5
 """Cost of an odd IMU frame after another odd one, because a shock lasts several frames."""
@@ -111,7 +111,7 @@ DELTAS_MISSED: Final = 2
 
 
 class Context(NamedTuple):
-    """What the earlier frames show, before a frame is judged. None means unknown."""
+    """What is known from earlier frames when a frame is judged. None means unknown."""
 
     imu: ImuFrame | None = None
     seq: int | None = None

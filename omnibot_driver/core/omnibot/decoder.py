@@ -181,7 +181,7 @@ class FrameDecoder:
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
         while at < size:
-            paused = gaps and gaps[-1].first > at  # within the bytes from here on
+            paused = gaps and gaps[-1].first > at  # within the bytes from ``at`` on
             if not paused and size - at >= SHORTEST_RUN:
                 at, context = take_run(held, at, context, expectation, order, walk)
                 if at == size:

@@ -42,7 +42,7 @@ _POSE: Final = {
     "little": struct.Struct("<3fB").unpack_from,
 }
 
-# A frozen object is made in a third of the time from an unfrozen one with the same slots.
+# Making an unfrozen object, and turning it into a frozen one, takes a third of the time.
 UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
     type(kind.__name__, (), {"__slots__": vars(kind)["__slots__"]})
     for kind in (ImuFrame, DeltaFrame, PoseFrame)

@@ -64,7 +64,7 @@ class InterFrameGaps:
         self.doubt()
 
     def doubt(self) -> None:
-        """Stop trusting pauses as signs of an idle line, because earlier pauses may have misled."""
+        """Stop trusting pauses as signs of an idle line: earlier pauses may have other causes."""
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 

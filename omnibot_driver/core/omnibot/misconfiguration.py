@@ -42,7 +42,7 @@ frame. ``TIMES`` limits the ratio of this distance to the distance in the other 
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Least number of consecutive deltas, and their least duration in s, to prove the rate wrong."""
+"""Least number and duration in s of consecutive deltas that prove the configured rate wrong."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}

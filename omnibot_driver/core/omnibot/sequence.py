@@ -73,10 +73,10 @@ class Sequence:
         flipped, or the frame may be false.
         """
         self._left: tuple[int, float, int] | None = None
-        """Last count before a supposed restart, its time in s, and the first count afterwards."""
+        """Last count before a supposed restart, its arrival time in s, and first count after it."""
 
     def pause(self) -> None:
-        """Record that the board paused: its next count continues the old one, or restarts."""
+        """Record that the board paused: its counter may continue, or restart from zero."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:

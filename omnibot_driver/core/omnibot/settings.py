@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The settings of an OmniBot board that its data does not show; only its user knows them."""
+"""The settings of an OmniBot board that the board's data does not show; the user knows them."""
 
 from dataclasses import dataclass, field
 from typing import Literal

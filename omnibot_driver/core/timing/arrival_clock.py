@@ -18,7 +18,7 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time, in increasing order.
 
-    A stamp is later than its arrival time only if the stamp before it already reached that time.
+    A stamp is later than the arrival time only if the previous stamp has already reached that time.
     """
 
     skew_ppm = 0.0
@@ -27,7 +27,7 @@ class ArrivalClock:
         self._stamp_s = -math.inf
 
     def restart(self) -> None:
-        """Do nothing: stamps do not depend on the board, and still increase."""
+        """Do nothing: stamps depend only on arrival times, and continue to increase."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None

@@ -201,7 +201,7 @@ class DeviceClock:
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
-            return 0  # an earlier read saw its first bytes, which show more
+            return 0  # an earlier read brought the tick's first bytes
         lag_s = arrival - line.at(tick)
         period_s, lags_s = self._period_s, self._lags_s
         short = 0
