@@ -24,7 +24,7 @@ NOISE_RADPS: Final = 0.05
 The causes are encoder counts, rounding, and a slope on which a slow controller lets the robot roll.
 """
 SIDEWAYS: Final = 0.1
-"""Fraction of a speed, or of a yaw rate, that is allowed in any direction.
+"""Fraction of a speed, or of a yaw rate, by which motion may deviate in any direction.
 
 The heading is uncertain, and wheels differ. The resulting error is independent of the noise, so the
 squares of both are added.

@@ -3,8 +3,8 @@
 """The history of set-points, and the velocities of the robot that they explain.
 
 A robot follows a set-point late, and leaves it smoothly. So a set-point that was replaced explains
-its full velocity for ``HELD_S``, and less and less of it afterwards. This module knows velocities in
-the board's own axes, and times; it does not know how the robot moves.
+its full velocity for ``HELD_S``, and less and less of it afterwards. This module knows velocities
+in the board's own axes, and times; it does not know how the robot moves.
 """
 
 import math
@@ -33,7 +33,7 @@ Robots with a time constant of up to 0.35 s stay within the envelope.
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored: 2 % of its velocity are left."""
 UNKNOWN_S: Final = 0.8
-"""Time in s after the first known set-point until motion by unknown commands has ended."""
+"""Time in s from the first known set-point until motion by earlier commands has ended."""
 HISTORY_S: Final = 3.0
 """Length of the history in s; displacements arrive later than this only if the computer stalls."""
 

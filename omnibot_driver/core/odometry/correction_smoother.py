@@ -31,7 +31,7 @@ class CorrectionSmoother:
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """Correct ``target`` by ``chord``, in the target's axes; ``pose`` follows in ``spread_s``."""
+        """Correct ``target`` by ``chord``, given in its axes; ``pose`` follows in ``spread_s``."""
         self.target = self.target.moved(chord)
         self._settling_s = spread_s
 
