@@ -52,7 +52,7 @@ class Shutdown:
         """Stop repeating Stop, and demand a new proof that the robot stands still.
 
         The line may have damaged the last Stop, and the board may obey it as another command.
-        Return whether displacements of this board can prove a standstill.
+        Return whether such a proof is possible now.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
             return False

@@ -31,7 +31,7 @@ class Drive:
 
 @value(frozen=True, slots=True)
 class TurnWheels:
-    """The order to turn the wheels at given rates in rad/s, one for each of ``Traits.wheels``."""
+    """The order to turn the wheels at rates in rad/s, in the sequence of ``Traits.wheels``."""
 
     rates_radps: tuple[float, ...]
 

@@ -232,7 +232,11 @@ class CommandPipeline:
         return f" (commanded {commanded}; measured {measured})"
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
-        """Drop a goal if ``odom`` was reset or the robot drives away from it; return notices."""
+        """Drop a goal that is no longer valid or is being left; return notices for the user.
+
+        A goal is valid until the odometry frame moves within the board's frame. It is being left
+        if the robot drives away from it.
+        """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):
             return []
