@@ -241,7 +241,7 @@ class CommandPipeline:
         if not isinstance(goal, GoalSetpoint):
             return []
         if goal.alignment != self._odometry.alignments:
-            why = "odom was reset to a new origin"
+            why = "the origin of odom has changed, by ~/reset_odometry or a restart of the board"
         elif any(
             goal.is_left_by(estimate.pose)
             for estimate in estimates

@@ -50,8 +50,7 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """When a base command follows wheel commands, Stop is sent first, then the newest base command.
-    """
+    """When a base command follows wheel commands, Stop is sent first, then the newest base command."""
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)
@@ -129,8 +128,7 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """Each new command continues the ramp of the command before it; a set point is due every 18 ms.
-    """
+    """Each new command continues the ramp of the command before it; a set point is due every 18 ms."""
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)

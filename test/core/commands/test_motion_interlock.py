@@ -20,8 +20,7 @@ def test_motion_is_allowed_until_something_trips() -> None:
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """The refusal ends after a timeout without commands; each refused command restarts the timeout.
-    """
+    """The refusal ends after a timeout without commands; each refused command restarts the timeout."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -74,8 +73,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """A release of the e-stop ends the refusal after the second trip, but not after the first trip.
-    """
+    """A release of the e-stop ends the refusal after the second trip, but not after the first trip."""
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

@@ -89,8 +89,7 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """A speed that the new scale rounds to 0 is sent as Stop; zeros in mode 1 have another meaning.
-    """
+    """A speed that the new scale rounds to 0 is sent as Stop; zeros in mode 1 have another meaning."""
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)

@@ -108,8 +108,7 @@ def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
 
 
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
-    """With its switch on position, the board would take 0.3 m/s for a goal 21 mm from its origin.
-    """
+    """With its switch on position, the board would take 0.3 m/s for a goal 21 mm from its origin."""
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
         with pytest.raises(CommandRefused, match="`control_method` is 'position'"):
@@ -192,8 +191,7 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """A halt on the way to a goal sends Stop; zeros in mode 1 would send the robot to its origin.
-    """
+    """A halt on the way to a goal sends Stop; zeros in mode 1 would send the robot to its origin."""
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)

@@ -47,8 +47,7 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """With displacements every 0.4 s, the first one after Stop may contain motion from before it.
-    """
+    """With displacements every 0.4 s, the first one after Stop may contain motion from before it."""
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
     proof.look(rare, 10.3)
@@ -114,8 +113,7 @@ def test_a_robot_that_moves_is_not_proved_to_stand(
 
 
 def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) -> None:
-    """A displacement of unknown duration, such as the first one after a pause, does not prove rest.
-    """
+    """A displacement of unknown duration, such as the first one after a pause, does not prove rest."""
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
         proof.look(unknown, 10.1 + number * PERIOD_S)
@@ -168,8 +166,7 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
-    """The board misses Stop and drives on; the motion monitor, which would report it too, is off.
-    """
+    """The board misses Stop and drives on; the motion monitor, which would report it too, is off."""
     bench = driving()
     bench.configure(motion_monitor=False)
     bench.hears = False

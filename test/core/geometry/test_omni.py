@@ -61,8 +61,7 @@ def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base
 def test_body_and_back_is_the_same_wheels(
     rates: tuple[float, float, float], radius: float, base: float
 ) -> None:
-    """Converting wheel rates to a twist and back loses nothing: both have three degrees of freedom.
-    """
+    """Converting wheel rates to a twist and back loses nothing: both have three degrees of freedom."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     assert kinematics.wheel_rates(kinematics.body_twist(rates)) == close(rates, rel=1e-9, abs_=1e-7)
 
@@ -79,7 +78,6 @@ def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
 
 
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
-    """At 1 rad/s to the left each rim moves at −L; the manual's «rotate all» command turns right.
-    """
+    """At 1 rad/s to the left each rim moves at −L; the manual's «rotate all» command turns right."""
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

@@ -92,8 +92,7 @@ def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
 
 @pytest.mark.parametrize("state", ["disconnected", "paused"])
 def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> None:
-    """On a closed port or a paused board, a calibration is refused with the advice to call again.
-    """
+    """On a closed port or a paused board, a calibration is refused with the advice to call again."""
     bench = running()
     if state == "paused":
         bench.ask(Request.PAUSE, 5.0)
@@ -158,8 +157,7 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """With ``auto_gyro_bias``, the bias moves half the distance in 15 s at rest, and not in motion.
-    """
+    """With ``auto_gyro_bias``, the bias moves half the distance in 15 s at rest, and not in motion."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)

@@ -56,8 +56,7 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """After a reset, odom is right except for the displacement under way, which is at most 20 mm.
-    """
+    """After a reset, odom is right except for the displacement under way, which is at most 20 mm."""
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)

@@ -130,8 +130,7 @@ def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
 def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
-    """A shock that rings is delivered, because the force does not return to its old value at once.
-    """
+    """A shock that rings is delivered, because the force does not return to its old value at once."""
     readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
     through = gate()
     assert list(chain(*admitted(readings, through))) == readings
@@ -157,8 +156,7 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement above 2 m/s or 8 rad/s is rejected; the next displacement counts it as lost.
-    """
+    """A displacement above 2 m/s or 8 rad/s is rejected; the next displacement counts it as lost."""
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
     assert came == [[ahead()], [], [ahead(lost=4)], [ahead()]]
@@ -173,8 +171,7 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """A jump from 0.25 to 1.5 m/s and back within 80 ms is rejected; a pose waits for the decision.
-    """
+    """A jump from 0.25 to 1.5 m/s and back within 80 ms is rejected; a pose waits for the decision."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]

@@ -31,8 +31,7 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """A motion limit is too low, but is corrected before the motion monitor is switched on again.
-    """
+    """A motion limit is too low, but is corrected before the motion monitor is switched on again."""
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
         bench.configure(motion_monitor=False, motion=limits)

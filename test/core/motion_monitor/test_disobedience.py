@@ -59,8 +59,7 @@ DISOBEYING = {
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """The robot is stopped within 0.3 s; the log contains the measured velocity and what to check.
-    """
+    """The robot is stopped within 0.3 s; the log contains the measured velocity and what to check."""
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -178,8 +177,7 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """If leaving the goal did not trip, a node that repeats goals could restart the robot for ever.
-    """
+    """If leaving the goal did not trip, a node that repeats goals could restart the robot for ever."""
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)

@@ -192,8 +192,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """A robot held for 1 s at 0.4 m/s may catch up 0.4 m, because its wheel controllers integrate.
-    """
+    """A robot held for 1 s at 0.4 m/s may catch up 0.4 m, because its wheel controllers integrate."""
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
     drive.move((0.4, 0.0, 0.0), 1.0)
@@ -204,8 +203,7 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """A robot pushed at rest may be moved back by wound-up wheel controllers at the next command.
-    """
+    """A robot pushed at rest may be moved back by wound-up wheel controllers at the next command."""
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)

@@ -20,8 +20,7 @@ def bench() -> Bench:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
-    """A robot that does not move is reported once; in this case its switch is on position control.
-    """
+    """A robot that does not move is reported once; in this case its switch is on position control."""
     bench = started(BoardSettings(running=True, control="position"), control="velocity")
     for _ in range(10):
         drive_on(bench)
@@ -112,8 +111,7 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
 
 
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """For a pushed robot, Stop is sent at once, then ever more rarely; a later command is obeyed.
-    """
+    """For a pushed robot, Stop is sent at once, then ever more rarely; a later command is obeyed."""
     bench = standing()
     bench.board.grip(0.3, 0.0, 0.2)
     start = len(bench.written)

@@ -28,8 +28,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def minors(c: Covariance) -> Triple:
-    """Return the leading principal minors of ``c``; all are positive if ``c`` is positive definite.
-    """
+    """Return the leading principal minors of ``c``; all are positive if ``c`` is positive definite."""
     first = c.xx
     second = c.xx * c.yy - c.xy**2
     third = (
