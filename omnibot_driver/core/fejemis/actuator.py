@@ -2,9 +2,9 @@
 
 """The set-point stream for both boards, which repeats the motion lines.
 
-While the encoder limits the drive board's speed, each new angle of the front wheel may allow more
-speed. So, during this time, the stream sends the lines again with each new angle, not only at the
-repetition rate. The module decides when a line is due, not what the line contains.
+While ``Encoder`` limits the drive board's speed, each new angle of the front wheel may allow more
+speed. So, while the speed is limited, the stream sends the motion lines with each new angle, and
+not only at the repetition rate. The module decides when a line is due, not what the line contains.
 """
 
 import math
@@ -33,12 +33,12 @@ class PairStream(SetpointStream):
         super().__init__(encoder, proof)
 
     def connect(self) -> None:
-        """Begin a new connection, on which motion has not been commanded yet."""
+        """Begin a new connection; no motion is commanded yet."""
         self.driving = False
         super().connect()
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the set-point, and notify the listener whether it is an emergency stop."""
+        """Replace the set-point, and tell the listener whether the new one is an emergency stop."""
         is_stop = wanted is None or isinstance(wanted, Stop | EmergencyStop)
         self.driving = not is_stop and not wanted.is_zero  # type: ignore[union-attr]
         self._listener.wanted(estop=isinstance(wanted, EmergencyStop))

@@ -3,14 +3,14 @@
 """The front wheel's angle as a line for the drive board, in digits that make damage detectable.
 
 If two characters whose codes add up to 99 are lost, the sum (checksum) of a line does not change.
-So the driver sends an angle in digits without such a pair, and for this rounds it by half a degree
-at most. The rounding error is added to the next angles, so the mean is right. Some angles to the
-right contain a ``6`` that rounding cannot avoid. If the minus sign and this ``6`` are both lost,
-the sum does not change, and the board receives an angle of less than 10° to the left.
+So the driver sends an angle in digits without such a pair; to get these digits, it rounds the angle
+by at most half a degree. The rounding error is added to the next angles, so the mean is right. Some
+angles to the right contain a ``6`` that rounding cannot avoid. If the minus sign and this ``6`` are
+both lost, the sum does not change, and the board receives an angle of less than 10° to the left.
 
-Without sums, the board does not detect any loss. So the driver sends whole degrees: a loss then
-never makes the number larger, so it never exceeds 90°. Beyond 90°, the board would compute an inner
-wheel that is faster than the outer one.
+Without sums, the board does not detect any loss. So the driver sends whole degrees: the loss of a
+digit never makes a whole number larger, so the received angle never exceeds 90°. Beyond 90°, the
+board would compute an inner wheel that is faster than the outer one.
 """
 
 import math
@@ -28,7 +28,8 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Limit in degrees for a damaged angle to the right that arrives as an angle to the left."""
+"""If damage turns an angle to the right into an angle to the left, the latter must be smaller than
+this number of degrees."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
@@ -48,7 +49,11 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """Yield the value of ``text`` after each undetected loss of two characters; 0 if unreadable."""
+    """Yield each number that a board may read instead of ``text`` if two characters are lost.
+
+    Only losses that the sum does not detect are included. A remaining text that is not a number
+    gives 0.
+    """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
             found = _NUMBER.match(text[:i] + text[i + 1 : j] + text[j + 1 :])

@@ -61,7 +61,7 @@ class FejemisBoard(Board):
 
     @property
     def traits(self) -> Traits:  # type: ignore[override]
-        """The board's traits; each channel has the name of the board found at it."""
+        """The robot's traits; each channel has the name of the board that was found at its port."""
         return self._ports.traits
 
     @property
@@ -161,16 +161,17 @@ class FejemisBoard(Board):
         self._upkeep.machine.off()
 
     def stalled(self) -> None:
-        """Switch brush and lift off after a stall of the driver, as the guard may have done so.
+        """Switch brush and lift off after a stall of the driver.
 
-        A stall of the driver does not make the boards appear silent.
+        The guard process may already have switched them off during the stall. The time of the stall
+        is not regarded as silence of the boards.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 
     def leave(self) -> None:
-        """Switch brush and lift off, as the driver ends; the wheels may take longer to stop."""
+        """Switch brush and lift off at once, as the driver ends; the wheels may stop later."""
         self._upkeep.machine.off()
 
     def elapse(self, now: float) -> list[Reading]:
@@ -214,7 +215,7 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Take a new order: latch the e-stop if the order is an e-stop, else release it."""
+        """Take a new order: latch the e-stop if the order is an e-stop, else release the e-stop."""
         if not estop:
             self._obedience.release(self._now)
         elif not self._obedience.estopped:
@@ -224,7 +225,7 @@ class FejemisBoard(Board):
             self._upkeep.jobs.interrupt(why)
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """Return these lines as packets for the two boards."""
+        """Return the two lines as packets, one for each board."""
         return self._ports.line("drive", drive) + self._ports.line("front", front)
 
     def stop(self) -> Packets:
@@ -251,7 +252,8 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
-        """Forget the faults of the front wheel, and cancel a power off, even during an e-stop."""
+        """Forget faults of the front wheel and cancel a requested power-off, even during an
+        e-stop."""
         self._encoder.follower.start()
         self._upkeep.jobs.keep_power()
 
@@ -266,7 +268,7 @@ class FejemisBoard(Board):
         return self.stop() + self._ports.line("drive", b"start")
 
     def pause(self) -> Packets:
-        """Return the packets that stop the motion and pause the drive board; end brush and lift."""
+        """Return a Stop and the pause of the drive board; switch brush and lift off."""
         self._obedience.pause()
         self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
         self._upkeep.machine.off()

@@ -51,7 +51,7 @@ class Configuration:
         self._once: dict[str, tuple[float, ...]] = {}
         """The last reported numbers by keyword, even if a second reading has not confirmed them."""
         self.turned = False
-        """Whether the board's ``confs`` begins with the track; the help text shows it last."""
+        """Whether the board's ``confs`` begins with the track, which is last in the help text."""
         self.written = written
         self.begin()
 
@@ -78,18 +78,18 @@ class Configuration:
 
     @property
     def failed(self) -> list[Written]:
-        """Settings that the board does not report as written; empty while writing continues."""
+        """Settings that the board has not confirmed; empty while they are still being written."""
         return self._unwritten() if self._next_at == math.inf else []
 
     @property
     def pending(self) -> bool:
-        """Whether the board is new, may lack the user's settings, and must not be driven."""
+        """Whether the board is new: it may lack the user's settings, and must not be driven."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new
 
     def due(self, now: float, *, stands: bool) -> list[bytes]:
-        """Return the lines to send now; settings are written only if ``stands`` (at rest)."""
+        """Return the lines to send now; settings are written only if the robot ``stands``."""
         if now < self._next_at:
             return []
         missing, unwritten = self._missing(), self._unwritten()
@@ -179,7 +179,7 @@ def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
 
 
 def _near(told: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
-    """Return whether the numbers read back equal the wanted ones within the printed digits."""
+    """Return whether the numbers read from the board equal the wanted ones, except for rounding."""
     return len(told) >= len(wanted) and all(
         abs(one - other) <= max(DIGIT, NEAR * abs(other))
         for one, other in zip(told, wanted, strict=False)

@@ -113,7 +113,7 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """Learn from a heartbeat whether lines have sums; boards send it without a request."""
+        """Learn whether lines have sums from a heartbeat, which a board sends without a request."""
         if self._line_sums != "auto":
             self.contradicted = with_sum is not self.sums
             return

@@ -2,7 +2,7 @@
 
 """Converts an order into lines for both boards, given the front wheel's angle.
 
-The caller passes the packets that it sends to ``meaning``. With this call, the encoder notes the
+The caller calls ``meaning`` with all packets that it sends. In this call, the encoder notes the
 angle that the front wheel must reach, and whether the drive board's speed is limited. The module
 knows geometry and lines, not when the lines are sent.
 """
@@ -51,7 +51,7 @@ class Pair(Protocol):
         """Return the packets of the boards' own emergency stop."""
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """Return these lines as packets for the two boards."""
+        """Return the two lines as packets, one for each board."""
 
     @property
     def with_sums(self) -> bool:
@@ -64,9 +64,8 @@ class Pair(Protocol):
 class Encoder:
     """Encodes orders; ``held``: the speed is limited, as the front wheel is not at its angle yet.
 
-    ``restless``: whether to send the lines again with each front angle. This is True while the
-    speed is limited. It is also True if lines have no checksums: a damaged line is then replaced
-    after 15 ms.
+    ``restless``: whether to send the lines again with each front angle: while the speed is limited,
+    and always if lines have no checksums, so that a damaged line is replaced after 15 ms.
     """
 
     def __init__(self, pair: Pair, settings: FejemisSettings) -> None:
@@ -95,7 +94,7 @@ class Encoder:
         return self._pair.emergency_stop()
 
     def encode(self, order: Order) -> Packets:
-        """Return the lines of the order. Raises CommandRefused if the robot cannot obey it."""
+        """Return the lines for ``order``. Raises CommandRefused if the robot cannot obey it."""
         match order:
             case Drive(twist):
                 return self._drive(twist)
@@ -106,10 +105,10 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the body twist that these packets command at the present front angle.
+        """Return the body twist that ``packets`` command at the present front angle.
 
-        Take note that the packets are sent. The twist is zero unless the packets are the last
-        result of ``encode`` for an order to move.
+        The encoder also notes that ``packets`` are sent. The twist is zero unless ``packets`` are
+        the last result of ``encode`` for an order to move.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

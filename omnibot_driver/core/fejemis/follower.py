@@ -2,21 +2,22 @@
 
 """Check that the front wheel follows its commanded angle; if not, motion is refused.
 
-Without the refusal, a node that continues to send commands would move the robot for a second, again
-and again. After a first fault, motion is refused until the wheel has moved; after a second fault
-within 60 s, until ~/start is called. The module knows only angles and times.
+Without the refusal, a node that continues to send commands would move the robot again and again,
+each time for a second. After a first fault, motion is refused until the wheel has moved; after a
+second fault within 60 s, until ~/start is called. The module knows only angles and times.
 """
 
 import math
 from typing import Final
 
 FOLLOWS_WITHIN_S: Final = 1.0
-"""Time in s within which the front wheel must get nearer to its angle; else it does not follow."""
+"""Time in s within which the front wheel must get nearer to its commanded angle; otherwise a fault
+is found."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
-"""Deviation in rad up to which the wheel is regarded as following, while the robot drives."""
+"""Deviation in rad from the commanded angle that is not a fault while the robot drives."""
 MOVED_RAD: Final = math.radians(3.0)
-"""Rotation in rad of a stuck wheel after which motion is allowed again."""
+"""Angle in rad by which a stuck wheel must turn before motion is allowed again."""
 AGAIN_WITHIN_S: Final = 60.0
 UNTIL_IT_MOVES: Final = (
     "the front wheel did not go where it was commanded; check the servo and its power. Motion is"

@@ -2,7 +2,7 @@
 
 """The form of each kind of line: how many fields, and how many decimals each number has.
 
-A board always prints a kind of line in the same form, so a line in another form has lost or gained
+A board prints all lines of one kind in the same form, so a line in another form has lost or gained
 characters. The form of each kind is learnt from its lines; a new form replaces the learnt one after
 three lines in a row. A kind whose form keeps changing is not checked. The module does not know the
 meaning of a line.
@@ -13,7 +13,8 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Count of deviating lines, among ``OF`` lines of a kind, after which the kind is not checked.
+"""Count of deviating lines, among ``OF`` lines of a kind, after which the kind is no longer
+checked.
 
 Lines with a correct sum are rarely damaged, so for them the smaller ``VARIES`` is enough."""
 OF: Final = 24
@@ -65,7 +66,7 @@ class _Kind:
 
 
 def _shape(field: bytes) -> int:
-    """Return the count of decimals; -1 for a whole number, -2 for anything else."""
+    """Return the count of decimals; -1 for a whole number, -2 for a field that is not a number."""
     whole, point, after = field.partition(b".")
     if not point:
         return -1 if whole.lstrip(b"+-").isdigit() else -2

@@ -11,12 +11,13 @@ from typing import Final
 from omnibot_driver.core.fejemis.messages import FrontAngle
 
 OLDEST_S: Final = 0.06
-"""Age of the last angle in s after which the robot is stopped: four periods of ``fwl``."""
+"""The robot is stopped when the last angle is older than this time in s: four periods of
+``fwl``."""
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all but the frame counter."""
 SICK_LINES: Final = 3
-"""Lines in a row that must report a fault of the sensor; fewer may be damaged lines."""
+"""Number of lines in a row that must report a fault of the sensor, as a few may be damaged."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Accepted jump of the angle in degrees, in addition to the motion of the fastest servo."""
@@ -33,7 +34,7 @@ BITS: Final = (
     (1, True, "magneto core loops not finished"),
     (0, False, "supply in 5 V mode"),
 )
-"""Diagnosis bits: number, expected value, and the meaning of the other value (manual, fwl)."""
+"""For each diagnosis bit (manual, fwl): number, value without a fault, and name of the fault."""
 
 
 class FrontWheel:
@@ -44,7 +45,7 @@ class FrontWheel:
 
     def __init__(self) -> None:
         self.refused = 0
-        """Count of rejected angles, which the wheel cannot have reached."""
+        """Count of angles that were rejected because the wheel cannot have reached them."""
         self.begin()
 
     def begin(self) -> None:

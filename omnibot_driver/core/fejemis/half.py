@@ -35,8 +35,8 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """Subscribed streams of each board, with their periods in ms.
 
-``confs`` is subscribed, not requested: a request ``confsi`` that loses its last letter sets the
-geometry to zero."""
+``confs`` is subscribed, not requested: if the request ``confsi`` loses its last letter, the board
+reads it as a command that sets the geometry to zero."""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """The stream of each board without which the robot must not be driven."""
 TOGETHER: Final = ("gyro", "acc")
@@ -45,7 +45,7 @@ AGAIN_S: Final = 0.5
 ASK_AGAIN_S: Final = 0.1
 """Time between two requests for the heartbeat in s, while a restart cannot be ruled out."""
 MANY: Final = 30
-"""Number of damaged or unknown lines per second up to which the user is not notified.
+"""Number of damaged or unknown lines per second above which the user is notified.
 
 A board sends a few hundred lines per second.
 """
@@ -84,7 +84,8 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the stream in ``NEEDED`` arrives, and the board has not restarted since."""
+        """Whether the stream in ``NEEDED`` arrives, and the board has not restarted since it
+        began."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -106,9 +107,9 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in these bytes; the caller handles each before it requests the next.
 
-        A message may change the state of the half: after a restart, earlier times are forgotten.
-        Messages with an implausible board time are left out, and so are poses before the first
-        heartbeat.
+        A message may change the state of the half: if it shows a restart, the half forgets earlier
+        times of the board. Messages with an implausible board time are left out, and so are poses
+        before the first heartbeat.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):
@@ -245,7 +246,7 @@ class Half:
 
 
 def keyword_of(message: Message) -> str:
-    """Return the stream's keyword of a message; empty for heartbeats and unsubscribed messages."""
+    """Return the keyword of the stream to which a message belongs; empty if it is in no stream."""
     if isinstance(message, Distance):
         return message.keyword
     return _KEYWORDS.get(type(message).__name__, "")

@@ -61,8 +61,9 @@ class ImuSamples:
     def sampled_s(self, arrived_s: float, not_before_s: float, skipped: int) -> float:
         """Return the board's time of the next sample, in s.
 
-        ``arrived_s``: its arrival in the board's time. ``not_before_s``: the board's time of the
-        pose that came before it. ``skipped``: count of samples before it that were left out.
+        ``arrived_s``: the sample's arrival in the board's time. ``not_before_s``: the board's time
+        of the pose that came before the sample. ``skipped``: count of samples before this one that
+        were left out.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()

@@ -34,17 +34,21 @@ PAIR_WITHIN_S: Final = 0.005
 """Delay in s between two lines up to which they are a pair without further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Evidence for an order, as a sum of pauses in s: when the order is known, and the largest sum."""
+"""The evidence for which line comes first is a sum of pauses in s. From the sum ``KNOWN_S`` on, the
+order is known; ``SUREST_S`` is the largest sum."""
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that another periodic line between two lines adds: a cycle ended between them."""
+"""Evidence in s that is added if another periodic line comes between a gyro and an acceleration
+line, because a control cycle has then ended between them."""
 PATIENCE: Final = 60
 """Count of lines after which the order is decided even if the evidence is weak.
 
 Neither order gains evidence if the board sends both lines half a period apart."""
 MOST: Final = 10
-"""Limit for the count of lines of a kind outside of pairs, minus the count within pairs."""
+"""Limit, positive and negative, of a difference of counts: lines of a kind that came outside of
+pairs, minus lines of the kind that came within pairs."""
 UNPOSED: Final = 20
-"""A pair that waits for the next pose is rejected after more lines of one kind than this."""
+"""Largest count of gyro or acceleration lines for which a pair waits for the next pose; after more
+lines, the pair is rejected."""
 
 
 @dataclass(slots=True)
@@ -101,7 +105,7 @@ class ImuPairs:
         self._line("acc", acceleration, now)
 
     def other(self, kind: str) -> None:
-        """Take a line of another kind, which the board sends with every second sample."""
+        """Take a line other than gyro and acceleration; it is sent with every second sample."""
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
             self._waiting = None
@@ -128,7 +132,10 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return the decided items; call this after a pose and at the end of a read."""
+        """Return the decided pairs and the orientations among them, in order of arrival.
+
+        Called after a pose and at the end of a read.
+        """
         taken: list[Pair | Oriented] = []
         while self._queue:
             item = self._queue[0]
@@ -195,7 +202,7 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Record that lines of these kinds came outside (1) or within (-1) a pair."""
+        """Record that lines of these ``kinds`` came outside (``step`` 1) or within (-1) a pair."""
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))
 

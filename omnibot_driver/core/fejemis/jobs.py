@@ -29,9 +29,11 @@ AGAIN_S: Final = 0.4
 SAID: Final = 3
 """How many times a request is sent, except for a calibration."""
 UNCHANGED_S: Final = 2.4
-"""Time in s after which a calibration with unchanged offsets is regarded as not received."""
+"""If the offsets are unchanged this time in s after the request for a calibration, the request is
+regarded as lost."""
 CALIBRATIONS: Final = 2
-"""How many times a calibration is requested while the offsets are unchanged."""
+"""Largest number of requests for one calibration; it is requested again while the offsets are
+unchanged."""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {

@@ -2,9 +2,10 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-Moving parts are switched on only by a call, and never for longer than requested: the lift runs for
-the time that is sent with its voltage. An e-stop, a pause or a lost board switches brush and lift
-off. The board does not acknowledge lines, so lines for brush and lights are sent several times.
+Moving parts are switched on only at the user's request, and never for longer than requested: the
+lift runs for the time that is sent with its voltage. An e-stop, a pause or a lost board switches
+brush and lift off. The board does not acknowledge lines, so lines for brush and lights are sent
+several times.
 """
 
 import math
@@ -24,12 +25,13 @@ PACE_S: Final = 0.05
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest fraction of the wanted voltage that may be sent so that the sum detects damage."""
+"""Smallest fraction of the wanted voltage that the driver sends: it reduces the voltage if the sum
+of a line with the wanted voltage does not detect damage."""
 LEAST_TIME_S: Final = 0.04
 
 
 class Machine:
-    """State of brush, lift and lights; ``brush``: whether it is on.
+    """State of brush, lift and lights; ``brush``: whether the brush is on.
 
     ``volts``: voltage of the lift in V, 0 once its time is over.
     """
@@ -41,7 +43,8 @@ class Machine:
         self._lift_line = b""
         """Line for the lift that is still to be sent; empty if the last line was sent."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """Times in s: when the line is sent, when the next may follow, and when the lift stops."""
+        """Times in s: when to send ``_lift_line``, when the next lift line may follow, and when the
+        lift stops."""
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf
@@ -102,7 +105,7 @@ class Machine:
         self._next_at = -math.inf
 
     def switch_off(self) -> list[bytes]:
-        """Switch brush and lift off; return the lines for it.
+        """Switch brush and lift off; return the lines that do so.
 
         The lines also let the board show its own lights again.
         """
@@ -148,7 +151,7 @@ class Machine:
 
 
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
-    """Return a ``motv`` line whose sum detects damage, and how long the lift runs by it, in s."""
+    """Return a ``motv`` line whose sum detects damage, and the run time in the line, in s."""
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)

@@ -31,7 +31,7 @@ ANGLE_COST: Final = 1e4
 SLOWEST: Final = 30.0
 """Largest ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
 SCALES: Final = 4.0
-"""Largest factor between a number for the front board and the commanded one."""
+"""Largest factor between a number in the front board's line and the commanded number."""
 Candidate = tuple[float, str, str]
 """A possible line: cost, and texts of the speed (m/s) and turn rate (degrees/s) without signs."""
 

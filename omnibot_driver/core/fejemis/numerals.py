@@ -3,10 +3,10 @@
 """Numbers that can be written without any two characters whose joint loss a sum does not detect.
 
 A sum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or ``-``
-and ``6``. Each line contains the number ``2`` (the source of the command), so the numbers here do
-not contain ``1``. They also do not contain ``3`` or ``5``. In a line with a minus sign, they do not
-contain ``6`` either. So there are gaps between the numbers; the largest gap, relative to the
-number, is from 1 to 2.
+and ``6``. Each line contains the number ``2`` (the source of the command), so the numbers of this
+module do not contain ``1``. They also do not contain ``3`` or ``5``. In a line with a minus sign,
+the numbers do not contain ``6`` either. So there are gaps between the numbers; the largest gap,
+relative to the number, is from 1 to 2.
 """
 
 from bisect import bisect_left, bisect_right
@@ -21,7 +21,7 @@ LARGEST: Final = 4
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return all numbers of this kind from 0.0001 to 10000 in rising order, and their texts.
+    """Return all writable numbers from 0.0001 to 10000 in rising order, and their texts.
 
     ``negative``: the line has a minus sign.
     """
@@ -41,7 +41,7 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
     """Return the number of ``numerals`` nearest to a positive ``number``, with its text.
 
-    ``down``: return the nearest that is not above ``number``, if such a number exists.
+    ``down``: return the nearest one that is not above ``number``, if there is one.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds from heartbeats whether the drive board obeys, and tells a pause from the driver's e-stop.
+"""Finds from heartbeats whether the drive board obeys; distinguishes a pause from an e-stop.
 
-The driver sends ``stop`` to the board in both cases. The driver's own e-stop is not regarded as a
-pause: after its release, ``start`` is sent until the heartbeat shows that the board obeys. A pause
-remains until the user calls start. The module knows times and rcSource (the source of commands that
-the board obeys, by its own report), not lines.
+For a pause and for its own e-stop, the driver sends ``stop`` to the board. After the release of the
+e-stop, the driver sends ``start`` until the heartbeat shows that the board obeys. A pause remains
+until the user calls start. The module knows times and rcSource (the source of commands that the
+board obeys, by its own report), not lines.
 """
 
 import math
@@ -57,7 +57,7 @@ class Obedience:
         self.start_at = math.inf
 
     def release(self, now: float) -> None:
-        """Release the driver's e-stop; ``start`` is due if the board obeyed before it."""
+        """Release the driver's e-stop; ``start`` is due if the board obeyed before the e-stop."""
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf
         self.estopped = False

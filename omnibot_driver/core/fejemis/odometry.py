@@ -1,15 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry from poses and wheel speeds of the drive board: displacements.
+"""Displacements of the robot, from poses and wheel speeds of the drive board.
 
-A pose is absolute, but has few digits: with steps of 1 mm every 20 ms, a speed has steps of 0.05
-m/s. The wheel speeds show the motion more finely. So a displacement is the integral of the speeds
-between two poses, corrected towards the newer pose. If the integral and the difference of the poses
-differ by more than rounding, lines were lost or a wheel was turned quickly; then the displacement
-is the difference of the poses. The displacements add up to the pose.
+A pose is absolute, but has few digits: with steps of 1 mm every 20 ms, a speed from two poses has
+steps of 0.05 m/s. The wheel speeds show the motion more finely. So a displacement is the integral
+of the speeds between two poses, corrected towards the newer pose. If the integral and the
+difference of the poses differ by more than rounding, lines were lost or a wheel was turned quickly;
+then the displacement is the difference of the poses. The displacements add up to the pose.
 
-A pose that the robot cannot have reached is held back until the next pose comes. If the two agree,
-either the pose before both was wrong, or the board has begun a new frame (command ``enc0``).
+A pose that the robot cannot have reached is held back until the next pose comes. If both poses
+agree, either the last accepted pose was wrong, or the board has begun a new frame (command
+``enc0``).
 """
 
 import math
@@ -22,7 +23,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 DRAWN: Final = 0.25
 """Fraction of the difference between pose and speeds that one displacement corrects.
 
-It applies if rounding alone explains the difference.
+The fraction applies if rounding alone explains the difference.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference, in units of the last digit sent, that is explained by rounding.
@@ -88,7 +89,8 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement up to this pose, and every 0.2 s the sum of all displacements.
 
-        The sum is a pose. It corrects for displacements that a later check rejects.
+        The sum is returned as a pose. If a later check rejects a displacement, the pose still
+        contains it.
         """
         displacement = self.pose(pose, now)
         if displacement is None:
@@ -191,7 +193,7 @@ def _place(pose: BoardPose) -> Pose:
 
 
 def _possible(way: Pose, seconds: float) -> bool:
-    """Return whether a robot can move this far in this time."""
+    """Return whether a robot can make the motion ``way`` in this time."""
     return (
         way.way_m <= FASTEST_MPS * seconds + SLACK_M
         and abs(way.yaw_rad) <= FASTEST_RADPS * seconds + SLACK_RAD

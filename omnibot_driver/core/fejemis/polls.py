@@ -19,9 +19,9 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
         b"cvsteeri", b"bati",
     ),
 }  # fmt: skip
-"""Requests for each board, sent in this order, repeatedly."""
+"""Requests for each board; they are sent repeatedly, in the order of the list."""
 WITH_SUMS: Final = (b"svpi", b"svjti")
-"""Requests sent only with a sum: if their last letter is lost, they are commands to the servo."""
+"""Requests sent only with a sum: without their last letter, they would be commands to the servo."""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1
 

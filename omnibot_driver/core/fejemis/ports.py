@@ -32,7 +32,7 @@ class Ports:
 
     @property
     def traits(self) -> Traits:
-        """The board's traits; each channel has the name of the board found at it."""
+        """The robot's traits; each channel has the name of the board that was found at its port."""
         return SWAPPED if self.swapped else TRAITS
 
     def begin(self, settings: FejemisSettings) -> None:

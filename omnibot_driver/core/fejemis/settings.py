@@ -17,7 +17,7 @@ class Written(Enum):
     WHEELS = "confw", 5
     """Radius of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
     STEERING = "confs", 2
-    """Track and distance of the steered wheel from the axle, in m; on both boards."""
+    """Track and distance of the steered wheel from the axle, in m; written to both boards."""
     FRONT_WHEEL = "fwoffset", 2
     """Offset of the front angle in degrees, and 1 if the angle is inverted, else 0."""
     INFRARED = "irc", 4

@@ -22,7 +22,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Target angle of the front wheel in rad from which the command is a turn on the spot."""
+"""Smallest target angle of the front wheel, in rad, at which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
 """Deviation of the front wheel from its target, in rad, up to which a turn on the spot continues.
@@ -106,7 +106,7 @@ def steer(
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
     """Return the body's twist from the outer wheel's speed and the front angle.
 
-    The equations are the manual's. A negative ``outer_mps`` is backward.
+    The equations are those of the manual. A negative ``outer_mps`` is backward.
     """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)

@@ -15,9 +15,11 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Longest time in s by which a line may seem to arrive early; else its time is implausible."""
+"""Longest time in s by which a line may seem to arrive before it was sent; if it seems to arrive
+earlier, the board time in the line is implausible."""
 LATE_S: Final = 1.0
-"""Longest delay of a line in s, even if the host was busy; else its time is implausible."""
+"""Longest delay of a line in s, even if the host was busy; if the delay seems longer, the board
+time in the line is implausible."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
@@ -120,7 +122,11 @@ class StampedReadings:
         self._stamps: list[float] = []
 
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
-        """Add a reading; move ``stamp_s`` if it is after ``now`` or not after the last one."""
+        """Add a reading with the timestamp ``stamp_s``.
+
+        The timestamp is changed if it is after ``now``, or not after the last one of the same kind
+        of reading.
+        """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         stamp_s = min(stamp_s, now)
         last_s = self._last.get(kind)
@@ -136,7 +142,10 @@ class StampedReadings:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the timestamps of the added readings; ``now`` for each if the counts differ."""
+        """Return the timestamps of the added readings.
+
+        If their count is not that of ``readings``, return ``now`` for each of ``readings``.
+        """
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
