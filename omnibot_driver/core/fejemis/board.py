@@ -252,8 +252,7 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
-        """Forget faults of the front wheel and cancel a requested power-off, even during an
-        e-stop."""
+        """Forget faults of the front wheel, and cancel a requested power-off, even in an e-stop."""
         self._encoder.follower.start()
         self._upkeep.jobs.keep_power()
 

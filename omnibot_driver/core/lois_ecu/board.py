@@ -44,11 +44,11 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Pause in s before a reset is repeated. Wheels roll on for less than this time after a stop, and
-four groups of ticks with the usual period take less than this time."""
+"""Pause in s before a reset is repeated: longer than wheels roll on after a stop, and longer than
+four usual periods of the ticks."""
 STEADY_S: Final = 0.3
-"""Time in s without a change of the counts after which the driver treats them as steady: longer
-than the usual period of the ticks."""
+"""Time in s without a change of the tick counts, after which the driver treats the counts as
+steady. It is longer than the usual period of the ticks."""
 
 
 class LoisEcuBoard(Board):
@@ -99,7 +99,7 @@ class LoisEcuBoard(Board):
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether the board counts both wheels' ticks now: unchanged ticks prove a standstill.
+        """Whether the board now counts the ticks of both wheels; then unchanged counts prove rest.
 
         The public firmware counts a wheel's ticks only while its RPM target is positive.
         """
@@ -125,7 +125,7 @@ class LoisEcuBoard(Board):
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings of held bytes and groups; call it when the port closes."""
+        """Return the readings of held bytes and groups; called when the port closes."""
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
@@ -264,11 +264,11 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """Return RPM 0/0, as the board has no e-stop command; empty in a terminal mode."""
+        """Return RPM 0/0, as the board has no e-stop command; nothing in a terminal mode."""
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and a counter reset; ``due`` repeats the reset until the counters show it."""
+        """Return Stop and a counter reset; ``due`` repeats the reset until it is proved."""
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own
         self._resets_left, self._reset_shown = RESETS, False
@@ -290,7 +290,7 @@ class LoisEcuBoard(Board):
     # Functions that only this board has
 
     def set_led(self, on: bool, now: float) -> None:
-        """Switch the board's LED; the line is sent several times, as lines may be lost."""
+        """Switch the board's LED on or off; send the line several times, as lines may be lost."""
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:

@@ -2,8 +2,8 @@
 
 """Detection of the kind of board: with the public firmware, or as the manual describes it.
 
-The public firmware sends odometry after each group of ticks, with the same command byte. The ticks
-of a board as in the manual count in both directions; a negative count proves this. Works on counts
+The public firmware sends odometry after each group of ticks, with the same command byte. On a board
+as in the manual, ticks count in both directions; a negative count proves this kind. Works on counts
 and on the order of groups.
 """
 
@@ -41,7 +41,7 @@ class BoardKind:
             self._motion.signed = self._seen_signed = True
 
     def took_odometry(self, *, appended: bool) -> None:
-        """Record a group of odometry; ``appended``: it has the command byte of the ticks."""
+        """Record a group of odometry; ``appended``: the group has the command byte of the ticks."""
         motion = self._motion
         if appended and not self.appends:
             self.appends, motion.holds = True, True

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes between two odometry groups (0x20): turn, distance, and wheel speeds from the velocity.
+"""Changes from one odometry group (0x20) to the next: turn, distance and wheel speeds.
 
 The public firmware integrates the speeds of both wheels as whole RPM. The position in 0x20 does not
 change while both wheel speeds are equal, and the velocity in 0x20 is that of the last tick. Works
@@ -23,9 +23,9 @@ class Told:
 
     ``turned_m``: distance of the right rim minus that of the left rim. ``along_m``: distance of the
     middle of the axle. ``still``: position and heading did not change. ``same_velocity``: the
-    velocity did not change. If both are true, no wheel has ticked, unless both wheel speeds are
-    equal. ``speeds_mps``: speeds of the left and right rim at the last tick, rounded down to whole
-    RPM; None if no wheel speeds in whole RPM give this velocity.
+    velocity did not change. If ``still`` and ``same_velocity`` are both true, no wheel has ticked,
+    unless both wheel speeds are equal. ``speeds_mps``: speeds of the left and right rim at the last
+    tick, rounded down to whole RPM; None if no wheel speeds in whole RPM give this velocity.
     """
 
     turned_m: float

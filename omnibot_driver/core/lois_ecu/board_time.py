@@ -65,8 +65,8 @@ class BoardTime:
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         """Return the delay in s of ticks that arrive at ``now``.
 
-        The delay is at least zero. The corrected time, ``now`` minus the delay, is never before
-        that of the previous call.
+        The delay is at least zero. The corrected time, ``now`` minus the delay, is never earlier
+        than the corrected time of the previous call.
         """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s
@@ -98,9 +98,10 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return the height of each point above a straight line that touches the lowest point.
+    """Return how high each point is above a straight line that no point is below.
 
-    The line has the slope from the lowest point of the first half to that of the second half.
+    The slope of the line is that from the lowest point of the first half to the lowest point of the
+    second half.
     """
     half = len(kept) // 2
     points = list(kept)

@@ -129,7 +129,7 @@ def _said(command: Command) -> tuple[int, int]:
 
 
 def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
-    """Decode one line from a host. Raises FrameError if it is not a command."""
+    """Decode one line from a host. Raises FrameError if the line is not a command."""
     line = line_of(data, sum_required=with_sum)
     if line is None or (not with_sum and len(data.replace(b"\r", b"")) != 12):
         raise FrameError(f"not exactly one line: {data!r}")
@@ -147,7 +147,7 @@ def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
 
 
 def encode_report(report: Report) -> bytes:
-    """Return the lines of a report as a board sends it. Raises FrameError if a value is too big."""
+    """Return a board's lines for ``report``. Raises FrameError if a value is too big."""
     match report:
         case EStopButton(pressed):
             return encode_line(Code.ESTOP_BUTTON, int(pressed))
@@ -194,7 +194,7 @@ def _encode_record(record: Record) -> bytes:
 
 
 def single_report(line: Line) -> Report | None:
-    """Decode a report that has only this one line; None if the line is not a valid report."""
+    """Decode a report that has only one line; None if ``line`` is not such a report."""
     payload = line.payload
     low = payload & 0xFFFF
     high, middle, last = payload >> 16, low >> 8, low & 0xFF

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Corrections of the motion filter: compares each report with what the filter expects.
+"""Correction of the motion filter: comparison of each report with the filter's expectation.
 
 The ticks of a wheel are exact while the board counts them. While the board does not count, the
-heading in 0x20 is compared instead. The distance in 0x20 is compared only while the two wheel
-speeds differ: while they are equal, the public firmware does not change the position. The speeds in
-0x20 are compared only after a new tick, because the board keeps reporting the last speed of a wheel
-at rest. Works on counts and changes of 0x20, without the robot's pose.
+heading in 0x20 (odometry) is compared instead. The distance in 0x20 is compared only while the two
+wheel speeds differ: while these speeds are equal, the public firmware does not change the position.
+The speeds in 0x20 are compared only after a new tick, because the board keeps reporting the last
+speed of a wheel at rest. Works on counts and changes of 0x20, without the robot's pose.
 """
 
 import math
@@ -46,14 +46,16 @@ SAME_TICKS: Final = 0.6
 """Residual in ticks below which an unchanged count is not used as a measurement."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""Limits of the residual of a heading, in standard deviations and in m. A residual beyond both is
-discarded, because the board has integrated an old speed while the wheel was at rest."""
+"""Limits of the residual of a heading, in standard deviations and in m. A heading whose residual is
+beyond both limits is discarded: it is wrong because the board has integrated an old speed while the
+wheel was at rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
 """Additional standard deviations in m of a wheel's distance after 1 m without ticks: in the usual
-case, and while the speed oscillates, because then the board reports it too seldom."""
+case, and, larger, while the speed oscillates, because the board then reports the speed too
+seldom."""
 SWERVED_M: Final = 0.05
 """Additional standard deviation in m of the position after 1 m at an oscillating speed, even if the
 distances of the wheels are known."""
@@ -112,7 +114,7 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Make the present heading and distance in 0x20 the reference for later ones."""
+        """Make the present heading and distance in 0x20 the reference for later values."""
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
         self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)
@@ -158,7 +160,7 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Subtract the wheel's distance since its reported speed last changed: it was at rest."""
+        """Subtract the distance that was estimated for a wheel while it was in fact at rest."""
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:

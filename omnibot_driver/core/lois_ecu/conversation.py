@@ -84,12 +84,12 @@ class LoisConversation:
         self._translation.connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
-        """Return the readings that these bytes complete. At ``held_until``, call it with b""."""
+        """Return the readings that these bytes complete. Called with b"" at ``held_until``."""
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
 
     def flush(self, now: float) -> list[LoisReading]:
-        """Return the readings of lines that were held back; call it when the port closes."""
+        """Return the readings of lines that were held back; called when the port closes."""
         return self._understood(self._decoder.flush(now), now)
 
     def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
@@ -217,7 +217,7 @@ class LoisConversation:
     def due(self, now: float) -> bytes:
         """Return the lines that are due: settings, modes, the request for a record, and RPM 0/0.
 
-        Call it at ``wake_at``.
+        Called at ``wake_at``.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)))
         self._decoder.terminal = self._upkeep.change.terminal
@@ -225,7 +225,7 @@ class LoisConversation:
 
     @property
     def wake_at(self) -> float:
-        """Time at which to call ``due``, and ``receive`` with b"", next."""
+        """Next time at which to call ``due``, and also ``receive`` with b""."""
         return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property
@@ -248,7 +248,7 @@ class LoisConversation:
     def emergency_stop(self) -> bytes:
         """Return RPM 0/0, which is sent in turn with Stop.
 
-        The board does not latch an e-stop, so both are repeated.
+        The board does not latch an e-stop, so both commands are repeated.
 
         In a terminal mode the result is empty, so only Stop is sent: the public firmware forwards
         all received characters to the sensor, and then reads at most 480 characters a second.
@@ -256,7 +256,7 @@ class LoisConversation:
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode a velocity as RPM or duty, by the drive mode; return Stop if it rounds to zero."""
+        """Encode a velocity, in the drive mode, as RPM or duty; as Stop if it rounds to zero."""
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
@@ -281,11 +281,11 @@ class LoisConversation:
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """Write all settings again: by the manual, a reset affects controllers and interfaces."""
+        """Write all settings again, as by the manual a reset affects controllers and interfaces."""
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Send a command several times, as lines may be lost; the repetition must be harmless."""
+        """Send ``command``, whose repetition must be harmless, several times: lines may be lost."""
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:
@@ -293,7 +293,7 @@ class LoisConversation:
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Start a record. Raises RequestRefused if the board could not complete it."""
+        """Start a record. Raises RequestRefused if the board could not complete the record."""
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
         self._upkeep.request.begin(kind, samples, self._decoder)

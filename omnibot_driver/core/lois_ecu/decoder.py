@@ -59,7 +59,7 @@ class LoisDecoder:
 
     @property
     def statistics(self) -> DecoderStatistics:
-        """Counters. Before the first data you may replace them with those of an earlier decoder."""
+        """Counters; before the first data, the counters of an earlier decoder may be assigned."""
         return self._statistics
 
     @statistics.setter
@@ -115,7 +115,7 @@ class LoisDecoder:
         return self._untimed(found)
 
     def flush(self, now: float) -> list[Report]:
-        """Return the report that was held back, if it is complete; call it when the port closes."""
+        """Return the report that was held back, if it is complete; called when the port closes."""
         if self._held or self._cut_bytes:
             self._damaged(len(self._held) + self._cut_bytes)
         self._held, self._cut_bytes = b"", 0

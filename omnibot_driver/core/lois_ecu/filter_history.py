@@ -11,8 +11,8 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 
 KEPT: Final = 32
-"""Number of stored states; fewer groups than this arrive until a restart of the board is
-noticed."""
+"""Number of stored states: more than the number of groups that arrive before a restart of the board
+is noticed."""
 
 
 class FilterHistory:

@@ -15,8 +15,8 @@ group, if all lines between them were lost. In this case the shorter group is di
 
 The command byte 0x12 has two kinds of groups, distinguished by their length: 3 lines of ticks, and
 in the public firmware 6 lines of odometry directly after the ticks. A count of -1 looks like a
-marker; the length of the group also shows which of the two it is. Records are assembled in
-``record_lines``. Works on lines and arrival times.
+marker; the length of the group also shows whether a line is a count or a marker. Records are
+assembled in ``record_lines``. Works on lines and arrival times.
 """
 
 import math
@@ -93,7 +93,7 @@ class Assembler:
         self._astray = False
         self._after_ticks = False
         self._appends = True
-        """Whether this board sends odometry directly after its ticks, as far as is known."""
+        """Whether the board is believed to send odometry directly after its ticks."""
         self._at = -math.inf
 
     @property
@@ -158,7 +158,7 @@ class Assembler:
         return self._end(now) if now >= self.resolves_at else []
 
     def finish(self, now: float) -> list[Timed]:
-        """Return the held group if it is complete; call it when the port closes."""
+        """Return the held group if it is complete; called when the port closes."""
         found = self._end(now)
         self._record.cut_off()
         return found
@@ -174,7 +174,7 @@ class Assembler:
         self._code, self._payloads, self._done, self._astray = code, [], False, False
 
     def _may_be_minus_one(self, code: int) -> bool:
-        """Return whether this marker may be a count of -1; if not, the group becomes too long."""
+        """Return whether a line with the payload of a marker may be a count of -1 in this group."""
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
     def _may_be_complete(self) -> bool:

@@ -29,7 +29,7 @@ class HeadingFilter:
         self.forget()
 
     def forget(self) -> None:
-        """Reject the next heading, and accept the second one if it agrees with the first."""
+        """Forget all headings; accept none until two in a row agree."""
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
         self._agreed = 0
@@ -66,7 +66,7 @@ class HeadingFilter:
         return True
 
     def _mistaken(self, heading_deg: float, yaw_rad: float) -> bool:
-        """Return whether this is one of the false headings that the firmware reports near north."""
+        """Return whether this heading is a false one that the firmware reports near north."""
         if self._last is None or abs(_expected(self._last, yaw_rad)) > NORTH_DEG:
             return False
         return any(

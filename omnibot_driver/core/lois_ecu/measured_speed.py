@@ -37,8 +37,8 @@ def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, floa
     """Predict the speeds that the firmware keeps, and the resulting changes of 0x20.
 
     The firmware updates 0x20 at each tick of either wheel, with the speed that it measured last for
-    each wheel. So if only one wheel rolls, 0x20 uses its present speed, and the old speed of the
-    wheel at rest.
+    each wheel. So if only one wheel rolls, 0x20 uses the present speed of this wheel, and an old
+    speed of the wheel at rest.
     """
     dt, new = step.dt, step.new
     turn: Terms = [(TURN, 1.0)]

@@ -100,7 +100,7 @@ class RecordKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SetDuty:
-    """A command of an open-loop duty for each motor, in percent of the supply: -100..100."""
+    """A command that sets each motor's duty, open loop, in percent of the supply: -100..100."""
 
     left_percent: int
     right_percent: int
@@ -108,7 +108,7 @@ class SetDuty:
 
 @dataclass(frozen=True, slots=True)
 class SetRpm:
-    """A command of a closed-loop speed for each wheel, in revolutions per minute."""
+    """A command that sets each wheel's speed, closed loop, in revolutions per minute."""
 
     left_rpm: int
     right_rpm: int
@@ -123,7 +123,7 @@ class SetLed:
 
 @dataclass(frozen=True, slots=True)
 class RecordRpm:
-    """A command to record this many tick times of each wheel, then send them."""
+    """A command to record tick times of both wheels, and then to send the samples."""
 
     left_samples: int
     right_samples: int
@@ -131,7 +131,7 @@ class RecordRpm:
 
 @dataclass(frozen=True, slots=True)
 class RecordTorque:
-    """A command to record this many torque readings of each motor, then send them."""
+    """A command to record torque readings of both motors, and then to send the samples."""
 
     left_samples: int
     right_samples: int
@@ -139,7 +139,7 @@ class RecordTorque:
 
 @dataclass(frozen=True, slots=True)
 class RecordHeading:
-    """A command to record this many compass headings, then send them."""
+    """A command to record compass headings, and then to send the samples."""
 
     samples: int
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on a misconfiguration, which shows in the settings or in bytes that are not valid lines.
+"""Advice on a misconfiguration, found in the settings or in bytes that are not valid lines.
 
 There is at most one piece of advice at a time. Advice from bytes (another board, a wrong setting)
 is given only while valid lines do not arrive. Works on bytes and settings, without times.
@@ -49,7 +49,7 @@ class Suspicion:
         self._seen = b""
 
     def understood(self) -> None:
-        """Clear the advice, as a decoded report shows that the board is the right one."""
+        """Clear the advice, because a decoded report shows that nothing is misconfigured."""
         self._seen, self.advice = b"", None
 
     def look(self, data: bytes) -> None:

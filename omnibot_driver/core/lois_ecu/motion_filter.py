@@ -3,10 +3,10 @@
 """Kalman filter of both wheels' motion, and of the board's counters that report this motion.
 
 States of each wheel: distance, speed, acceleration, the ticks that the board should have counted,
-the speed that the firmware measured last, a bias, and the excess of its speed backward. States of
-the body: position, and the changes of the heading and the distance in 0x20. The errors of all these
-states are correlated with the error of the position, so each report of the board also corrects the
-position.
+the speed that the firmware measured last, a bias, and the fraction by which the wheel rolls
+backward faster than its set-point. States of the body: position, and the changes of the heading and
+the distance in 0x20. The errors of all these states are correlated with the error of the position,
+so each report of the board also corrects the position.
 
 Left and right are those of the board; distances and speeds are for wheels of nominal size. Works on
 commands and the firmware's counters, without messages.
@@ -43,7 +43,8 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts: of a longer time, only the last part."""
+"""Longest time in s that one call of ``advance`` predicts; of a longer time, it predicts only the
+last part."""
 ROLLED_OUT_S: Final = 0.15
 """Time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
@@ -57,8 +58,8 @@ EXCESS_CHANGE: Final = (0.0, 0.15)
 """Fraction by which a wheel that rolls backward is faster than its set-point: mean, standard
 deviation, and additional standard deviation after a change of the set-point. Each has two values:
 for the board's own gains, and for gains that the user set. The wheel is faster because the firmware
-lowers the target with each tick until the controller's next step. A feed-forward may add much
-more."""
+lowers the target with each tick until the controller's next step. A feed-forward may make the wheel
+much faster still."""
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
 
@@ -66,9 +67,10 @@ ROLLING_MPS: Final = 1e-6
 class MotionFilter:
     """Estimate of the wheels' motion and the body's pose.
 
-    ``tick_m``, ``rpm_mps``: distance that a rim moves in one tick, and its speed at one RPM.
-    ``turn_sign``: -1 if the board's left wheel is the robot's right one. ``signed``: ticks always
-    count in both directions. ``holds``: the board keeps the last measured speed of a wheel at rest.
+    ``tick_m``, ``rpm_mps``: distance that the rim of a wheel moves in one tick, and the speed of
+    the rim at one RPM. ``turn_sign``: -1 if the board's left wheel is the robot's right one.
+    ``signed``: ticks always count in both directions. ``holds``: the board keeps the last measured
+    speed of a wheel at rest.
 
     ``tuned``: whether the controllers have gains that the user set. If a wheel is halted soon after
     a change of its set-point, it did not roll at the speed of the model, and perhaps rolled in the
@@ -143,11 +145,11 @@ class MotionFilter:
             at_s = end_s
 
     def restart(self, then_s: float) -> None:
-        """Restore the state at ``then_s``, when the board restarted, and add the coasting after it.
+        """Restore the state at ``then_s``, when the board restarted, and add the later coasting.
 
         Later estimates are discarded. If ticks count in both directions, they have restarted at
-        zero and report how far the wheels coasted. Otherwise this distance is estimated, and the
-        set-points are forgotten.
+        zero and report how far the wheels coasted. Otherwise the distance of the coasting is
+        estimated, and the set-points are forgotten.
         """
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
@@ -164,7 +166,7 @@ class MotionFilter:
                 self.filter.forget(wheel.base + state, 0.0, 0.0)
 
     def shift(self, index: int, way_m: float, stddev_m: float) -> None:
-        """Add ``way_m`` to a wheel's estimated distance, with this standard deviation in m."""
+        """Add ``way_m`` (standard deviation ``stddev_m``) to a wheel's estimated distance."""
         terms = self._way_terms(index)
         for state, factor in terms:
             self.filter.mean[state] += factor * way_m

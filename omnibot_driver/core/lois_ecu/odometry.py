@@ -4,9 +4,9 @@
 
 Counts of ticks are exact, but the public firmware counts only while a wheel is commanded forward.
 At other times the commands show how the wheels should move (``motion_filter``), and 0x20 shows how
-they moved (``comparison``). The board cannot report errors of the wheels' sizes and their slip, so
-these are estimated separately (``size_errors``). Time is an argument; all times are arrival times
-in s.
+they moved (``comparison``). The reports do not show errors of the wheels' sizes, nor slip, so the
+effect of both errors is estimated separately (``size_errors``). Time is an argument; all times are
+arrival times in s.
 """
 
 import math
@@ -37,8 +37,8 @@ LATE_S: Final = 0.012
 """Standard deviation of an arrival time in s, while no better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""Silence, in s and in periods of the ticks, after both of which the prediction of the pose ends:
-the board may be switched off."""
+"""The prediction of the pose ends after a silence that is longer than both limits, in s and in
+periods of the ticks, because the board may be switched off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
@@ -155,7 +155,7 @@ class LoisOdometry:
         self.wrote(SetRpm(0, 0), now)
 
     def stalled(self, wheels: tuple[bool, bool]) -> None:
-        """Treat these wheels as at rest since their reported speeds last changed."""
+        """Treat the given ``wheels`` as at rest since their reported speeds last changed."""
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:
                 self._comparison.came_to_rest(index)
@@ -193,7 +193,7 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process odometry (0x20, or odometry that was appended to 0x12).
 
-        It corrects the next predictions and the next estimate.
+        The odometry corrects the next predictions and the next estimate.
         """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now

@@ -20,8 +20,8 @@ motion command.
 
 A board in another terminal mode, or with another checksum setting, is silent or seems to ignore
 everything. The driver then sends the line that restores the setting, both with and without a
-checksum. After it, the driver writes the left short correction, because any write of the terminal
-mode overwrites this setting.
+checksum. After this line, the driver writes the setting "left short correction", because any write
+of the terminal mode overwrites it.
 """
 
 import math
@@ -92,7 +92,7 @@ class SettingsWriter:
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
         self.overwritten = False
-        """Whether the terminal mode was written; this overwrites the setting "left short
+        """Whether the terminal mode was written, which overwrites the setting "left short
         correction"."""
 
     @property
@@ -249,6 +249,6 @@ class SettingsWriter:
 
 
 def _taken(queue: deque[tuple[float, Command]], now: float) -> Iterable[Command]:
-    """Remove the commands that are due from the queue, and yield them."""
+    """Remove from the queue all commands that are due, and yield them."""
     while queue and now >= queue[0][0]:
         yield queue.popleft()[1]

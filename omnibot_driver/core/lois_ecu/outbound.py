@@ -35,8 +35,7 @@ MOST_RPM: Final = 50
 """Largest set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""RPM 0/0 is sent before each of this number of set-points after a Stop, because lines may be
-lost."""
+"""Number of set-points after a Stop before each of which RPM 0/0 is sent; one may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
@@ -51,7 +50,7 @@ def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], 
 
 
 def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
-    """Return the set-points in these written lines, in order."""
+    """Return the set-points in ``data``, which are lines for the board, in order."""
     length = LENGTH if with_sum else LENGTH_WITHOUT_SUM
     found: list[SetRpm | SetDuty] = []
     for line in data.splitlines(keepends=True):

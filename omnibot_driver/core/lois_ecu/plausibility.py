@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Plausibility of a complete group of lines: its ranges, and its change since the group before.
+"""Plausibility of a complete group of lines: its values, and their change since the last group.
 
 A group that cannot follow the last accepted group is not accepted, but stored. If the next group
 can follow the stored one, the board was restarted or reset, and the next group is accepted. Works
@@ -59,7 +59,7 @@ class Gate(Generic[Group]):
         self._aside: tuple[Group, float] | None = None
 
     def passes(self, group: Group, now: float) -> bool:
-        """Return whether to accept this group; store it to compare the next group with it."""
+        """Return whether to accept ``group``; store it for the comparison with the next group."""
         aside = self._aside
         if self._last is not None and not self.would_pass(group, now):
             if aside is None or not self._reachable(aside[0], group, now - aside[1]):
@@ -153,7 +153,7 @@ def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: f
 
 
 def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
-    """Return whether a group's position is in range (NaN is not). Velocities are not checked."""
+    """Return whether a group's position is finite and in range. Velocities are not checked."""
     match group:
         case GpsPosition(latitude, longitude):
             return abs(latitude) <= 90.0 and abs(longitude) <= 180.0

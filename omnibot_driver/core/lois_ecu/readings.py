@@ -61,7 +61,7 @@ class RecordFailed:
 
 @dataclass(frozen=True, slots=True)
 class TerminalLeft:
-    """Notice that a terminal mode has ended; presses of the e-stop button in it are unknown."""
+    """Notice that a terminal mode has ended, in which the e-stop button may have been pressed."""
 
 
 LoisReading = (

@@ -28,8 +28,8 @@ LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""Largest change of a wheel's speed: a constant in RPM, and a part in RPM per s. A larger change
-shows a tick that was delayed while the board sent something else."""
+"""Largest plausible change of a wheel's speed: a constant in RPM, and a part in RPM per s. A larger
+change shows a tick that was delayed while the board sent something else."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """Largest difference from the expected speed, in RPM and as a fraction, of a wheel with a constant
@@ -67,8 +67,8 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Subtract the distance since the reported speed last changed: the wheel was at rest.
 
-        If the wheel has not turned since it was commanded to start, subtract the distance since
-        then.
+        If the wheel has not turned since it was commanded to start, subtract the distance since the
+        start.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -121,7 +121,7 @@ class ReportedSpeed:
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
     def _jumps(self, told_rpm: float, duration_s: float) -> bool:
-        """Return whether a speed is implausible after the last one, or for a steady wheel."""
+        """Return whether a reported speed is implausible after the last, or for a steady wheel."""
         motion, wheel = self._motion, self._wheel
         change_rpm = abs(told_rpm - abs(self._told) / motion.rpm_mps)
         if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:

@@ -14,7 +14,7 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 FEW_TICKS: Final = 20
 """Largest number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""More ticks than a wheel can roll between a reset and the next counts."""
+"""A number of ticks that no wheel can roll between a reset and the next counts."""
 STEADY_TICKS: Final = 3
 """Lowest count of a wheel at rest from which backlash cannot turn the wheel back to zero."""
 UNPROVED_S: Final = 2.5

@@ -14,15 +14,15 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""Range in RPM of the last speed of a wheel that came to rest: a wheel that is starting shows a
-lower speed, and a faster wheel ticks once more before it is at rest."""
+"""Range in RPM of the last reported speed of a wheel that came to rest. A lower speed is that of a
+starting wheel, and a faster wheel ticks once more before it is at rest."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""Rate of this module's clock, as a fraction of real time, while speeds are not reported."""
+"""While speeds are not reported, the clock of this module runs at this fraction of real time."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -30,10 +30,10 @@ NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Probabilities that the wheel is at rest, by the number of repetitions of its speed. ``FAST``:
 after a fall to a speed above ``FAST_RPM``. ``FAR``: after a fall by ``FELL_FAR_RPM``. ``LONE``:
-after such a fall from a speed that was reported only once. ``NEAR``: after a smaller fall.
-``TUNED``: after any of these with gains that the user set. With such gains a wheel rarely comes to
-rest without a Stop, and often rolls at a steady speed after an overshoot. The probabilities were
-counted on the public firmware."""
+after a fall by ``FELL_FAR_RPM`` from a speed that was reported only once. ``NEAR``: after a smaller
+fall. ``TUNED``: after any of these with gains that the user set. With such gains a wheel rarely
+comes to rest without a Stop, and often rolls at a steady speed after an overshoot. The
+probabilities were counted on the public firmware."""
 
 
 class RestingWheel:
@@ -43,7 +43,7 @@ class RestingWheel:
         self.forget()
 
     def forget(self) -> None:
-        """Forget all speeds; treat the next one as the first."""
+        """Forget all speeds; treat the next speed as the first."""
         self._lately: deque[tuple[float, float]] = deque(maxlen=64)
         self._told_rpm = 0.0
         self._fell_at_s = -SWINGS_S

@@ -74,11 +74,11 @@ class SetPoints:
 
     @property
     def clears_at(self) -> float:
-        """Time at which to send RPM 0/0 after a Stop; infinity if it need not be sent."""
+        """Time at which to send RPM 0/0 after a Stop; infinity if RPM 0/0 is not needed."""
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Return whether to send RPM 0/0 now, and treat it as sent."""
+        """Return whether to send RPM 0/0 now; if so, treat it as sent."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
@@ -131,7 +131,7 @@ class SetPoints:
         )
 
     def _board_order(self, pair: tuple[int, int]) -> tuple[int, int]:
-        """Swap left and right if the board's order is inverted; works in both directions."""
+        """Swap left and right if the board's order is inverted: from or to the board's order."""
         return (pair[1], pair[0]) if self.settings.inverted else pair
 
 

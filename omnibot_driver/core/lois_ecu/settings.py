@@ -14,8 +14,8 @@ DriveMode = Literal["rpm", "duty"]
 USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
     {Stream.TICKS: 200, Stream.ODOMETRY: 200}
 )
-"""Periods in ms that the odometry needs. With shorter periods the board sends for a larger part of
-the time, in which it cannot receive."""
+"""Periods in ms that the odometry needs. With shorter periods the board would send for a larger
+part of the time, and it cannot receive while it sends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

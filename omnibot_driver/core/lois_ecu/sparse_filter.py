@@ -3,7 +3,8 @@
 """Kalman filter of a few states, in plain numbers, without a matrix library.
 
 Most rows of the transition matrix are those of the identity matrix, and a measurement depends on
-one to three states. Both are given as their non-zero terms, so that a step takes little time.
+one to three states. Rows and measurements are given as their non-zero terms, so that a step takes
+little time.
 """
 
 from collections.abc import Mapping, Sequence

@@ -100,7 +100,7 @@ class StallWatch:
                     self._note(wheel, now, turns=ticked[wheel])
 
     def stalled(self, now: float) -> tuple[bool, bool]:
-        """Return which commanded wheels have not turned for ``STALLED_S``; restart their time."""
+        """Return which commanded wheels have not turned for ``STALLED_S``, and restart the time."""
         left, right = (
             now - seen_at >= STALLED_S and quiet >= AT_LEAST
             for seen_at, quiet in zip(self._seen_at, self._quiet, strict=True)
@@ -113,7 +113,7 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for this wheel.
 
-        This is so if the speed repeats, and if the other wheel's speed has changed or the repeated
+        The speed is old if it repeats, and if the other wheel's speed has changed or the repeated
         speed is far above the set-point.
         """
         if told is None or self._told is None:
@@ -138,7 +138,7 @@ class StallWatch:
         return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
-        """Return whether the wheel gets no power: its reported speed reaches the set-point."""
+        """Return whether a wheel gets no power because its reported speed reaches its set-point."""
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS
 

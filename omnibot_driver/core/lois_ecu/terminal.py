@@ -19,20 +19,21 @@ UNPROVED_S: Final = 2.0
 """Time in s for which Stop is sent to a robot whose standstill cannot be seen."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""Time in s after the writing of a mode, in which earlier reports may still arrive."""
+"""Time in s after the writing of a mode, in which reports that were sent before may still
+arrive."""
 
 
 class ModeChange:
     """Changes of the terminal mode.
 
-    ``reason``: why the robot may not be driven now, as a sentence; empty if it may. ``wanted``: the
-    requested mode. ``want`` and ``stop_first`` may be called at any time.
+    ``reason``: why the robot may not be driven now, as a sentence; empty if the robot may be
+    driven. ``wanted``: the requested mode. ``want`` and ``stop_first`` may be called at any time.
     """
 
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """Sensor's mode that was written to the board; None once the board's own messages arrive
+        """Mode of a sensor that was written to the board; None once the board's own messages arrive
         again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
@@ -52,7 +53,7 @@ class ModeChange:
         self._again_at_s = -math.inf
 
     def stop_first(self, why: str) -> None:
-        """Stop the robot, and refuse motion until it is at rest; ``why`` begins the reason."""
+        """Stop the robot, and refuse motion until it is at rest; ``reason`` begins with ``why``."""
         self._stopping, self._stopping_since_s = why, None
 
     @property
@@ -67,7 +68,7 @@ class ModeChange:
 
     @property
     def reason(self) -> str:
-        """Reason why motion is refused; empty if it is allowed."""
+        """Reason why motion is refused; empty if motion is allowed."""
         if self.sensor_wanted:
             return (
                 f"terminal_mode is {self.wanted.name.lower()}, and the board reports no motion;"
@@ -86,7 +87,7 @@ class ModeChange:
         return self._again_at_s if waits else math.inf
 
     def stops(self, now: float, *, stands: bool) -> bool:
-        """Return whether to send Stop now, because the robot must be at rest first."""
+        """Return whether to send Stop now, because the robot must be at rest before a change."""
         if not self._stopping:
             return False
         if self._stopping_since_s is None:

@@ -36,15 +36,15 @@ from omnibot_driver.core.readings import DisplacementReading
 
 DAY_S: Final = 86400
 UNKNOWN_FROM_YEAR: Final = 38
-"""Year of the century from which a date is not one that the receiver knows."""
+"""Year of the century from which the date of the GPS receiver is regarded as unknown."""
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """Fall of the counts towards zero, in ticks and in ticks per s, beyond which the board has
 restarted: wheels do not roll back that fast."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which wheels may have rolled back, if the board's clock contradicts the
-time since the last ticks. (The decoder has then forgotten the clock's unit.)"""
+"""Longest time in s for which wheels are assumed to have rolled back, if the board's clock does not
+confirm the time since the last ticks. (The decoder has then forgotten the clock's unit.)"""
 
 
 class Translation:
@@ -219,10 +219,10 @@ class Translation:
 
 
 def _is_date(date: GpsDate) -> bool:
-    """Return whether the receiver knows the date.
+    """Return whether the GPS receiver knows the date.
 
-    Before that it sends zeros, or the beginning of its calendar, such as 1980. Seconds from 2038 on
-    do not fit into a ROS time.
+    Until the receiver knows the date, it sends zeros, or the beginning of its calendar, such as
+    1980. Seconds from 2038 on do not fit into a ROS time.
     """
     return bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
 
@@ -230,7 +230,7 @@ def _is_date(date: GpsDate) -> bool:
 def _days_since_1970(year: int, month: int, day: int) -> int:
     """Return the days since 1970 in the Gregorian calendar.
 
-    The year is taken to begin in March, so that it ends with the leap day.
+    The computation uses years that begin in March, so that the leap day is the last day of a year.
     """
     year, month = (year, month - 3) if month > 2 else (year - 1, month + 9)
     leap_days = year // 4 - year // 100 + year // 400

@@ -2,9 +2,9 @@
 
 """Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
-It covers settings, the terminal mode, requests for records, RPM 0/0 after a Stop, and the recovery
-of a board that is silent or ignores commands. Combines the classes for each of these. Must not know
-what the board sends.
+The schedule covers settings, the terminal mode, requests for records, RPM 0/0 after a Stop, and the
+recovery of a board that is silent or ignores commands. Combines the classes for these tasks. Must
+not know what the board sends.
 """
 
 import math
@@ -51,7 +51,7 @@ class Upkeep:
             self.opened = False
 
     def due(self, now: float, *, stands: bool) -> bytes:
-        """Return the bytes to write now; call it at ``wake_at``.
+        """Return the bytes to write now; called at ``wake_at``.
 
         ``stands``: the robot is seen at rest.
         """

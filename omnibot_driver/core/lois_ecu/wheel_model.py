@@ -15,7 +15,7 @@ HEARD_S: Final = 0.008
 """Time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""Period of the speed controller in s: by the manual, and in the public firmware."""
+"""Period of the speed controller in s: first by the manual, then in the public firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 
@@ -24,7 +24,8 @@ CommandKind = Literal["rpm", "duty"]
 class _Effect:
     """What happens to a wheel's command at ``at_s``.
 
-    ``halts``: the target is zero until the next step; otherwise this command is carried out.
+    ``halts``: the firmware sets its RPM target to zero; otherwise it carries out the command with
+    ``kind`` and ``speed_mps``.
     """
 
     at_s: float
@@ -58,7 +59,7 @@ class WheelModel:
 
     @property
     def measured_sign(self) -> int:
-        """Sign that the public firmware gives this wheel's speed; 0 if it does not measure one."""
+        """Sign that the public firmware gives this wheel's speed; 0 if no speed is measured."""
         return (self.hidden_mps > 0.0) - (self.hidden_mps < 0.0)
 
     @property
@@ -67,7 +68,7 @@ class WheelModel:
         return bool(self._effects)
 
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
-        """Record that this command was written at ``at_s``."""
+        """Record that a command was written at ``at_s``."""
         if (kind, speed_mps) == self._heard and not (kind == "rpm" and not speed_mps):
             return
         halts = kind == "rpm" and (not speed_mps or speed_mps * self._rpm_mps < 0)

@@ -3,7 +3,7 @@
 """Motion of a wheel under its commands, as a step of the motion filter.
 
 A wheel coasts without power, follows a duty, or is driven by the board's speed controller. The
-controller uses the last measured speed. The public firmware does not set this value to zero when
+controller uses the last measured speed. The public firmware does not set this speed to zero when
 the wheel stops, so a wheel at rest may get little power, or none. The user's gains and motors are
 unknown, so the assumed noise is large. Works on commands and the states of one wheel.
 """
@@ -43,7 +43,7 @@ COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest time in s for which a wheel rolls on in the old direction after its set-point has changed
-its sign."""
+sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
 """Time in s for which the speed of a halted wheel has differed from the model: with the board's own
 gains, and with gains that the user set. With the public firmware's own gains the speed
@@ -73,7 +73,7 @@ class Wheel:
     """State of one wheel in addition to its states in the filter, which begin at index ``base``.
 
     ``blind``: whether the wheel has moved, or has had a target, while the board did not count its
-    ticks. The user of this class clears it.
+    ticks. The user of this class clears the flag.
     """
 
     def __init__(self, base: int) -> None:
@@ -95,11 +95,11 @@ class Wheel:
         self.cut = False
         """Whether the wheel is without power until the controller has wound up."""
         self.rolls_on = False
-        """Whether the reported speed may be from before the target changed its sign."""
+        """Whether the reported speed may be from before the target changed sign."""
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """Speed in m/s when the controller was reset, and the time in s since then."""
+        """Speed in m/s when the controller was reset, and the time in s since the reset."""
         self.locked = False
         """Whether the wheel is at rest without power, because the last measured speed exceeds its
         target."""
@@ -108,7 +108,7 @@ class Wheel:
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:
-        """Record that the controller was reset while the wheel had this speed."""
+        """Record that the controller was reset while the wheel had the speed ``speed_mps``."""
         self.cut, self.wound_m = True, 0.0
         self.rests = False
         self.rolled_mps, self.rolled_s = speed_mps, 0.0
