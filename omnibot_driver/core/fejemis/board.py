@@ -136,7 +136,7 @@ class FejemisBoard(Board):
         self._obedience.begin()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Return the readings that these bytes complete."""
+        """Return the readings that ``data`` completes."""
         self._open(now)
         self._inbound.receive(data, now, channel)
         self._inbound.look(now, driving=self.driving)

@@ -66,7 +66,7 @@ class FejemisDecoder:
         self._otherwise = 0
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """Return the messages that these bytes complete, in order of arrival."""
+        """Return the messages that ``data`` completes, in order of arrival."""
         *lines, rest = (self._held + data).split(b"\n")
         found = []
         for line in lines:

@@ -105,7 +105,7 @@ class Half:
         return bool(self.decoder.sums) and not self.decoder.doubtful
 
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
-        """Yield the messages in these bytes; the caller handles each before it requests the next.
+        """Yield the messages in ``data``; the caller handles each before it requests the next.
 
         A message may change the state of the half: if it shows a restart, the half forgets earlier
         times of the board. Messages with an implausible board time are left out, and so are poses

@@ -99,7 +99,7 @@ class LoisEcuBoard(Board):
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether the board now counts the ticks of both wheels; then unchanged counts prove rest.
+        """Whether both wheels' ticks are counted now, so that unchanged ticks prove a standstill.
 
         The public firmware counts a wheel's ticks only while its RPM target is positive.
         """
@@ -268,7 +268,7 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and a counter reset; ``due`` repeats the reset until it is proved."""
+        """Return Stop and a reset of the counters, which ``due`` repeats until it is confirmed."""
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own
         self._resets_left, self._reset_shown = RESETS, False

@@ -3,8 +3,8 @@
 """Detection of the kind of board: with the public firmware, or as the manual describes it.
 
 The public firmware sends odometry after each group of ticks, with the same command byte. On a board
-as in the manual, ticks count in both directions; a negative count proves this kind. Works on counts
-and on the order of groups.
+as in the manual, ticks count in both directions; a negative count proves this kind. This module
+works on counts and on the order of groups.
 """
 
 from typing import Final

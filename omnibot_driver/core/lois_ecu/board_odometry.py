@@ -3,8 +3,8 @@
 """Changes from one odometry group (0x20) to the next: turn, distance and wheel speeds.
 
 The public firmware integrates the speeds of both wheels as whole RPM. The position in 0x20 does not
-change while both wheel speeds are equal, and the velocity in 0x20 is that of the last tick. Works
-on groups, without their times.
+change while both wheel speeds are equal, and the velocity in 0x20 is that of the last tick. This
+module works on groups, without their times.
 """
 
 import math

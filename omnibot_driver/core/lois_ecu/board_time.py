@@ -6,7 +6,7 @@ The clock of the public firmware stops while the board sends, so it falls behind
 missing time can be added: the number of lines sent is known, and each takes about 1.2 ms. The clock
 of a board as in the manual does not stop. Both models of the clock are fitted to the last arrivals,
 and the better fit is used. The fit is a straight line below all arrivals, because a read may be
-late but never early. Works on clock counts, numbers of lines and arrival times.
+late but never early. This module works on clock counts, numbers of lines and arrival times.
 """
 
 import math
@@ -98,7 +98,7 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return how high each point is above a straight line that no point is below.
+    """Return the height of each point above a straight line that touches the points from below.
 
     The slope of the line is that from the lowest point of the first half to the lowest point of the
     second half.

@@ -6,7 +6,7 @@ The ticks of a wheel are exact while the board counts them. While the board does
 heading in 0x20 (odometry) is compared instead. The distance in 0x20 is compared only while the two
 wheel speeds differ: while these speeds are equal, the public firmware does not change the position.
 The speeds in 0x20 are compared only after a new tick, because the board keeps reporting the last
-speed of a wheel at rest. Works on counts and changes of 0x20, without the robot's pose.
+speed of a wheel at rest. This module works on counts and changes of 0x20, without the robot's pose.
 """
 
 import math

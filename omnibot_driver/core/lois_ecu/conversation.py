@@ -84,7 +84,7 @@ class LoisConversation:
         self._translation.connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
-        """Return the readings that these bytes complete. Called with b"" at ``held_until``."""
+        """Return the readings that ``data`` completes; also called, with b"", at ``held_until``."""
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
 
@@ -234,7 +234,7 @@ class LoisConversation:
         return self._points.driving
 
     def wrote(self, data: bytes, now: float) -> None:
-        """Record that these bytes were sent to the board."""
+        """Record that ``data`` was sent to the board."""
         said = self._points.wrote(data, now)
         if said:
             self._stall.wrote(said[-1], now)
@@ -256,7 +256,7 @@ class LoisConversation:
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode a velocity, in the drive mode, as RPM or duty; as Stop if it rounds to zero."""
+        """Encode a velocity as RPM or duty (``drive_mode``); return Stop if it rounds to zero."""
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
@@ -269,7 +269,7 @@ class LoisConversation:
         return self._lines(*self._points.wheels(rates_radps))
 
     def meaning(self, data: bytes) -> BodyTwist:
-        """Return the body velocity that the last set-point in these bytes commands."""
+        """Return the body velocity that the last set-point in ``data`` commands."""
         return self._points.meaning(data)
 
     # Other requests

@@ -2,7 +2,7 @@
 
 """History of a filter's states. It restores a past state, if a restart is noticed late.
 
-Works on states and times. Does not know what a state means.
+This module works on states and times. It does not know what a state means.
 """
 
 from collections import deque

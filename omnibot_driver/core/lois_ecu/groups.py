@@ -16,7 +16,7 @@ group, if all lines between them were lost. In this case the shorter group is di
 The command byte 0x12 has two kinds of groups, distinguished by their length: 3 lines of ticks, and
 in the public firmware 6 lines of odometry directly after the ticks. A count of -1 looks like a
 marker; the length of the group also shows whether a line is a count or a marker. Records are
-assembled in ``record_lines``. Works on lines and arrival times.
+assembled in ``record_lines``. This module works on lines and arrival times.
 """
 
 import math

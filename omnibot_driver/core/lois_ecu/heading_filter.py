@@ -4,9 +4,10 @@
 
 The firmware averages three headings of 0 to 359 degrees as plain numbers: for 359, 1 and 1 it
 reports 120, and for 359, 359 and 1 it reports -121. A heading is accepted if it differs from the
-last accepted one by about the turn of the odometry since then. Any other heading is accepted only
-when ``SURE_AFTER`` further headings agree with it. A false heading (about 120 or -120 degrees while
-the robot faces north) is rejected even then. Works on degrees and the odometry's yaw.
+last accepted one by about the angle that the odometry has turned since then. Any other heading is
+accepted only when ``SURE_AFTER`` further headings agree with it. A false heading (about 120 or -120
+degrees while the robot faces north) is rejected even then. This module works on degrees and the
+odometry's yaw.
 """
 
 import math
@@ -66,7 +67,7 @@ class HeadingFilter:
         return True
 
     def _mistaken(self, heading_deg: float, yaw_rad: float) -> bool:
-        """Return whether this heading is a false one that the firmware reports near north."""
+        """Return whether ``heading_deg`` is one of the firmware's false headings near north."""
         if self._last is None or abs(_expected(self._last, yaw_rad)) > NORTH_DEG:
             return False
         return any(

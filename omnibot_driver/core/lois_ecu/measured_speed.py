@@ -2,8 +2,8 @@
 
 """Speeds that the public firmware measures and keeps, and their effect on 0x20.
 
-This is a part of each step of the motion filter. Works on the states of the filter, without
-reports.
+The motion filter calls this module in each of its steps. The module works on the states of the
+filter, without reports.
 """
 
 import math

@@ -3,7 +3,8 @@
 """Advice on a misconfiguration, found in the settings or in bytes that are not valid lines.
 
 There is at most one piece of advice at a time. Advice from bytes (another board, a wrong setting)
-is given only while valid lines do not arrive. Works on bytes and settings, without times.
+is given only while valid lines do not arrive. This module works on bytes and settings, without
+times.
 """
 
 import re

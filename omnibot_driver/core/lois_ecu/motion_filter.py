@@ -8,8 +8,8 @@ backward faster than its set-point. States of the body: position, and the change
 the distance in 0x20. The errors of all these states are correlated with the error of the position,
 so each report of the board also corrects the position.
 
-Left and right are those of the board; distances and speeds are for wheels of nominal size. Works on
-commands and the firmware's counters, without messages.
+Left and right are those of the board; distances and speeds are for wheels of nominal size. This
+module works on commands and the firmware's counters, without messages.
 """
 
 import math

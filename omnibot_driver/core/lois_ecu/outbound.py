@@ -35,7 +35,8 @@ MOST_RPM: Final = 50
 """Largest set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""Number of set-points after a Stop before each of which RPM 0/0 is sent; one may be lost."""
+"""Number of set-points after a Stop before each of which RPM 0/0 is sent, because lines may be
+lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

@@ -3,8 +3,8 @@
 """Plausibility of a complete group of lines: its values, and their change since the last group.
 
 A group that cannot follow the last accepted group is not accepted, but stored. If the next group
-can follow the stored one, the board was restarted or reset, and the next group is accepted. Works
-on values and arrival times.
+can follow the stored one, the board was restarted or reset, and the next group is accepted. This
+module works on values and arrival times.
 """
 
 import math

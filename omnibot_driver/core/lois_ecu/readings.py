@@ -61,7 +61,7 @@ class RecordFailed:
 
 @dataclass(frozen=True, slots=True)
 class TerminalLeft:
-    """Notice that a terminal mode has ended, in which the e-stop button may have been pressed."""
+    """Notice that a terminal mode has ended, in which presses of the e-stop button are not seen."""
 
 
 LoisReading = (

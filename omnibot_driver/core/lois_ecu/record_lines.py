@@ -2,7 +2,7 @@
 
 """Assembly of a requested record from its lines; an incomplete record is discarded.
 
-Works on lines, without characters and times.
+This module works on lines, without characters and times.
 """
 
 from dataclasses import dataclass

@@ -4,8 +4,8 @@
 
 A reported speed is that of the wheel's last tick, and the board keeps it until the next tick. It is
 a new measurement only if the wheel has ticked since the last report, if this tick was not delayed
-while the board sent, and if the wheel is not at rest. Works on reported speeds and the motion
-filter, without messages.
+while the board sent, and if the wheel is not at rest. This module works on reported speeds and the
+motion filter, without messages.
 """
 
 import math

@@ -3,7 +3,7 @@
 """Proof, by the tick counters, that the board has obeyed a reset, and the limits of this proof.
 
 A count near zero proves nothing by itself: the count may have been near zero before, or a wheel may
-have rolled back. Works on counts and times.
+have rolled back. This module works on counts and times.
 """
 
 import math

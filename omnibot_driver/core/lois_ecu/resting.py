@@ -4,8 +4,8 @@
 
 For a wheel at rest, the public firmware keeps reporting the speed of the last tick. A wheel slows
 down before it comes to rest, so this speed is usually 5 to 17 RPM, and is then repeated. The speed
-of a wheel that rolls steadily is repeated too, but has not fallen just before. Works on the speeds
-that the board reports, one for each group, and on the time between them.
+of a wheel that rolls steadily is repeated too, but has not fallen just before. This module works on
+the speeds that the board reports, one for each group, and on the time between them.
 """
 
 from collections import deque

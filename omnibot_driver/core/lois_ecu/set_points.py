@@ -2,7 +2,8 @@
 
 """Set-points for a LOIS ECU: the encoding of motions, and a memory of what was sent last.
 
-``outbound`` explains the choice of set-points. Works on commands, times and written bytes.
+``outbound`` explains the choice of set-points. This module works on commands, times and written
+bytes.
 """
 
 import math
@@ -48,7 +49,7 @@ class SetPoints:
         return self._said is not None and _moves(self._said)
 
     def wrote(self, data: bytes, now: float) -> list[SetRpm | SetDuty]:
-        """Record that these bytes were sent to the board; return the set-points in them."""
+        """Record that ``data`` was sent to the board; return its set-points."""
         said = outbound.set_points(data, with_sum=self.settings.with_sum)
         for command in said:
             if _moves(command):
@@ -109,7 +110,7 @@ class SetPoints:
         return SetDuty(*self._board_order(pair))
 
     def meaning(self, data: bytes) -> BodyTwist:
-        """Return the body velocity that the last set-point in these bytes commands."""
+        """Return the body velocity that the last set-point in ``data`` commands."""
         settings = self.settings
         found = outbound.set_points(data, with_sum=settings.with_sum)
         if not found:
@@ -131,7 +132,7 @@ class SetPoints:
         )
 
     def _board_order(self, pair: tuple[int, int]) -> tuple[int, int]:
-        """Swap left and right if the board's order is inverted: from or to the board's order."""
+        """Convert a pair to or from the board's order: swap its values if the board is inverted."""
         return (pair[1], pair[0]) if self.settings.inverted else pair
 
 

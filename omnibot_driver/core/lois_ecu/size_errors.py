@@ -4,8 +4,8 @@
 
 Such an error is constant during a drive, so the yaw error grows, and soon the error of the pose is
 not proportional to its cause. Therefore the drive is computed again with each error, once positive
-and once negative. The spread of the resulting poses is the covariance. Works on distances of the
-wheels.
+and once negative. The spread of the resulting poses is the covariance. This module works on
+distances of the wheels.
 """
 
 import math

@@ -11,8 +11,8 @@ turn backward is at rest, there are two cases. While the other wheel is also at 
 rest. A wheel that rolls steadily also repeats a speed, but this speed is not far above its
 set-point: far above it the controller gives no power, so the wheel would slow down. There are two
 exceptions. A feed-forward gives power at any speed. A saturated controller may keep full power
-until RPM 0/0 restarts it; the wheel is then faster than any wheel that comes to rest. Works on
-set-points, reports and times.
+until RPM 0/0 restarts it; the wheel is then faster than any wheel that comes to rest. This module
+works on set-points, reports and times.
 """
 
 import math
@@ -100,7 +100,10 @@ class StallWatch:
                     self._note(wheel, now, turns=ticked[wheel])
 
     def stalled(self, now: float) -> tuple[bool, bool]:
-        """Return which commanded wheels have not turned for ``STALLED_S``, and restart the time."""
+        """Return which commanded wheels have not turned for ``STALLED_S``.
+
+        If there are any, the timing of both wheels is restarted.
+        """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= AT_LEAST
             for seen_at, quiet in zip(self._seen_at, self._quiet, strict=True)

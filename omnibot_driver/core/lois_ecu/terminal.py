@@ -5,8 +5,8 @@
 In a terminal mode the board forwards a sensor's lines and sends no messages of its own. It still
 obeys set-points, but does not report motion, and the public firmware does not report presses of the
 e-stop button. So the robot is stopped first, and is not driven until the board's own messages
-arrive again. A mode is written repeatedly until the received data shows that the board obeys. Works
-on modes and times.
+arrive again. A mode is written repeatedly until the received data shows that the board obeys. This
+module works on modes and times.
 """
 
 import math
@@ -19,7 +19,7 @@ UNPROVED_S: Final = 2.0
 """Time in s for which Stop is sent to a robot whose standstill cannot be seen."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""Time in s after the writing of a mode, in which reports that were sent before may still
+"""Time in s after a mode is written, during which reports that the board sent earlier may still
 arrive."""
 
 

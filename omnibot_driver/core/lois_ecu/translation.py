@@ -3,7 +3,7 @@
 """Translation of a LOIS ECU's reports to readings in SI units.
 
 This module also detects a restart of the board: the ticks are near zero again, or the board's clock
-has gone back. Works on reports, without lines.
+has gone back. The module works on reports, without lines.
 """
 
 import math

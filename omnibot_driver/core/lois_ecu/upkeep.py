@@ -3,8 +3,8 @@
 """Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
 The schedule covers settings, the terminal mode, requests for records, RPM 0/0 after a Stop, and the
-recovery of a board that is silent or ignores commands. Combines the classes for these tasks. Must
-not know what the board sends.
+recovery of a board that is silent or ignores commands. This module combines the classes for these
+tasks. It must not know what the board sends.
 """
 
 import math

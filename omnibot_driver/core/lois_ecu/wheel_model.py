@@ -3,7 +3,7 @@
 """Model of one wheel's commands: when they take effect, and what the firmware then counts.
 
 The public firmware stores an RPM target for each wheel. The sign of the target decides whether
-ticks are counted, and is the sign of the measured speed. Works on set-points and times.
+ticks are counted, and is the sign of the measured speed. This module works on set-points and times.
 """
 
 import math

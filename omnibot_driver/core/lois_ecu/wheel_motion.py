@@ -5,7 +5,7 @@
 A wheel coasts without power, follows a duty, or is driven by the board's speed controller. The
 controller uses the last measured speed. The public firmware does not set this speed to zero when
 the wheel stops, so a wheel at rest may get little power, or none. The user's gains and motors are
-unknown, so the assumed noise is large. Works on commands and the states of one wheel.
+unknown, so the assumed noise is large. This module works on commands and the states of one wheel.
 """
 
 import math

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pair of Teensys and their robot: bytes in and out of both ports, in steps of a millisecond.
+"""The pair of simulated Teensys and their robot, which advance in steps of a millisecond.
 
-Pure: bytes in, ticks of ``tick_s``, bytes out; the same settings and input give the same output.
-Knows which half is at which port, and when a fault occurs. Must not know commands.
+The module is pure: it takes bytes, advances by ticks of ``tick_s``, and returns bytes; the same
+settings and input give the same output. It knows which half is at which port, and when a fault
+occurs. It must not know commands.
 
 Assumptions where the manual says nothing: an ``rc`` never expires; a Teensy that restarts switches
 its motors off and forgets its subscriptions; the front wheel stays where it is until an ``rc``

@@ -2,8 +2,8 @@
 
 """The two distance sensors of the drive Teensy, which face a wall across the x axis.
 
-The time-of-flight sensor always measures; the sonar measures only when triggered. Knows only the
-robot's pose.
+The time-of-flight sensor always measures; the sonar measures only when triggered. This module knows
+only the robot's pose.
 """
 
 from math import cos

@@ -2,8 +2,8 @@
 
 """The drive Teensy: turning control of two wheels, odometry, IMU, battery, distance sensors.
 
-Knows the drive half of the manual and the robot. Must not know the front Teensy: the angle of the
-front wheel arrives by a command, or not at all.
+This module knows the drive half of the manual and the robot. It must not know the front Teensy: the
+angle of the front wheel arrives by a command, or not at all.
 """
 
 from collections.abc import Callable

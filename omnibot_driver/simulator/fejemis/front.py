@@ -2,7 +2,7 @@
 
 """The front Teensy: steering, its angle sensor, brush, lift, LEDs and infrared sensors.
 
-Knows the front half of the manual and the robot. Must not know the drive Teensy.
+This module knows the front half of the manual and the robot. It must not know the drive Teensy.
 """
 
 from collections.abc import Callable
@@ -90,7 +90,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         return -seen_deg if self.config.angle_inverted else seen_deg
 
     def _steer(self) -> None:
-        """Set the servo's velocity by the P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
+        """Set the servo's velocity with the P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
         servo, gains = self.vehicle.servo, self.config.steering
         if self._servo_raw is not None:
             servo.command = self._servo_raw

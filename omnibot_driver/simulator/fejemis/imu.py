@@ -2,7 +2,7 @@
 
 """The IMU on the drive Teensy: gyro, accelerometer, magnetometer, orientation, calibration.
 
-Knows the true motion of the body. Must not know the lines of the protocol.
+This module knows the true motion of the body. It must not know the lines of the protocol.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ class Imu:
     """The simulated IMU.
 
     orientation: roll, pitch and yaw in rad. calibrated: the result of a calibration that has just
-    ended, for the configuration; otherwise None.
+    ended, to be stored in the configuration; otherwise None.
     """
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:

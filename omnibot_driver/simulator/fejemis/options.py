@@ -2,7 +2,7 @@
 
 """Command line options of a simulated Fejemis, except its seed and the faults of its lines.
 
-Knows the names, values and effects of options. Must not know what runs the boards.
+This module knows the names, values and effects of options. It must not know what runs the boards.
 """
 
 import argparse

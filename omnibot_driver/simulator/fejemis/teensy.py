@@ -2,8 +2,8 @@
 
 """The common part of both Teensys: lines, clock, subscriptions, identity, configuration memory.
 
-A control cycle takes a millisecond by the Teensy's own crystal. Knows the software structure that
-the manual describes. Must not know what either Teensy measures or moves.
+A control cycle takes a millisecond by the Teensy's own crystal. This module knows the software
+structure that the manual describes. It must not know what either Teensy measures or moves.
 """
 
 import struct
@@ -42,7 +42,8 @@ class Obeyed:
 class Teensy(Generic[C]):
     """The common part of the drive and the front Teensy.
 
-    commands: the lines that it executed, newest last. received: all bytes that reached it.
+    commands: the lines that the Teensy executed, newest last. received: all bytes that reached the
+    Teensy.
 
     The caller may set these faults at any time. sums: whether lines carry checksums. silent: the
     Teensy obeys, but sends nothing. hung: the Teensy neither obeys nor sends, and its last control
@@ -153,7 +154,7 @@ class Teensy(Generic[C]):
             self._arrived += self._reader.feed(data)
 
     def step(self, now_s: float) -> bytes:
-        """Advance by a millisecond, up to ``now_s``; return the bytes sent over the cable."""
+        """Advance by one millisecond, which ends at ``now_s``; return the bytes sent."""
         if not self.powered:
             return b""
         self._told_s = now_s

@@ -2,7 +2,8 @@
 
 """The robot that the two Teensys move: driving wheels, the steered wheel's servo, lift, brush.
 
-Knows speeds and angles, and the pose that results. Must not know the boards or their lines.
+This module knows speeds and angles, and the pose that results. It must not know the boards or their
+lines.
 """
 
 from dataclasses import dataclass

@@ -3,8 +3,8 @@
 """Codec of text lines as a Teensy reads and writes them, by the manual and public programs.
 
 In firmware with checksums a line begins with ``;NN``: 1 plus the sum, modulo 99, of all later
-characters from the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. Must not
-know the meaning of a command.
+characters from the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. This
+module must not know the meaning of a command.
 """
 
 import re
@@ -13,7 +13,7 @@ from enum import Enum
 BUFFER = 200
 """Number of characters that the line buffer holds.
 
-Each time a longer line fills the buffer, the characters in it are discarded.
+Each time a longer line fills the buffer, all characters in the buffer are discarded.
 """
 
 _NUMBER = re.compile(r"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
@@ -41,7 +41,7 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Return the checksum's check result, the line without ``;NN``, and the correct checksum."""
+    """Return the result of the check, the line without ``;NN``, and the correct checksum."""
     found = _PREFIX.match(text)
     if found is None:
         return Check.ABSENT, text, 0
@@ -70,7 +70,7 @@ def padded(text: str, count: int) -> list[float]:
 class LineReader:
     """Splits characters into lines.
 
-    If the buffer is full, the next character clears it first.
+    If the buffer is full, the next character first clears the buffer.
     """
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ class LineReader:
         self._held.clear()
 
     def feed(self, data: bytes) -> list[str]:
-        """Return the lines that these bytes complete, without line ends and without empty lines."""
+        """Return the lines that ``data`` completes, without line ends and without empty lines."""
         lines = []
         for byte in data:
             if byte in b"\r\n":

@@ -2,9 +2,9 @@
 
 """The simulated LOIS ECU and its robot, which advance in steps of a millisecond.
 
-Pure: takes bytes, advances by ``tick_s``, and returns bytes; the same settings and input give the
-same output. Knows the manual's table of messages and, through ``Quirks``, the public firmware. Must
-not know ports or real time.
+The module is pure: it takes bytes, advances by ``tick_s``, and returns bytes; the same settings and
+input give the same output. It knows the manual's table of messages and, through ``Quirks``, the
+public firmware. It must not know ports or real time.
 
 Assumptions where the manual says nothing: set points never expire; encoder ticks are signed and
 wrap at 2³²; the button is reported on press and on release, and both set the set points to zero.
@@ -162,7 +162,7 @@ class SimulatedLois:
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
-        """Begin to receive these bytes at 115200 baud; ``now`` and ``channel`` are ignored."""
+        """Begin to receive ``data`` at 115200 baud; ignore ``now`` and ``channel``."""
         self._uart.receive(data)
 
     def advance(self) -> list[Packet]:
@@ -190,7 +190,7 @@ class SimulatedLois:
         }
 
     def step(self) -> bytes:
-        """Advance by one tick of 10 ms; return the bytes sent in it."""
+        """Advance by one tick of 10 ms; return the bytes sent in this tick."""
         self.tick += 1
         sent = bytearray()
         for _ in range(STEPS_PER_TICK):

@@ -2,8 +2,8 @@
 
 """One wheel as the board sees it: encoder edges in; ticks, speed and motor duty out.
 
-Contains the firmware's quirks of counting and measuring. Knows neither the protocol nor the other
-wheel.
+This module contains the firmware's quirks of counting and measuring. It knows neither the protocol
+nor the other wheel.
 """
 
 from math import copysign
@@ -91,7 +91,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        The manual implies this; with a quirk, a stalled wheel keeps its measured speed.
+        The manual implies this rule; with a quirk, a stalled wheel keeps its measured speed.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0
@@ -99,7 +99,7 @@ class WheelChannel:
     # Records
 
     def start_record(self, samples: int, *, torque: bool) -> None:
-        """Start a record of this many samples, and discard the previous one."""
+        """Start a record of ``samples`` samples, and discard the previous record."""
         if not self._quirks.large_records_never_end:
             samples = min(samples, RECORD_DEPTH)
         self.record, self.record_left = [], samples
@@ -132,7 +132,7 @@ class WheelChannel:
     def release(self) -> None:
         """Stop the motor because of the emergency stop button.
 
-        This acts like a command of zero in the current mode.
+        The button acts like a command of zero in the current mode.
         """
         if self.open_loop:
             self.duty_percent = 0

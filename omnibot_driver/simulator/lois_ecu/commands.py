@@ -2,7 +2,7 @@
 
 """The effect of each command on the board.
 
-Knows commands and payloads. Must not know characters, nor how replies are sent.
+This module knows commands and payloads. It must not know characters, nor how replies are sent.
 """
 
 from dataclasses import dataclass

@@ -2,8 +2,8 @@
 
 """A motor with its wheel and encoder, and the board's speed controller for it.
 
-Speeds are in RPM, efforts in percent of duty. Knows time steps. Must not know commands or the
-protocol.
+Speeds are in RPM, efforts in percent of duty. This module knows time steps. It must not know
+commands or the protocol.
 """
 
 from collections import deque
@@ -84,10 +84,10 @@ class Motor:
 
 
 class Encoder:
-    """An encoder disc. The fraction ``short`` of each period is the short level, the rest the long.
+    """An encoder disc, on which short and long levels alternate.
 
-    ``steps``: edges per turn. ``noise``: standard deviation of the length of a level, as a fraction
-    of half a period.
+    ``short``: fraction of a period that is the short level. ``steps``: edges per turn. ``noise``:
+    standard deviation of the length of a level, as a fraction of half a period.
     """
 
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
@@ -142,8 +142,8 @@ class SpeedController:
     """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised with the trapezoidal rule.
 
     The coefficients are for steps of ``NOMINAL_STEP_S``, even if the true step differs. An output
-    beyond 100 % does not enter the state (anti-windup). An output whose sign differs from the
-    target's becomes zero. The firmware adds a low-pass of the target and a feed-forward.
+    beyond 100 % does not enter the state (anti-windup). An output whose sign differs from that of
+    the target becomes zero. The firmware adds a low-pass of the target and a feed-forward.
     """
 
     def __init__(self, gains: Gains) -> None:

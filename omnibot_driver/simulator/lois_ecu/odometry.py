@@ -2,7 +2,7 @@
 
 """The board's own odometry, as the manual describes it and as the firmware computes it.
 
-Knows wheels and their nominal geometry. Must not know the true pose of the robot.
+This module knows wheels and their nominal geometry. It must not know the true pose of the robot.
 """
 
 from math import cos, inf, nan, pi, sin
@@ -33,7 +33,7 @@ class DocumentedOdometry:
         self.velocity = (0.0, 0.0, 0.0)
 
     def move(self, left_ticks: int, right_ticks: int) -> None:
-        """Move the pose by these increments of the ticks."""
+        """Move the pose by the given increments of the ticks."""
         way = (left_ticks + right_ticks) * self._tick_m / 2
         turn = (right_ticks - left_ticks) * self._tick_m / self._track_m
         x, y, yaw = self.pose
@@ -51,7 +51,7 @@ class DocumentedOdometry:
 class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each tick of either wheel, from the latest RPMs.
 
-    The RPMs are integers. ``stands``: the position does not change while both speeds are equal.
+    The RPMs are integers. ``stands``: the position does not change while both RPMs are equal.
     ``divides``: the velocity is the displacement divided by the time since the last tick, so a time
     of zero gives NaN or infinity. ``slow``: each count of the timer takes 0.7 % too long.
     """

@@ -2,7 +2,7 @@
 
 """Records of tick times, torque and headings: sampled, and encoded as lines when complete.
 
-Knows wheels as the board sees them. Must not know when the lines are sent.
+This module knows wheels as the board sees them. It must not know when the lines are sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire
@@ -26,7 +26,7 @@ class Recorder:
         self._wanted = 0
 
     def start(self, number: int, payload: int) -> None:
-        """Start a record and discard the previous one."""
+        """Start a record, and discard the previous record."""
         self.number = number
         if number == HEADINGS:
             self._headings, self._wanted = [], payload
@@ -35,13 +35,16 @@ class Recorder:
             channel.start_record(samples, torque=number == TORQUE)
 
     def control(self) -> None:
-        """Take a torque sample if a torque record runs; called at each step of the controllers."""
+        """Take a torque sample if a torque record is running.
+
+        Called at each step of the controllers.
+        """
         if self.number == TORQUE:
             for channel in self._wheels:
                 channel.torque()
 
     def heading(self, heading: int) -> bytes:
-        """Record a compass heading in degrees; return the encoded record if complete, else b""."""
+        """Record a heading in degrees; return the encoded record if it is complete, else b""."""
         if self.number != HEADINGS:
             return b""
         full = len(self._headings) >= min(self._wanted, 2 * RECORD_DEPTH)

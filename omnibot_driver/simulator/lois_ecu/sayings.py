@@ -2,7 +2,7 @@
 
 """The board's periodic messages as lines: GPS position, time, date, heading, ticks, odometry.
 
-Knows where each value comes from. Must not know when a message is sent.
+This module knows where each value comes from. It must not know when a message is sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire
@@ -28,7 +28,7 @@ class Sayings:
         self._odometry, self._compass = odometry, compass
 
     def group(self, code: int, clock_ms: int, now_s: float) -> bytes:
-        """Return the lines of the message with this command number."""
+        """Return the lines of the message with the command number ``code``."""
         quirks = self._settings.quirks
         if code == 0x10:
             return wire.words(code, 0, self._compass.last)

@@ -2,7 +2,7 @@
 
 """The GPS receiver and the compass on the board's serial inputs.
 
-Knows the true pose of the robot. Must not know the host's protocol.
+This module knows the true pose of the robot. It must not know the host's protocol.
 """
 
 from collections import deque
@@ -48,7 +48,7 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: average the readings as plain numbers, which is wrong across north.
+    ``over_north``: average the readings as plain numbers, which gives a wrong mean near north.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:

@@ -2,7 +2,8 @@
 
 """The terminal mode: characters that pass between the board's sensors and the host.
 
-Knows characters and which sensor sent them. Must not know the protocol, nor when the board sends.
+This module knows characters and which sensor sent them. It must not know the protocol, nor when the
+board sends.
 """
 
 from collections import deque
@@ -14,7 +15,7 @@ GPS, COMPASS = 1, 2
 NO_TERMINAL = (0, 4)
 PASSED_ON_DEPTH = 2048
 CHARACTERS_PER_STEP = {GPS: 0.96, COMPASS: 0.48}
-"""Characters that a sensor's serial line carries in a step of 1 ms, at 9600 and 4800 baud."""
+"""Number of characters that a sensor's serial line, at 9600 or 4800 baud, carries in 1 ms."""
 
 
 class Terminal:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Periods of the board's messages. Knows the board's clock and the command numbers."""
+"""Periods of the board's messages. This module knows the board's clock and the command numbers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Timers:
             timer.since_ms = clock_ms
 
     def take(self, code: int, clock_ms: int) -> bool:
-        """Return whether this message is due; if so, begin its next period."""
+        """Return whether the message ``code`` is due; if so, begin its next period."""
         timer = self._timers[code]
         if timer.period_ms == NEVER:
             return False

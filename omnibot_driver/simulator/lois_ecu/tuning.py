@@ -2,7 +2,7 @@
 
 """Initial parameters of the wheels' controllers and encoders, and the commands that change them.
 
-Knows the commands that write one number each. Must not know lines.
+This module knows the commands that write one number each. It must not know lines.
 """
 
 from omnibot_driver.simulator.lois_ecu.channel import WheelChannel

@@ -2,7 +2,7 @@
 
 """The board's serial port at 115200 baud: what it receives, and what it sends with interrupts off.
 
-Knows characters and steps of a millisecond. Must not know lines.
+This module knows characters and steps of a millisecond. It must not know lines.
 """
 
 from collections import deque
@@ -58,7 +58,7 @@ class Uart:
         self._misses = True
 
     def listen(self) -> int:
-        """Receive for one step; return the number of characters received."""
+        """Receive for one step of 1 ms; return the number of characters received."""
         came = heard = 0
         self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._inbound and self._in_credit >= 1.0:
@@ -78,7 +78,7 @@ class Uart:
         return heard
 
     def send(self, sent: bytearray) -> bool:
-        """Send for one step, appending the sent bytes to ``sent``.
+        """Send for one step of 1 ms, and append the sent bytes to ``sent``.
 
         Return whether interrupts are switched on again; the caller must then call ``hear_kept``.
         """

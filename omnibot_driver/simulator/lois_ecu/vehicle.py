@@ -2,7 +2,7 @@
 
 """The robot that a simulated LOIS ECU drives: two wheels on the ground, and the resulting motion.
 
-Knows duties and the positions of the encoder marks. Must not know the board.
+This module knows duties and the positions of the encoder marks. It must not know the board.
 """
 
 from dataclasses import dataclass
@@ -40,8 +40,8 @@ class Edge:
 class Vehicle:
     """The robot; ``truth`` is its true pose and motion.
 
-    ``corrections``: for each encoder, the factors of the short and the long level with which the
-    board makes the levels equal.
+    ``corrections``: for each encoder, the board's factors for the short and the long level, which
+    make both levels equally long.
     """
 
     def __init__(

@@ -3,8 +3,8 @@
 """The protocol as the board encodes and decodes it, written from the manual alone.
 
 A line is ``:``, two hexadecimal digits of command, eight of payload, two of checksum (XOR of all
-characters before it) and a line feed. Shares no code with the driver. Must not know what a command
-means.
+characters before it) and a line feed. This module shares no code with the driver. It must not know
+what a command means.
 """
 
 import re
@@ -44,7 +44,7 @@ def bits_of(number: float) -> int:
 
 
 def number_of(bits: int) -> float:
-    """Return the float32 that has these bits."""
+    """Return the float32 whose bits are ``bits``."""
     (number,) = struct.unpack(">f", bits.to_bytes(4, "big"))
     return float(number)
 
@@ -58,8 +58,8 @@ class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
     ``checks``: whether lines have a checksum. ``lenient``: fields are read like C's strtol, which
-    accepts space, sign and prefix and stops at the first character that is not a digit. Otherwise
-    such a field invalidates the line.
+    accepts space, sign and prefix and stops at the first character that is not a digit. Without
+    ``lenient``, a field with such characters invalidates the line.
     """
 
     def __init__(self, *, lenient: bool) -> None:
@@ -68,7 +68,7 @@ class LineReader:
         self._buffer: list[str] = []
 
     def take(self, character: int) -> tuple[int, int] | None:
-        """Process a character; return command and payload of the line it completes, or None."""
+        """Process a character; return command and payload if it completes a line, else None."""
         letter = chr(character)
         length = LINE_CHARACTERS if self.checks else LINE_CHARACTERS - 2
         if letter == ":" or len(self._buffer) >= length:
