@@ -143,7 +143,7 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines, as the ports are closed; return a running job's failure."""
+        """Discard incomplete lines, as the ports are closed; return the failure of a job."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -210,7 +210,7 @@ class FejemisBoard(Board):
     # Outbound
 
     def actuator(self, proof: StopProof) -> PairStream:
-        """Create the set-point stream for both halves."""
+        """Create the set-point stream for both boards."""
         self._actuator = PairStream(self._encoder, proof, self)
         return self._actuator
 
@@ -267,7 +267,10 @@ class FejemisBoard(Board):
         return self.stop() + self._ports.line("drive", b"start")
 
     def pause(self) -> Packets:
-        """Return a Stop and the pause of the drive board; switch brush and lift off."""
+        """Return the packets that stop the motion and pause the drive board.
+
+        Brush and lift are switched off too.
+        """
         self._obedience.pause()
         self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
         self._upkeep.machine.off()

@@ -46,9 +46,9 @@ TURN: Final[Range] = (-180.0, 180.0)
 SPEED: Final[Range] = (-10.0, 10.0)
 """Range of the speed of a wheel's rim, in m/s."""
 RATE: Final[Range] = (-4000.0, 4000.0)
-"""Range of a turn rate, in degrees per second; a gyro of this kind does not measure more."""
+"""Range of a turn rate, in degrees per second; the gyros of such boards do not measure more."""
 FORCE: Final[Range] = (-320.0, 320.0)
-"""Range of the specific force, in m/s²: 32 g."""
+"""Range of the specific force, in m/s²; 320 m/s² are about 32 g."""
 FIELD: Final[Range] = (-5000.0, 5000.0)
 """Range of the magnetic field, in µT."""
 ANGLE: Final[Range] = (-7.0, 7.0)
@@ -68,7 +68,7 @@ Parse = Callable[[list[str]], Message | None]
 
 
 def parse(text: str) -> Message | None:
-    """Return the message in this text; None if it is damaged or its keyword is unknown."""
+    """Return the message in ``text``; None if the text is damaged or its keyword is unknown."""
     if text.startswith("#") or text.startswith("--"):
         return Comment(text)
     words = text.split()  # splits at any white space, as the firmware does

@@ -139,7 +139,7 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        These are the values that the user has set, unless the board reports other values.
+        Track and wheelbase are those that the user has set, unless the board reports other values.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):
@@ -173,7 +173,7 @@ class Configuration:
 
 
 def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
-    """Return the line that writes ``numbers`` to the board as this setting."""
+    """Return the line that writes ``numbers`` to the board as the values of ``setting``."""
     words = " ".join(f"{number:.6g}" for number in numbers)
     return f"{setting.command} {words}".encode("ascii")
 

@@ -24,7 +24,8 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Longest line in characters, equal to the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""Count of heartbeats in a row that prove that sums began or ended; a single one may be damaged."""
+"""Number of heartbeats in a row that prove that the board began or ceased to send sums. A single
+heartbeat may be damaged."""
 
 
 @dataclass(slots=True)
@@ -50,7 +51,7 @@ class FejemisDecoder:
         self.changed = self.doubtful = self.contradicted = False
         self._held = b""
         self._cut = False
-        """Whether the incomplete line is already too long."""
+        """Whether the line that is being received is already too long."""
         self._forms = Forms()
         self.line_sums = line_sums
 

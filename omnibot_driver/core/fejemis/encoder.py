@@ -34,7 +34,7 @@ REVERSE = (
 
 
 class Pair(Protocol):
-    """The two boards, as the encoder uses them."""
+    """What the encoder needs from the two boards."""
 
     @property
     def geometry(self) -> Geometry:

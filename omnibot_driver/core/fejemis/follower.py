@@ -30,7 +30,10 @@ UNTIL_START: Final = (
 
 
 class Follower:
-    """Check of the front wheel; ``refusal``: why the robot must not be driven, else empty."""
+    """Check of the front wheel.
+
+    ``refusal``: the reason why the robot must not be driven; empty if driving is allowed.
+    """
 
     def __init__(self) -> None:
         self.refusal = ""

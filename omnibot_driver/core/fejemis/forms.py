@@ -29,7 +29,7 @@ class Forms:
         self._kinds: dict[bytes, _Kind] = {}
 
     def admit(self, text: bytes, *, summed: bool) -> bool:
-        """Return whether the line has the form of its kind; ``summed``: it has a correct sum."""
+        """Return whether the line has the form of its kind; ``summed``: its sum is correct."""
         keyword, *fields = text.split()
         form = tuple(map(_shape, fields))
         kind = self._kinds.get(keyword)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of the front wheel: whether it is known, and whether its sensor works.
+"""The angle of the front wheel: whether the angle is known, and whether its sensor works.
 
 The module knows angles, the sensor's status bits and times, not what is commanded.
 """
@@ -49,17 +49,17 @@ class FrontWheel:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the angle and the sensor's faults."""
+        """Forget the wheel's angle and the faults of its sensor."""
         self.angle_rad = math.nan
         self.heard_at = -math.inf
         self.fault = ""
-        """The sensor's faults, as text; empty while it works."""
+        """The faults of the angle sensor, as text; empty while the sensor works."""
         self._sick = 0
         self._doubted_deg: float | None = None
 
     @property
     def trouble(self) -> str:
-        """The sensor's faults, as a sentence with advice; empty while it works."""
+        """Faults of the angle sensor, as a sentence with advice; empty while the sensor works."""
         if not self.fault:
             return ""
         return (
@@ -82,7 +82,7 @@ class FrontWheel:
         return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
 
     def known(self, now: float) -> bool:
-        """Return whether the sensor works, and its last angle is recent enough to drive."""
+        """Return whether the angle sensor works, and its last angle is recent enough to drive."""
         return not self.fault and now - self.heard_at <= OLDEST_S
 
     def hear(self, told: FrontAngle, now: float) -> bool:
@@ -115,7 +115,7 @@ class FrontWheel:
 
 
 def complaints(told: FrontAngle) -> list[str]:
-    """Return the faults that the sensor reports; empty while it works."""
+    """Return the faults that the angle sensor reports; empty while the sensor works."""
     words = [f"error flags 0x{told.error:x}"] if told.error else []
     if told.diagnosis & LOOKED_AT != HEALTHY:
         words += [

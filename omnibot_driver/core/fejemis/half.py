@@ -2,9 +2,9 @@
 
 """One of the two Teensy boards (a half), at one port: identity, streams and silence.
 
-The driver subscribes to the board's streams, and subscribes again when a stream does not come: a
-line may be lost, and a board that restarts forgets all subscriptions. The module knows lines and
-times, not what a message is used for.
+The driver subscribes to the board's streams, and subscribes again when a stream does not come: the
+subscription may be lost, and a board that restarts forgets all subscriptions. The module knows
+lines and times, not what a message is used for.
 """
 
 import math
@@ -55,7 +55,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
 class Half:
-    """State of one board; ``identity``: from its heartbeats, None before the first.
+    """State of one board; ``identity``: from its heartbeats, None before the first one.
 
     ``restarted``: whether the board has restarted; the caller resets this flag.
 
@@ -84,8 +84,8 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the stream in ``NEEDED`` arrives, and the board has not restarted since it
-        began."""
+        """Whether the stream in ``NEEDED`` arrives, and the board has not restarted since the
+        stream began."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -126,7 +126,7 @@ class Half:
     def not_understood(self, now: float) -> bool:
         """Return whether many recent lines were damaged or unknown; True at most once a second.
 
-        Call this after each read.
+        Called after each read.
         """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults
@@ -136,11 +136,11 @@ class Half:
         return True
 
     def came_at(self, keyword: str) -> float:
-        """Return the time of the last line of this kind, in s; -infinity before the first."""
+        """Return the time of the last line with ``keyword``, in s; -infinity before the first."""
         return self._at.get(keyword, -math.inf)
 
     def note(self, keyword: str, now: float) -> None:
-        """Record that a line of this kind came."""
+        """Record that a line with this ``keyword`` came."""
         self._at[keyword] = now
 
     def subscribe_again(self) -> None:
@@ -217,7 +217,7 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """Accept the first heartbeat's identity at once; later, two heartbeats must agree."""
+        """Accept the first identity at once, and another one only if two heartbeats agree."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self.identity:

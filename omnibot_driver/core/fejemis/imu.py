@@ -2,10 +2,11 @@
 
 """Converts pairs of gyro and acceleration lines, which carry no time, into samples with timestamps.
 
-The board measures both every ``PERIOD_S`` of its own clock, and sends them together. So samples are
-counted, and a sample's time is a phase plus a whole number of periods. The phase and this number
-follow from the arrival times: a sample cannot arrive before its time, and a sample that comes after
-a pose in the stream is not older than the pose. `imu_pairs.py` finds the pairs.
+The board measures turn rate and acceleration every ``PERIOD_S`` of its own clock, and sends both
+together. So samples are counted, and a sample's time is a phase plus a whole number of periods. The
+phase and this number follow from the arrival times: a sample cannot arrive before its time, and a
+sample that comes after a pose in the stream is not older than the pose. `imu_pairs.py` finds the
+pairs.
 """
 
 import math
@@ -22,7 +23,7 @@ REGULAR: Final = 0.6
 """Shortest interval between two arrivals, in periods, at which late samples prove a loss.
 
 If two samples in a row are late by a period, and arrive at least this interval apart, a sample was
-lost before them. If they had waited for a stalled host, both would arrive at once."""
+lost before them. If both samples had waited for a stalled host, they would have arrived at once."""
 CYCLE_S: Final = 0.0015
 """Longest time in s in which one control cycle sends its lines, in any order."""
 PHASE_BLOCKS: Final = 3

@@ -31,7 +31,7 @@ Kind = Literal["gyro", "acc"]
 
 PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
-"""Delay in s between two lines up to which they are a pair without further evidence."""
+"""Longest delay in s between two lines that are a pair without further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """The evidence for which line comes first is a sum of pauses in s. From the sum ``KNOWN_S`` on, the
@@ -82,14 +82,16 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of a sample's first line; None while unknown."""
         self._evidence_s = 0.0
-        """Evidence that gyro lines come first; negative if acceleration lines do."""
+        """Evidence that gyro lines come first; negative values: that acceleration lines come
+        first."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
         self._between: set[str] = set()
         """Kinds of other lines since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
-        """For each other kind: count of lines outside of pairs, minus count within pairs."""
+        """For each other kind of line: count of lines outside of pairs, minus count within
+        pairs."""
         self._skipped = 0
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf

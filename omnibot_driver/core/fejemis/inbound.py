@@ -53,7 +53,7 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return and clear the angle to relay to the drive board, in rad; None if there is none."""
+        """Return and clear the angle to relay to the drive board, in rad; None if none is due."""
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 

@@ -19,7 +19,7 @@ from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, Whe
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
 POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
-"""The reason why nothing may move after a power off was requested."""
+"""The reason why nothing may move after a power-off was requested."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose codes add up to 99, so that a sum does not detect the loss of both."""
 WITHIN_S: Final = 8.0
@@ -27,7 +27,7 @@ CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""How many times a request is sent, except for a calibration."""
+"""How many times the request of a job is sent, except for a calibration."""
 UNCHANGED_S: Final = 2.4
 """If the offsets are unchanged this time in s after the request for a calibration, the request is
 regarded as lost."""
@@ -40,7 +40,7 @@ OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
     Job.CALIBRATE_GYRO: (b"gyroc", b"gyrooi", "gyroo"),
     Job.CALIBRATE_ACCELEROMETER: (b"acccal2", b"accoi", "acco"),
 }
-"""For each calibration: its command, the request for its result, and the answer's keyword."""
+"""For each calibration: the command, the request for the result, and the answer's keyword."""
 
 
 def whole_seconds(delay_s: float) -> int:
@@ -96,8 +96,8 @@ class Jobs:
     ) -> None:
         """Begin a job after ``wait_s``. Raises RequestRefused while another job runs.
 
-        ``token``: identifies the job in its result. ``delay_s``: time until a power off cuts the
-        power.
+        ``token``: identifies the job in its result. ``delay_s``: for a power-off, the time until
+        the power is cut.
         """
         if self.job is not None:
             raise RequestRefused(
@@ -124,7 +124,7 @@ class Jobs:
     def restarted(self, role: Role) -> None:
         """Fail the running job, as the board ``role`` has restarted.
 
-        A power off fails, and is cancelled, only if the drive board has restarted.
+        A power-off fails, and is cancelled, only if the drive board has restarted.
         """
         if role == "front" and self.job is Job.POWER_OFF:
             return
@@ -133,7 +133,7 @@ class Jobs:
             self.powering_off = False
 
     def keep_power(self) -> None:
-        """Cancel a requested power off, as the user has called ~/start."""
+        """Cancel a requested power-off, as the user has called ~/start."""
         if self.powering_off:
             self._stay_on(SAID)
         if self.job is Job.POWER_OFF:
@@ -141,7 +141,7 @@ class Jobs:
         self.powering_off = False
 
     def begin(self) -> None:
-        """Fail the running job, as the connection is new; a requested power off stays in force."""
+        """Fail the running job, as the connection is new; a requested power-off stays in force."""
         self.cancel("the port was lost meanwhile; call again once it is back")
 
     def due(self, now: float) -> Lines:

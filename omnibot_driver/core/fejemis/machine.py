@@ -21,7 +21,8 @@ BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
 """Period in s at which ``brush 1`` is repeated while the brush is on, as a line may be lost."""
 PACE_S: Final = 0.05
-"""Shortest time in s between two lift commands, or two light commands; only the newest is sent."""
+"""Shortest time in s between two lift commands, or between two light commands. Of the commands that
+come earlier, only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
@@ -33,7 +34,7 @@ LEAST_TIME_S: Final = 0.04
 class Machine:
     """State of brush, lift and lights; ``brush``: whether the brush is on.
 
-    ``volts``: voltage of the lift in V, 0 once its time is over.
+    ``volts``: voltage of the lift in V, 0 once its run time is over.
     """
 
     def __init__(self) -> None:
@@ -41,7 +42,7 @@ class Machine:
         self.volts = 0.0
         self.colour: tuple[int, int, int] | None = None
         self._lift_line = b""
-        """Line for the lift that is still to be sent; empty if the last line was sent."""
+        """Lift line that is still to be sent; empty if no line is waiting."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
         """Times in s: when to send ``_lift_line``, when the next lift line may follow, and when the
         lift stops."""
@@ -71,7 +72,7 @@ class Machine:
         self._next_at = -math.inf
 
     def lift(self, volts: float, now: float, longest_s: float) -> None:
-        """Move the lift at ``volts`` (positive raises the wheel) for ``longest_s`` at most.
+        """Move the lift at ``volts`` for ``longest_s`` at most; positive ``volts`` raise the wheel.
 
         0 V stops the lift at once. Raises CommandRefused for NaN or infinity.
         """

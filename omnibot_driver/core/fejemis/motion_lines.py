@@ -5,9 +5,9 @@
 Not every number can be written in this way (`numerals.py`), but a board does not need both numbers
 of a line exactly. The front board computes the wheel's angle from the ratio of speed and turn rate.
 The drive board computes the speed of the outer wheel as the root of the sum of the squares of both
-numbers, with the sign of the speed. Among the lines that give this angle or speed exactly enough,
-the module chooses the one nearest to the command. Lines whose sum may hide a lost character of a
-number are avoided (`outbound.py`).
+numbers, with the sign of the speed. Among the lines that give the wanted angle or speed exactly
+enough, the module chooses the one nearest to the command. Lines whose sum may hide a lost character
+of a number are avoided (`outbound.py`).
 """
 
 import math
@@ -21,7 +21,7 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Smallest speed in m/s near which there are enough numbers that can be written."""
+"""Smallest speed in m/s in a line: near smaller speeds, too few numbers can be written."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the speed that a line gives."""
@@ -68,7 +68,7 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line, which sets the outer wheel to sqrt(speed² + turn²) in m/s.
 
-    The sign is that of the speed.
+    The outer wheel's speed has the sign of ``speed_mps``.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Numbers that can be written without any two characters whose joint loss a sum does not detect.
+"""Numbers in whose texts a sum (checksum) detects the loss of any two characters.
 
 A sum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or ``-``
 and ``6``. Each line contains the number ``2`` (the source of the command), so the numbers of this
@@ -16,12 +16,12 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""Powers of ten of the first digit: from ``SMALLEST`` to below ``LARGEST``."""
+"""The first digit of a number has a power of ten from ``SMALLEST`` to below ``LARGEST``."""
 
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return all writable numbers from 0.0001 to 10000 in rising order, and their texts.
+    """Return all usable numbers from 0.0001 to 10000 in rising order, and their texts.
 
     ``negative``: the line has a minus sign.
     """

@@ -4,9 +4,10 @@
 
 A pose is absolute, but has few digits: with steps of 1 mm every 20 ms, a speed from two poses has
 steps of 0.05 m/s. The wheel speeds show the motion more finely. So a displacement is the integral
-of the speeds between two poses, corrected towards the newer pose. If the integral and the
-difference of the poses differ by more than rounding, lines were lost or a wheel was turned quickly;
-then the displacement is the difference of the poses. The displacements add up to the pose.
+of the speeds between two poses, corrected towards the newer pose. If this integral and the
+difference of the two poses differ by more than rounding explains, lines were lost or a wheel was
+turned quickly; then the displacement is the difference of the poses. The displacements add up to
+the pose.
 
 A pose that the robot cannot have reached is held back until the next pose comes. If both poses
 agree, either the last accepted pose was wrong, or the board has begun a new frame (command
@@ -33,12 +34,13 @@ both axes.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""Distance in m and angle in rad by which a pose may differ from the integral of the speeds."""
+"""``SLACK_M``, ``SLACK_RAD``: distance in m and angle in rad by which a pose may differ from the
+integral of the speeds."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
 FRESH_S: Final = 0.1
-"""Age in s up to which wheel speeds are used."""
+"""Largest age in s of wheel speeds that are still used."""
 LEAST_S: Final = 0.001
 STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
@@ -61,7 +63,8 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection; the last pose is kept, as the board may still use its frame."""
+        """Begin a new connection; keep the last pose, as the frame of the poses may be
+        unchanged."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
         """Count of rejected poses in a row that agreed with the one before."""
@@ -87,7 +90,7 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
 
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement up to this pose, and every 0.2 s the sum of all displacements.
+        """Return the displacement up to ``pose``, and every 0.2 s the sum of all displacements.
 
         The sum is returned as a pose. If a later check rejects a displacement, the pose still
         contains it.
@@ -102,7 +105,7 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
-        """Return the displacement up to this pose; None for a first or a rejected pose.
+        """Return the displacement up to ``pose``; None for a first or a rejected pose.
 
         After a restart of the board, the first pose gives a displacement of 0.
         """
@@ -150,7 +153,7 @@ class PoseOdometry:
         )
 
     def _rolled(self, seconds: float, now: float) -> Pose | None:
-        """Return the motion in ``seconds`` by the wheel speeds; None if the speeds are too old."""
+        """Return the motion in ``seconds`` at the last wheel speeds; None if they are too old."""
         speeds = self._speeds
         if speeds is None or now - self._speeds_at > FRESH_S or seconds > FRESH_S:
             return None
@@ -193,7 +196,7 @@ def _place(pose: BoardPose) -> Pose:
 
 
 def _possible(way: Pose, seconds: float) -> bool:
-    """Return whether a robot can make the motion ``way`` in this time."""
+    """Return whether a robot can make the motion ``way`` in ``seconds``."""
     return (
         way.way_m <= FASTEST_MPS * seconds + SLACK_M
         and abs(way.yaw_rad) <= FASTEST_RADPS * seconds + SLACK_RAD

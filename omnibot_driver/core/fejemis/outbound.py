@@ -11,9 +11,9 @@ sum, so the digits of a motion line are chosen to get a suitable sum:
   whose code equals the sum of the second line with its prefix. So this sum must not be the code of
   a character in numbers, nor of the ``;`` (without it, the digits of the sum would continue the
   last number of the first line). If a line has such a sum and its digits cannot be chosen, the
-  driver sends an empty line before it, which the boards ignore.
+  driver first sends an empty line, which the boards ignore.
 * A lost digit of the sum leaves a sum that is correct only if a certain character is lost as well.
-  So this must not be a character in numbers.
+  So this character must not occur in numbers.
 
 Characters are never added to a line itself: a board may compare the complete line with ``stop``.
 """

@@ -24,7 +24,7 @@ SWAPPED: Final = replace(TRAITS, channels=TRAITS.channels[::-1])
 
 
 class Ports:
-    """The halves by channel; ``swapped``: the drive board is at the second port."""
+    """The two boards (halves) by channel; ``swapped``: the drive board is at the second port."""
 
     def __init__(self, settings: FejemisSettings) -> None:
         self.halves = Half(settings.line_sums), Half(settings.line_sums)
@@ -57,14 +57,14 @@ class Ports:
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:
-        """Return the half with this role; None if neither half or both have this role."""
+        """Return the half with the role ``role``; None if neither half or both have it."""
         first, second = self.halves
         if first.role == role:
             return None if second.role == role else first
         return second if second.role == role else None
 
     def role(self, channel: int) -> Role:
-        """Return the role of the board at this channel; while unknown, the expected role."""
+        """Return the role of the board at ``channel``; while unknown, the expected role."""
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
@@ -116,6 +116,6 @@ class Ports:
         )
 
     def at(self, channel: int, *texts: bytes) -> Packets:
-        """Return lines for the board at this channel; no packets if there are no ``texts``."""
+        """Return lines for the board at ``channel``; no packets if there are no ``texts``."""
         data = outbound.lines(*texts, sums=self.halves[channel].sums)
         return ((channel, data),) if data else NO_PACKETS

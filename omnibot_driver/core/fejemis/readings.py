@@ -14,7 +14,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """Requests other than motion; each value is the request's name in messages to the user."""
+    """Requests other than motion; each value is the name of the request in texts for the user."""
 
     CALIBRATE_GYRO = "gyro calibration"
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"
@@ -51,7 +51,7 @@ class MagneticReading:
 
 @value(frozen=True, slots=True)
 class BatteryReading:
-    """State of the battery; ``amps``: negative while it is discharged, NaN if unknown.
+    """State of the battery; ``amps``: negative while discharging, NaN if unknown.
 
     ``cells``: 0 if unknown.
     """

@@ -23,7 +23,7 @@ NO_DATA: Final = "no data from the boards; check their power and cables"
 
 
 class Robot(Protocol):
-    """The robot, as the services use it."""
+    """What the services need from the robot."""
 
     @property
     def mode(self) -> Mode:
@@ -39,7 +39,7 @@ class Robot(Protocol):
 
     @property
     def settings(self) -> FejemisSettings:
-        """The settings, which include the lift's run time and the delay of a power off."""
+        """The settings, which include the lift's run time and the delay of a power-off."""
 
 
 class Services:

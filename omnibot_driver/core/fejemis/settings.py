@@ -21,11 +21,11 @@ class Written(Enum):
     FRONT_WHEEL = "fwoffset", 2
     """Offset of the front angle in degrees, and 1 if the angle is inverted, else 0."""
     INFRARED = "irc", 4
-    """Raw values of sensor 1 at 13 cm and 50 cm, then those of sensor 2."""
+    """Raw values of infrared sensor 1 at 13 cm and 50 cm, then those of sensor 2."""
     MAGNETOMETER = "magcal", 12
-    """Three offsets, then a 3 × 3 matrix, row by row."""
+    """Three offsets of the magnetometer, then a 3 × 3 matrix, row by row."""
     ACCELEROMETER = "acccal", 6
-    """Three offsets, then three scales."""
+    """Three offsets of the accelerometer, then three scales."""
     STEERING_GAINS = "cssteer", 0
     """Parameters of the steering controller, as in ucontrolbase.cpp; any count of numbers."""
 
@@ -40,12 +40,13 @@ class Written(Enum):
 class FejemisSettings:
     """Settings of the robot.
 
-    ``track_m``, ``wheelbase_m``: the geometry that is used until the boards report theirs.
+    ``track_m``, ``wheelbase_m``: the geometry that is used until the boards report their own.
     ``written``: values to write to the boards; all others are only read. ``line_sums``: whether
-    lines carry a sum; ``auto`` learns it from the heartbeats. ``allow_reverse``: whether a negative
-    speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the longest time that the
-    lift runs after one command. ``power_off_delay_s``: time from a request to switch off until the
-    power is cut. ``low_cell_v``: voltage per cell below which a battery is reported as low.
+    lines carry a sum (checksum); with ``auto``, the heartbeats show it. ``allow_reverse``: whether
+    a negative speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the longest
+    time that the lift runs after one command. ``power_off_delay_s``: time from a request to switch
+    off until the power is cut. ``low_cell_v``: voltage per cell below which a battery is reported
+    as low.
     """
 
     track_m: float = 0.4

@@ -5,7 +5,7 @@
 The command ``rc`` carries a speed v and a turn rate w. The drive board does not obey both: it
 drives its outer wheel at the speed sqrt(v² + w²), and turns about the centre given by the
 *measured* front angle. So the driver multiplies v and w by (`|v|` + `|w|`·B/2) / sqrt(v² + w²).
-This makes the root equal to the wanted speed of the outer wheel.
+With these products, the root is equal to the wanted speed of the outer wheel.
 
 While the front wheel moves to its angle, the drive board gets a lower speed, so that the body does
 not move or turn much faster than commanded. A turn on the spot begins when the front wheel has
@@ -116,7 +116,7 @@ def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTw
 def told_twist(
     speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
 ) -> BodyTwist:
-    """Return the body's twist if the drive board obeys an ``rc`` line with these numbers."""
+    """Return the body's twist if the drive board obeys an ``rc`` line with the given numbers."""
     outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
     return body_twist(outer, geometry, angle_rad)
 
@@ -124,7 +124,7 @@ def told_twist(
 def _allowed(
     wanted: BodyTwist, geometry: Geometry, target_rad: float, angle_rad: float, *, turning: bool
 ) -> float:
-    """Return the speed limit of the outer rim at this front angle, in m/s, or infinity."""
+    """Return the speed limit of the outer rim at the given front angle, in m/s, or infinity."""
     off_rad = abs(angle_rad - target_rad)
     if abs(target_rad) >= ACROSS_RAD:
         near = off_rad <= (STILL_ALIGNED_RAD if turning else ALIGNED_RAD)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The sum before a line, ``;NN``, by which a board detects most damaged lines.
+"""The sum (checksum) before a line, ``;NN``, by which a board detects most damaged lines.
 
 NN is the sum of the codes of all characters from 0x20 on, modulo 99, plus 1. The sum does not
 detect 1 in 99 damaged lines, the loss of a ``c`` (code 99), or the loss of two characters whose

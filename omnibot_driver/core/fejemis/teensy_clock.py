@@ -26,7 +26,8 @@ AGREE_S: Final = 0.1
 """Largest difference in s between times that agree.
 
 If ``AGAIN`` implausible times in a row agree, over ``AGAIN_AFTER_S`` or longer, the clock begins
-again with them. A shorter series may be lines that waited for a stalled host and arrived at once.
+again with these times. A shorter series may be lines that waited for a stalled host and arrived at
+once.
 """
 SMALLEST_STEP_S: Final = 1e-6
 
@@ -43,7 +44,8 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """Count of implausible times in a row; ``_odd``: the first one, and when it arrived."""
+        """Count of implausible times in a row; ``_odd``: the first such time, and when it
+        arrived."""
         self._last_s = 0.0
 
     @property
@@ -69,7 +71,8 @@ class TeensyClock:
         return near_s + (host_s - self.host_s(near_s))
 
     def see(self, board_s: float, now: float) -> bool:
-        """Take the board time of a line that came at ``now``; return whether it is plausible."""
+        """Take a line's board time and its arrival ``now``; return whether the time is
+        plausible."""
         self.restarted = False
         if self._fit is not None:
             late_s = now - self.host_s(board_s)
@@ -149,5 +152,5 @@ class StampedReadings:
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the timestamp of the first added reading; ``now`` if there is none."""
+        """Return the timestamp of the first added reading; ``now`` if no reading was added."""
         return self._stamps[0] if self._stamps else now

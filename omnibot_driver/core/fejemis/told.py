@@ -2,7 +2,8 @@
 
 """Notices for the user of this robot: each text is shown at most once in ``TELL_EVERY_S``.
 
-A notice that stops the robot is always added, but its text is empty if it repeats a recent text.
+A notice that stops the robot is always added, but its text is empty if the same text was shown
+recently.
 """
 
 import math

@@ -11,7 +11,8 @@ from omnibot_driver.core.traits import Traits
 
 DRIVE: Final = 0
 FRONT: Final = 1
-"""Channels of the two boards as configured; heartbeats show whether the ports are swapped."""
+"""``DRIVE``, ``FRONT``: channels of the two boards as configured; heartbeats show whether the ports
+are swapped."""
 
 TRAITS: Final = Traits(
     channels=("drive", "front"),

@@ -3,8 +3,8 @@
 """Keeps both boards sending and configured, and runs requests other than motion.
 
 The module combines subscriptions, polls, configuration, jobs, brush, lift and lights. It collects
-the lines that these parts have to send; it passes the answers on to them, without using the answers
-itself.
+the lines that these parts have to send; it passes answers on to these parts, without using the
+answers itself.
 """
 
 from typing import Final
@@ -106,7 +106,7 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """The reason why a new board must not be driven yet; empty once it is configured."""
+        """The reason why a new board must not be driven yet; empty once the board is configured."""
         for configuration in self.configurations.values():
             if configuration.pending:
                 return (

@@ -37,7 +37,7 @@ class Watch:
         self._patient_until = -math.inf
 
     def stalled(self) -> None:
-        """Record that this process stalled, which must not make the boards appear silent."""
+        """Record a stall of the driver, which must not be regarded as silence of the boards."""
         self._stalled = True
 
     def open(self, now: float) -> None:

@@ -256,7 +256,7 @@ class LoisEcuBoard(Board):
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Return Stop. Its ``:`` makes the board discard a partial line that came before."""
+        """Return Stop, whose ``:`` makes the board discard a partial line that came before."""
         return self.stop()
 
     def stop(self) -> Packets:

@@ -24,8 +24,8 @@ GROUPS_KEPT: Final = 25
 in this time."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
-"""Longest plausible delay in s; a longer one means that the board has restarted, or that its clock
-has another unit."""
+"""Longest plausible delay in s; a longer delay means that the board has restarted, or that its
+clock has another unit."""
 UNKNOWN_S: Final = 0.012
 """Standard deviation of an arrival time in s, while the unit of the board's clock is unknown."""
 LEAST_S: Final = 0.001

@@ -2,8 +2,8 @@
 
 """Encoding of all messages as lines, and decoding of commands and of reports with only one line.
 
-Sources: the ECU's manual; the public firmware for the order of words within a payload. Groups of
-several lines are parsed in ``groups``, records in ``record_lines``.
+Sources: the ECU's manual, and the public firmware for the order of words within a payload. Groups
+of several lines are parsed in ``groups``, records in ``record_lines``.
 """
 
 from collections.abc import Callable

@@ -37,8 +37,8 @@ TICKS_AGE_S: Final = 0.005
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""Error variances, in squared ticks: of a count, of the heading in 0x20, and of the distance in
-0x20."""
+"""Error variances, in squared ticks: ``TICK_VARIANCE`` of a count, ``TURN_VARIANCE`` of the heading
+in 0x20, and ``ALONG_VARIANCE`` of the distance in 0x20."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
 """Residual in ticks that shows a change of the wheel's speed without a change of its set-point."""
@@ -46,16 +46,16 @@ SAME_TICKS: Final = 0.6
 """Residual in ticks below which an unchanged count is not used as a measurement."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""Limits of the residual of a heading, in standard deviations and in m. A heading whose residual is
-beyond both limits is discarded: it is wrong because the board has integrated an old speed while the
-wheel was at rest."""
+"""``LEAP``, ``LEAP_M``: limits of the residual of a heading, in standard deviations and in m. A
+heading whose residual exceeds both limits is discarded: the board has integrated an old speed while
+the wheel was at rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""Additional standard deviations in m of a wheel's distance after 1 m without ticks: in the usual
-case, and, larger, while the speed oscillates, because the board then reports the speed too
-seldom."""
+"""Additional standard deviation in m of a wheel's distance after 1 m without ticks: usually
+``BLIND_M``, but ``SWINGING_M`` while the speed oscillates, because the board then reports the speed
+too seldom."""
 SWERVED_M: Final = 0.05
 """Additional standard deviation in m of the position after 1 m at an oscillating speed, even if the
 distances of the wheels are known."""
@@ -64,7 +64,7 @@ EQUAL_RPM: Final = 3.0
 
 
 class Comparison:
-    """Comparison of reports with the estimate of ``motion``, and correction of this estimate."""
+    """Comparison of reports with the estimate of ``motion``, and correction of the estimate."""
 
     def __init__(self, motion: MotionFilter) -> None:
         self._motion = motion

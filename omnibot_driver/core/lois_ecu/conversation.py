@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The conversation with a LOIS ECU: decodes its lines to readings, and encodes orders as lines.
+"""The conversation with a LOIS ECU: decodes lines to readings, and encodes orders as lines.
 
 Call ``wrote`` with all bytes that are sent. The odometry depends on the commands, because the board
 reports little about the motion of its wheels. ``translation`` explains what the board sends,
@@ -204,7 +204,7 @@ class LoisConversation:
 
     @property
     def configured(self) -> bool:
-        """Whether the settings have been sent; before that the wheels do not turn in RPM mode."""
+        """Whether the settings have been sent; until then the wheels do not turn in RPM mode."""
         return self._upkeep.opened and self._upkeep.writer.done
 
     @property

@@ -88,7 +88,7 @@ class LoisDecoder:
         return self._assembler.in_record
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record with these numbers of samples; discard every other record."""
+        """Expect a record with ``left`` and ``right`` samples; discard every other record."""
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:

@@ -2,11 +2,11 @@
 
 """Assembly of reports that take several lines: each is a group of lines after a marker line.
 
-A group is returned complete or not at all. A lost line makes it too short; a repeated line, or a
-line of another group, makes it too long or interrupts it. So a group is known to be complete when
-something else follows it. It is returned earlier, with its last line, on two conditions: no line
-equals the one before it (so none was received twice), and the values can follow those of the last
-group. Otherwise the group is held until the next line comes, or until no line has come for
+A group is returned complete or not at all. A lost line makes the group too short; a repeated line,
+or a line of another group, makes it too long or interrupts it. So a group is known to be complete
+when something else follows. The group is returned earlier, with its last line, on two conditions:
+no line equals the one before it (so none was received twice), and the values can follow those of
+the last group. Otherwise the group is held until the next line comes, or until no line has come for
 ``QUIET_S``.
 
 Silence completes a held group of a valid length. A shorter group continues to wait, because its
@@ -52,8 +52,8 @@ QUIET_S: Final = 0.05
 group 1.2 ms apart, and a reader usually delivers them within ``QUIET_S``."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest pause within a group: in s, and as a fraction of the time between the markers of this
-group and the group before."""
+"""Longest pause within a group: ``LATE_S`` in s, and ``LATE_PART`` as a fraction of the time
+between the markers of the group and the group before."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
@@ -64,8 +64,8 @@ _LONGEST: Final = 10
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
 Timed = tuple[float, Report]
-"""Arrival time of a report's last line in s, and the report. The report may be returned later than
-this time, when it is known to be complete."""
+"""Arrival time of a report's last line in s, and the report. The report may be returned after its
+arrival, when it is known to be complete."""
 
 
 class Assembler:
@@ -115,17 +115,17 @@ class Assembler:
         return self._record.begun
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record with these numbers of samples; discard every other record."""
+        """Expect a record with ``left`` and ``right`` samples; discard every other record."""
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
-        """Forget the last counts and poses, because a reset of the board restarts them."""
+        """Forget the last counts and poses, because a reset of the board sets them to zero."""
         self._ticks_gate.forget()
         for gate in self._odometry_gates.values():
             gate.forget()
 
     def add(self, line: Line, now: float) -> list[Timed]:
-        """Return the reports that this line completes."""
+        """Return the reports that ``line`` completes."""
         code, payload = line.command, line.payload
         if code in _LENGTHS:
             self._record.cut_off()
@@ -166,7 +166,7 @@ class Assembler:
     # Groups
 
     def _begin(self, code: int, now: float) -> None:
-        """Begin a group; set its longest pause, from the time since the group before."""
+        """Begin a group; compute its longest pause from the time since the group before."""
         since_s = now - self._begun_at.get(code, -math.inf)
         if since_s > QUIET_S and not self._after_ticks:  # neither read nor sent together
             self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))
@@ -209,7 +209,7 @@ class Assembler:
         return self._believed(group, now)
 
     def _end(self, now: float) -> list[Timed]:
-        """End the present group; return it if it is complete and plausible."""
+        """End the present group; return the group if it is complete and plausible."""
         code = self._code
         if code is None:
             return []

@@ -15,7 +15,8 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Fraction of the odometry's turn by which a heading may be wrong, in addition to ``NEAR_DEG``."""
+"""A heading may be wrong by ``NEAR_DEG``, plus this fraction of the angle that the odometry has
+turned."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)
@@ -30,7 +31,7 @@ class HeadingFilter:
         self.forget()
 
     def forget(self) -> None:
-        """Forget all headings; accept none until two in a row agree."""
+        """Forget all headings; accept a heading only when two in a row agree."""
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
         self._agreed = 0

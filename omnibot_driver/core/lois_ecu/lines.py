@@ -4,7 +4,7 @@
 
 ``:<command><payload><checksum>\\n``, 14 characters. The checksum is the XOR of the first eleven
 characters. The board can be set to accept lines without a checksum (12 characters), but always
-sends one. This module knows the layout only, not what a command means.
+sends a checksum. This module knows the layout only, not what a command means.
 """
 
 import re
@@ -43,7 +43,7 @@ def checksum(text: bytes) -> int:
 
 
 def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
-    """Return the characters of one line. Raises FrameError if a value does not fit into it."""
+    """Return the characters of one line. Raises FrameError if a value is out of range."""
     if not (0 <= command <= 0xFF and 0 <= payload <= MARKER):
         raise FrameError(f"command {command} with payload {payload} does not fit into a line")
     text = b":%02x%08x" % (command, payload)

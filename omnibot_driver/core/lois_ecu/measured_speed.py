@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speeds that the public firmware measures and keeps, and their effect on 0x20.
+"""Speeds that the public firmware measures and keeps, and their effect on 0x20 (odometry).
 
 The motion filter calls this module in each of its steps. The module works on the states of the
 filter, without reports.
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""Mean and standard deviation, in ticks, of the motion that 0x20 misses when a wheel starts."""
+"""``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation, in ticks, of the motion
+that 0x20 (odometry) misses when a wheel starts."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
 """Variance, in squared ticks per s, of a wheel's motion that 0x20 misses above ``FAST_RPM``. The

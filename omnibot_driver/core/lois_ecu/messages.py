@@ -174,8 +174,8 @@ class SetTerminalMode:
 class Reset:
     """A command that resets the board.
 
-    By the manual it resets controllers, interfaces and counters; the firmware resets only the
-    ticks.
+    By the manual, the reset affects controllers, interfaces and counters; the firmware resets only
+    the ticks.
     """
 
 

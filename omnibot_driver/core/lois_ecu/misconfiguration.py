@@ -21,15 +21,15 @@ GAINS: Final = (
     Setting.RIGHT_TN,
     Setting.RIGHT_TD,
 )
-"""Gains of the speed controllers; the board does not report which values it has."""
+"""Gains of the speed controllers; the board does not report their values."""
 OWN_GAINS: Final = (
     "the speed controllers run with the board's own {}. With the gains of the public firmware a"
     " wheel oscillates, so the robot does not hold its course. After 5 m, odometry is wrong by"
     " 0.04 m on average, and by 0.2 to 2 m in a few drives. Run calibrate step, or set these"
     " parameters"
 )
-"""Advice if the user has not set all gains. The figures are from 150 forward drives with the
-compiled firmware and correct wheel sizes."""
+"""Advice if the user has not set all gains. The figures in the text are from 150 forward drives
+with the compiled firmware and correct wheel sizes."""
 LOOK_AT: Final = 600
 """Number of bytes without a valid line after which advice is given; the board sends at least 70
 bytes per second."""

@@ -51,15 +51,16 @@ LATE_PART: Final = 0.6
 """Standard deviation of the time at which a command takes effect, in controller periods."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
-"""Mean and standard deviation of the fraction of an RPM that the firmware drops."""
+"""``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the fraction of an RPM that the
+firmware drops."""
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""Fraction by which a wheel that rolls backward is faster than its set-point: mean, standard
-deviation, and additional standard deviation after a change of the set-point. Each has two values:
-for the board's own gains, and for gains that the user set. The wheel is faster because the firmware
-lowers the target with each tick until the controller's next step. A feed-forward may make the wheel
-much faster still."""
+"""Fraction by which a wheel that rolls backward is faster than its set-point: mean ``EXCESS_MEAN``,
+standard deviation ``EXCESS_STDDEV``, and additional standard deviation ``EXCESS_CHANGE`` after a
+change of the set-point. Each has two values: for the board's own gains, and for gains that the user
+set. The wheel is faster because the firmware lowers the target with each tick until the
+controller's next step. A feed-forward may make the wheel much faster still."""
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
 
@@ -85,7 +86,7 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest difference between both measured speeds since this value was last reset, in
+        """Smallest difference between both measured speeds since the attribute was last reset, in
         m/s."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)

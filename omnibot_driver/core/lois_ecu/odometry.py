@@ -37,14 +37,14 @@ LATE_S: Final = 0.012
 """Standard deviation of an arrival time in s, while no better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""The prediction of the pose ends after a silence that is longer than both limits, in s and in
+"""The prediction of the pose ends after a silence of ``UNHEARD_S`` and of ``UNHEARD_GROUPS``
 periods of the ticks, because the board may be switched off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
 
 class LoisOdometry:
-    """Odometry of a robot with a LOIS ECU and these ``settings``; wheel order: left, right."""
+    """Odometry of a robot with a LOIS ECU and the given ``settings``; wheel order: left, right."""
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._motion = MotionFilter()
@@ -64,7 +64,7 @@ class LoisOdometry:
         self.connect()
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """Use these settings from the next group on."""
+        """Use the new ``settings`` from the next group on."""
         motion, yaw_rad = self._motion, self._motion.yaw_rad
         self._settings = settings
         period_s = settings.periods_ms.get(Stream.TICKS, 0) / 1e3
@@ -98,7 +98,7 @@ class LoisOdometry:
 
     @property
     def counting(self) -> bool:
-        """Whether this board counts the ticks of both wheels now."""
+        """Whether the board counts the ticks of both wheels now."""
         return self._motion.signed or all(wheel.course.counting for wheel in self._motion.wheels)
 
     @property
@@ -151,7 +151,7 @@ class LoisOdometry:
             self._may_roll_mps[index] = max(self._may_roll_mps[index], abs(speed_mps))
 
     def halted(self, now: float) -> None:
-        """Record that the board set both set-points to zero by itself, because of its button."""
+        """Record that the board set both set-points to zero by itself, due to its e-stop button."""
         self.wrote(SetRpm(0, 0), now)
 
     def stalled(self, wheels: tuple[bool, bool]) -> None:
@@ -228,7 +228,7 @@ class LoisOdometry:
         self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
-        """Add the errors of a long silence, and make the present 0x20 the reference for later ones.
+        """Add the errors of a long silence, and make the present 0x20 the later reference.
 
         A stop may not have reached the board, so each wheel may have continued at its speed.
         """

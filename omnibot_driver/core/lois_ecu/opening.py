@@ -18,10 +18,10 @@ Other commands (``write``) are also sent while the robot drives. They remain que
 of the board and after a change of settings. They are sent at least ``AFTER_MOTION_S`` after a
 motion command.
 
-A board in another terminal mode, or with another checksum setting, is silent or seems to ignore
-everything. The driver then sends the line that restores the setting, both with and without a
-checksum. After this line, the driver writes the setting "left short correction", because any write
-of the terminal mode overwrites it.
+A board in an unexpected terminal mode, or with an unexpected checksum setting, is silent or seems
+to ignore everything. The driver then sends the line that restores the setting, both with and
+without a checksum. After this line, the driver writes the setting "left short correction", because
+any write of the terminal mode overwrites it.
 """
 
 import math
@@ -59,11 +59,11 @@ harmless. The value is less than the time between two set-points, so that the ot
 even if motion commands are sent at the highest rate.
 """
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group to the next round of settings, or to the next request for the date. They
-are used in turn, because after a fixed time the board might always be sending another group, and
-would then receive nothing."""
+"""Times in s from a group to the next round of settings, or to the next request for the date. The
+times are used in turn, because after a fixed time the board might always be sending another group,
+and would then receive nothing."""
 CONFIRMED_WITHIN: Final = 0.35
-"""Fraction by which the period of the ticks may differ from the requested one."""
+"""Fraction by which the period of the ticks may differ from the requested period."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two requests for an unknown date."""
 MOST_ROUNDS: Final = 40
@@ -102,7 +102,7 @@ class SettingsWriter:
 
     @property
     def done(self) -> bool:
-        """Whether all queued commands have been sent, each in all of its rounds."""
+        """Whether all queued commands have been sent, in all of their rounds."""
         return not self._queue and not self._others and not self._rounds_left
 
     @property
@@ -152,7 +152,7 @@ class SettingsWriter:
         self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
 
     def ask_date(self, now: float) -> None:
-        """Request the date, unless dates come periodically or a request was sent just before."""
+        """Request the date, unless dates come periodically or a request was sent recently."""
         if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
             return
         self._date_asked_at_s = now

@@ -10,13 +10,14 @@ and the beginning of the next. A loss of up to two characters never turns a line
 line. While the board sends a group, it receives nothing for 13 ms. Set-points are at least 18 ms
 apart, so such a gap does not remove both the end of one line and the beginning of the next.
 
-Duty 0/0 and RPM 0/0. In the firmware both remove the power with the controller's next step. Duty
-0/0 does not change the firmware's RPM target. So after driving forward, the board continues to
-count ticks while the robot rolls out, and the counts can prove the standstill. RPM 0/0 ends the
-counting and clears the measured speed. It must be sent before the wheels turn again: the controller
-still uses the last speed of a wheel at rest, and with a slower set-point in the same direction the
-wheel would never start. So Stop is duty 0/0. The emergency stop is RPM 0/0; while it is latched,
-both are sent in turn. RPM 0/0 also precedes the first set-points after a Stop.
+Duty 0/0 and RPM 0/0. In the firmware, both commands remove the power with the controller's next
+step. Duty 0/0 does not change the firmware's RPM target. So after driving forward, the board
+continues to count ticks while the robot rolls out, and the counts can prove the standstill. RPM 0/0
+ends the counting and clears the measured speed. RPM 0/0 must be sent before the wheels turn again:
+the controller still uses the last speed of a wheel at rest, and with a slower set-point in the same
+direction the wheel would never start. So Stop is duty 0/0. The emergency stop is RPM 0/0; while the
+emergency stop is latched, RPM 0/0 and Stop are sent in turn. RPM 0/0 also precedes the first
+set-points after a Stop.
 """
 
 from typing import Final
@@ -40,7 +41,7 @@ lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
-    """Return the pair as integers of at most ``most``, and whether they were scaled down.
+    """Return the pair as integers of at most ``most``, and whether the pair was scaled down.
 
     If one value exceeds ``most``, both are scaled by the same factor.
     """
@@ -63,5 +64,5 @@ def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
 
 
 def lines(*commands: Command, with_sum: bool) -> bytes:
-    """Return the lines of these commands, one after the other."""
+    """Return the lines of the given commands, one after the other."""
     return b"".join(encode_command(command, with_sum=with_sum) for command in commands)

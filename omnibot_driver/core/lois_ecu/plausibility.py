@@ -29,10 +29,10 @@ SLOWEST_CLOCK: Final = 0.5
 """Lowest rate of the board's clock, as a fraction of real time; the clock stops while the board
 sends."""
 SURE_AFTER: Final = 2
-"""Number of further clock steps in the same unit after which this unit is accepted."""
+"""Number of further clock steps in the same unit after which the unit is accepted."""
 LEARNT_FROM_S: Final = 0.15
 """Shortest clock step in s from which the unit is learnt; arrival times are too inexact for shorter
-ones."""
+steps."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -80,11 +80,11 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what was learnt about the board's counters; a subclass may override this."""
+        """Forget what was learnt about the board's counters; subclasses may override this."""
 
 
 class TicksGate(Gate[Ticks]):
-    """Check of ticks. It also learns the unit of the board's clock, and then requires this unit."""
+    """Check of ticks, which also learns the unit of the board's clock and then requires it."""
 
     def __init__(self) -> None:
         super().__init__(_ticks_follow)
@@ -92,7 +92,7 @@ class TicksGate(Gate[Ticks]):
         self._steps = 0
 
     def passes(self, group: Ticks, now: float) -> bool:
-        """Return whether to accept these ticks; store them, and learn the clock's unit."""
+        """Return whether to accept the ticks; store them, and learn the clock's unit."""
         last = self._last
         passed = super().passes(group, now)
         if passed and last is not None and now - last[1] > LEARNT_FROM_S:
@@ -102,7 +102,7 @@ class TicksGate(Gate[Ticks]):
         return passed
 
     def would_pass(self, group: Ticks, now: float) -> bool:
-        """Return whether these ticks can follow the last accepted ones. Changes nothing."""
+        """Return whether the ticks can follow the last accepted ones. Changes nothing."""
         last, unit = self._last, self.unit
         return super().would_pass(group, now) and (
             last is None

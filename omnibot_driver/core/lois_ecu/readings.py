@@ -54,7 +54,7 @@ class RecordComes:
 
 @dataclass(frozen=True, slots=True)
 class RecordFailed:
-    """Notice that a requested record will not come; ``reason``: why, and what to do."""
+    """Notice that a requested record will not come; ``reason``: the cause, and what to do."""
 
     reason: str
 

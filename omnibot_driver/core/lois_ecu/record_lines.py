@@ -58,7 +58,7 @@ class RecordAssembler:
         return self._code is not None
 
     def expect(self, kind: RecordKind, left: int, right: int) -> None:
-        """Expect a record with these numbers of samples; discard every other record."""
+        """Expect a record with ``left`` and ``right`` samples; discard every other record."""
         self._expected = kind, left, right
         self._begin(None)
 
@@ -72,7 +72,7 @@ class RecordAssembler:
             self._drop()
 
     def add(self, code: int, payload: int) -> list[Record]:
-        """Return the record that this line completes, or an empty list."""
+        """Return the record that a line completes, or an empty list."""
         if not self.begun:
             self._begin(code)
         self._damaged |= code != self._code
@@ -91,7 +91,7 @@ class RecordAssembler:
         return [record]
 
     def _ends(self, code: int, payload: int) -> bool:
-        """Return whether this line ends the record.
+        """Return whether a line with ``code`` and ``payload`` ends the record.
 
         The end of a torque record looks like a sample of two motors without current, so it is
         accepted as the end only after all samples.

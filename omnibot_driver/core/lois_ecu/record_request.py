@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Request for a record. It is sent up to three times, because the board may lose lines.
+"""Request for a record, sent up to three times, because the board may lose lines.
 
 The repetitions end when the record begins to arrive. Each repetition makes the board restart the
-record, so all are sent within a short time. This module also detects whether the record arrives or
-fails.
+record, so all repetitions are sent within a short time. This module also detects whether the record
+arrives or fails.
 """
 
 import math
@@ -34,12 +34,12 @@ SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
 """Times in s at which the request is sent. The intervals are longer than the board can be deaf, and
 are not multiples of its usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
-"""Time unit in s of an RPM record, by the unit of the time in 0x12. The public firmware differs
-from the manual in both units."""
+"""Time unit in s of an RPM record, by the unit of the time in 0x12. The public firmware uses other
+units than the manual, for the time and for the record."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
-    """Return the command for a record. Raises RequestRefused if the board could not complete it."""
+    """Return a record's command. Raises RequestRefused if the board cannot complete the record."""
     if not 0 < samples <= MOST_SAMPLES:
         raise RequestRefused(
             f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
@@ -78,8 +78,8 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings, with the awaited record or the reason why the record will not come.
 
-        ``prevented``: why the board will not send the record, as a sentence; empty if it may still
-        come.
+        ``prevented``: why the board will not send the record, as a sentence; empty if the record
+        may still come.
         """
         if self.kind is None:
             return found

@@ -28,13 +28,13 @@ LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""Largest plausible change of a wheel's speed: a constant in RPM, and a part in RPM per s. A larger
-change shows a tick that was delayed while the board sent something else."""
+"""Largest plausible change of a wheel's speed: ``JUMP_RPM``, plus ``JUMP_RPM_PER_S`` for each s. A
+larger change shows a tick that was delayed while the board sent something else."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""Largest difference from the expected speed, in RPM and as a fraction, of a wheel with a constant
-set-point and gains that the user set. A single speed that differs by more comes from a delayed
-tick, or from the tick after it."""
+"""Largest difference from the expected speed, for a wheel with a constant set-point and gains that
+the user set: ``STRAY_RPM``, plus the fraction ``STRAY_PART`` of the expected speed. A single speed
+that differs by more comes from a delayed tick, or from the tick after it."""
 COASTED_TICKS: Final = 1.0
 """Number of ticks by which a wheel that comes to rest rolls less far than its last reported speed
 suggests."""
@@ -48,7 +48,7 @@ shows no tick."""
 
 
 class ReportedSpeed:
-    """Correction of ``motion`` by the reported speed of the wheel with this index."""
+    """Correction of ``motion`` by the reported speed of the wheel with the given index."""
 
     def __init__(self, motion: MotionFilter, index: int) -> None:
         self._motion, self._index = motion, index
@@ -59,13 +59,13 @@ class ReportedSpeed:
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Record the estimated speed for ``duration_s`` in which no speed was reported."""
+        """Record the estimated speed for a time ``duration_s`` in which no speed was reported."""
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """Subtract the distance since the reported speed last changed: the wheel was at rest.
+        """Subtract the distance since the reported speed last changed, as the wheel was at rest.
 
         If the wheel has not turned since it was commanded to start, subtract the distance since the
         start.

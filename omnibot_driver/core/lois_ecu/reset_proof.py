@@ -25,7 +25,7 @@ repeated."""
 class ResetProof:
     """Search for a proof that the board has obeyed a reset.
 
-    ``before``: counts when the reset was sent, or None if unknown. ``steady``: these counts had not
+    ``before``: counts when the reset was sent, or None if unknown. ``steady``: the counts had not
     changed for some time. ``remark``: what was not proved, as a sentence.
     """
 
@@ -37,8 +37,8 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the reset is repeated, and use the present counts if they prove more.
 
-        Counts of wheels at rest prove more than those of wheels that rolled. Counts of wheels that
-        still roll prove no more than the first ones.
+        Counts of wheels at rest prove more than counts of rolling wheels. If the wheels still roll,
+        the present counts prove no more than the first counts.
         """
         if before is not None and steady and _largest(before) >= STEADY_TICKS:
             self._before, self._steady = before, steady
@@ -47,8 +47,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the reset can be reported.
 
-        The counts must be near zero. They must also prove the reset, or ``UNPROVED_S`` must have
-        passed.
+        The reset can be reported if the counts are near zero and prove the reset, or if they are
+        near zero and ``UNPROVED_S`` has passed.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

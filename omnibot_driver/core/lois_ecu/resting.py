@@ -14,8 +14,9 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""Range in RPM of the last reported speed of a wheel that came to rest. A lower speed is that of a
-starting wheel, and a faster wheel ticks once more before it is at rest."""
+"""The last reported speed of a wheel that came to rest is from ``SLOWEST_RPM`` to ``FASTEST_RPM``.
+A lower speed is that of a starting wheel, and a faster wheel ticks once more before it is at
+rest."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -31,8 +32,8 @@ TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Probabilities that the wheel is at rest, by the number of repetitions of its speed. ``FAST``:
 after a fall to a speed above ``FAST_RPM``. ``FAR``: after a fall by ``FELL_FAR_RPM``. ``LONE``:
 after a fall by ``FELL_FAR_RPM`` from a speed that was reported only once. ``NEAR``: after a smaller
-fall. ``TUNED``: after any of these with gains that the user set. With such gains a wheel rarely
-comes to rest without a Stop, and often rolls at a steady speed after an overshoot. The
+fall. ``TUNED``: after any of these falls, with gains that the user set. With such gains a wheel
+rarely comes to rest without a Stop, and often rolls at a steady speed after an overshoot. The
 probabilities were counted on the public firmware."""
 
 
@@ -59,7 +60,7 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Record an estimated speed in RPM for ``since_s`` in which no speed was reported."""
+        """Record an estimated speed in RPM for the last ``since_s``, without a reported speed."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 

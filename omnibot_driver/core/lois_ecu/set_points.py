@@ -22,7 +22,7 @@ CLEAR_AGAIN_S: Final = 0.15
 
 
 class SetPoints:
-    """Encoder of set-points, with a memory of those that were sent.
+    """Encoder of set-points, with a memory of the set-points that were sent.
 
     ``saturated``: number of commands that were slowed because they were too fast. ``stopped_at_s``:
     time since which only zeros were sent, infinite while the robot is driven. ``stood``: the robot

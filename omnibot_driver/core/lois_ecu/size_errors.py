@@ -2,7 +2,7 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-Such an error is constant during a drive, so the yaw error grows, and soon the error of the pose is
+Each of these errors is constant during a drive, so the yaw error grows, and soon the pose error is
 not proportional to its cause. Therefore the drive is computed again with each error, once positive
 and once negative. The spread of the resulting poses is the covariance. This module works on
 distances of the wheels.
@@ -18,8 +18,8 @@ KINDS: Final = 3
 """Number of kinds of errors: size of the left wheel, size of the right wheel, slip of both."""
 WHEEL_SCALE: Final = 0.01
 WHEEL_SLIP: Final = 0.005
-"""Standard deviations of a wheel's relative size, and of the fraction of both wheels' distances
-that is lost by slip."""
+"""``WHEEL_SCALE``, ``WHEEL_SLIP``: standard deviations of a wheel's relative size, and of the
+fraction of both wheels' distances that is lost by slip."""
 
 
 class SizeErrors:
@@ -40,7 +40,7 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """Continue all drives by these distances; a negative ``track_m`` reverses the turns."""
+        """Continue all drives by the given distances; a negative ``track_m`` reverses the turns."""
         self._believed = _moved(self._believed, left_m, right_m, track_m)
         self._places = [
             _moved(place, left * left_m, right * right_m, track_m)
@@ -48,7 +48,7 @@ class SizeErrors:
         ]
 
     def covariance(self, yaw_rad: float) -> Covariance:
-        """Return the covariance for a pose with this yaw.
+        """Return the covariance for a pose with the yaw ``yaw_rad``.
 
         The frame of the pose may be rotated relative to the frame of the drives.
         """

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 Terms = Sequence[tuple[int, float]]
-"""Pairs of a state and its factor."""
+"""Pairs of the index of a state and the factor of that state."""
 
 LEAST_VARIANCE: Final = 1e-12
 
@@ -28,14 +28,14 @@ class SparseFilter:
 
         ``rows``: the rows of the transition matrix that differ from the identity matrix.
 
-        The mean is not changed, because its transition may be non-linear.
+        The mean is not changed, because the transition of the mean may be non-linear.
         """
         half = _applied(rows, self.covariance)
         whole = _applied(rows, [list(column) for column in zip(*half, strict=True)])
         self.covariance = whole
 
     def disturb(self, terms: Terms, variance: float) -> None:
-        """Add one error of this variance to the covariance; ``terms``: its effect on the states."""
+        """Add an error with the given variance; ``terms``: effect of the error on the states."""
         covariance = self.covariance
         for i, a in terms:
             row = covariance[i]
@@ -43,7 +43,7 @@ class SparseFilter:
                 row[j] += variance * a * b
 
     def forget(self, state: int, mean: float, variance: float) -> None:
-        """Set a state to this mean and variance, uncorrelated with all other states."""
+        """Set a state to the given mean and variance, uncorrelated with all other states."""
         covariance = self.covariance
         for row in covariance:
             row[state] = 0.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a wheel that is commanded to turn but stands still: it may never start by itself.
+"""Detection of a wheel that is commanded to turn, but is at rest and may never start by itself.
 
 The public firmware's controller continues to use the last measured speed of a wheel at rest. If
 this speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
@@ -30,9 +30,9 @@ LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""Limits above a set-point, as a factor and in RPM. A repeated speed beyond both is the last speed
-of a wheel at rest, because a wheel that rolls backward exceeds its set-point by at most 10 % and
-one RPM."""
+"""``TOO_FAST``, ``TOO_FAST_RPM``: limits above a set-point, as a factor and in RPM. A repeated
+speed beyond both limits is the last speed of a wheel at rest, because a wheel that rolls backward
+exceeds its set-point by at most 10 % and one RPM."""
 UNLIKE: Final = 1.15
 """Largest ratio of the relative speeds (speed divided by set-point) of two wheels that roll
 backward."""
@@ -45,7 +45,7 @@ class StallWatch:
     """Watch of both wheels; ``stalled`` reports a wheel at rest once in each ``STALLED_S``.
 
     ``settings`` may be replaced at any time. ``saturated``: whether each wheel's controller may be
-    saturated, so that the wheel rolls.
+    saturated, which means that the wheel rolls.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -114,7 +114,7 @@ class StallWatch:
         return left, right
 
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
-        """Return whether the board keeps reporting an old speed for this wheel.
+        """Return whether the board keeps reporting an old speed for ``wheel``.
 
         The speed is old if it repeats, and if the other wheel's speed has changed or the repeated
         speed is far above the set-point.
@@ -130,7 +130,7 @@ class StallWatch:
         return too_fast or not same[1 - wheel]
 
     def _too_fast(self, wheel: int, told: tuple[float, float]) -> bool:
-        """Return whether no wheel can roll steadily at this reported speed."""
+        """Return whether the reported speed is too high for a wheel that rolls steadily."""
         if self.settings.written.get(FEED_FORWARD[wheel]):
             return False
         target = abs(self._targets[wheel])

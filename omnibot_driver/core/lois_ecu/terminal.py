@@ -63,7 +63,7 @@ class ModeChange:
 
     @property
     def sensor_wanted(self) -> bool:
-        """Whether a sensor's mode is wanted, in which the board sends no messages of its own."""
+        """Whether a sensor's mode is wanted, in which the board sends none of its own messages."""
         return self.wanted in SENSORS
 
     @property
@@ -100,7 +100,7 @@ class ModeChange:
         return True
 
     def due(self, now: float, *, settled: bool) -> TerminalMode | None:
-        """Return the mode to write now, or None. ``settled``: all settings are sent."""
+        """Return the mode to write now, or None. ``settled``: all settings have been sent."""
         if self._stopping or now < self._again_at_s:
             return None
         if self.sensor_wanted:

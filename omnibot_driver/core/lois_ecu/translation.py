@@ -40,8 +40,8 @@ UNKNOWN_FROM_YEAR: Final = 38
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""Fall of the counts towards zero, in ticks and in ticks per s, beyond which the board has
-restarted: wheels do not roll back that fast."""
+"""If the counts fall towards zero by more than ``RESTARTED_TICKS``, plus ``RESTARTED_TICKS_PER_S``
+for each s, the board has restarted: wheels do not roll back that fast."""
 CONTRADICTED_S: Final = 1.0
 """Longest time in s for which wheels are assumed to have rolled back, if the board's clock does not
 confirm the time since the last ticks. (The decoder has then forgotten the clock's unit.)"""
@@ -81,7 +81,7 @@ class Translation:
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
         self._dated = False
-        """Whether the GPS has a date; it still has one when midnight makes ``_date`` unknown."""
+        """Whether the GPS has a date; this stays True when midnight makes ``_date`` unknown."""
         self._clock = (0, 0, 0)
         self._gps_works = False
 
@@ -175,7 +175,7 @@ class Translation:
 
     @property
     def needs_date(self) -> bool:
-        """Whether the last reports contain a GPS position or time, but the date is unknown."""
+        """Whether the GPS sends a position or time while the date is unknown."""
         return self._gps_works and self._date is None
 
     @property

@@ -39,7 +39,7 @@ class Upkeep:
         self.heard_at_s = self._recovered_at_s = -math.inf
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """Use new settings: write those that changed; a change of mode first stops the robot."""
+        """Use new settings: write the changed ones; a change of mode first stops the robot."""
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
             self.change.stop_first(f"drive_mode is changing to {settings.drive_mode}")

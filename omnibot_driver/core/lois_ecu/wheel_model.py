@@ -15,7 +15,8 @@ HEARD_S: Final = 0.008
 """Time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""Period of the speed controller in s: first by the manual, then in the public firmware."""
+"""Period of the speed controller in s: ``STEP_S`` by the manual, ``FIRMWARE_STEP_S`` in the public
+firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 
@@ -38,7 +39,7 @@ class WheelModel:
     """The command of one wheel; ``carry_out`` advances it. Speeds are commanded rim speeds.
 
     ``kind``, ``target_mps``: the motor's command. ``hidden_mps``: the firmware's RPM target; a duty
-    does not change it, but each tick with a negative duty lowers it.
+    command does not change this target, but each tick at a negative duty lowers it.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -82,7 +83,7 @@ class WheelModel:
             self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
     def next_change_s(self) -> float:
-        """Return when the next effect is due; infinity if there is none."""
+        """Return when the next effect is due; infinity if none is due."""
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:

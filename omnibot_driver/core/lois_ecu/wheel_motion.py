@@ -27,7 +27,7 @@ STATES: Final = 18
 CONTROL_RATE: Final = 2.0
 """Rate in 1/s at which the controller reaches its target, as a critically damped system."""
 PUSH_PER_SPEED: Final = 2.2
-"""Standard deviation of the acceleration after a change of speed, per m/s of this change, in
+"""Standard deviation of the acceleration after a change of speed, for each m/s of the change, in
 1/s."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
@@ -38,7 +38,8 @@ DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
 DRY_MPS2: Final = 0.7
-"""Time constant in s, and dry friction in m/s², of a wheel without power."""
+"""``COASTING_S``, ``DRY_MPS2``: time constant in s, and dry friction in m/s², of a wheel without
+power."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
@@ -99,12 +100,13 @@ class Wheel:
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """Speed in m/s when the controller was reset, and the time in s since the reset."""
+        """``rolled_mps``, ``rolled_s``: speed in m/s when the controller was reset, and time in s
+        since the reset."""
         self.locked = False
         """Whether the wheel is at rest without power, because the last measured speed exceeds its
         target."""
         self.rests = False
-        """Whether the wheel is at rest, as shown by a measured speed that stays the same."""
+        """Whether the wheel is at rest, as shown by a repeated measured speed."""
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:
@@ -130,7 +132,7 @@ class Wheel:
         return -1.0 if rolls_back else 1.0
 
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
-        """Add one step of this wheel to ``step``.
+        """Add the motion of the wheel in one step to ``step``.
 
         ``holds``: the board keeps the last measured speed of a wheel at rest. ``signed``: ticks
         count in both directions.

@@ -2,8 +2,8 @@
 
 """The drive Teensy: turning control of two wheels, odometry, IMU, battery, distance sensors.
 
-This module knows the drive half of the manual and the robot. It must not know the front Teensy: the
-angle of the front wheel arrives by a command, or not at all.
+This module knows the drive half of the manual and the robot. It must not know the front Teensy:
+only a command can tell the angle of the front wheel.
 """
 
 from collections.abc import Callable
@@ -68,7 +68,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.imu.boot()
 
     def started(self) -> None:
-        """Reset the pose at the end of a boot, so wheel turns during the boot are not counted."""
+        """Reset the pose at the end of a boot, so that turns during the boot are not counted."""
         self._reset_pose()
 
     # Each cycle

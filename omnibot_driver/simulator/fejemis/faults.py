@@ -2,7 +2,7 @@
 
 """Faults that can occur in one of the two Teensys at any time, by name.
 
-This module knows what each name means. It must not know when a fault occurs.
+This module knows the meaning of each name. It must not know when a fault occurs.
 """
 
 from collections.abc import Callable

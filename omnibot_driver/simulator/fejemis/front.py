@@ -30,9 +30,9 @@ class FrontTeensy(Teensy[FrontConfig]):
     wanted_deg: target angle of the steered wheel, None before the first ``rc``. leds: RGB of each
     LED.
 
-    The caller may set these faults of the angle sensor. diagnosis: diagnosis bits without the frame
-    counter. error_flags: error flags. frozen: the sensor repeats its last angle. absent: the angle
-    reads zero, and the diagnosis says that the magneto core loops have not finished.
+    The caller may set the following faults of the angle sensor. diagnosis: diagnosis bits without
+    the frame counter. error_flags: error flags. frozen: the sensor repeats its last angle. absent:
+    the angle reads zero, and the diagnosis says that the magneto core loops have not finished.
     """
 
     version = 100

@@ -72,14 +72,15 @@ class FejemisSettings:
     deviation in m of the distance of a wheel after 1 m. motor_lag_s: time constant of the speed of
     a driving wheel. steer_base_m: distance from the axle to the steered wheel, the manual's S, F or
     f. servo_degps: speed of the servo at its full velocity value 1000, chosen so that the manual's
-    controller crosses over at 12 rad/s; servo_lag_s: time constant of that speed. sensor_zero_deg:
-    zero offset of the angle sensor, which the factory configuration corrects. angle_noise_deg,
-    gyro_noise_dps, accel_noise_mps2: standard deviations. gyro_bias_dps, accel_bias_mps2: biases
-    that a calibration must find. clock_ppm: errors of the two crystals, drive first. boot_s:
-    duration of a boot. uptime_s: how long the boards have run at construction; if longer than
-    boot_s, they have booted. swapped: the drive Teensy is at the second port. ids: the boards'
-    numbers in heartbeats, drive first. lose_inbound: probability that a byte to a board is lost.
-    front_m: distance from the start to a wall in front. faults: in any order.
+    controller crosses over at 12 rad/s; servo_lag_s: time constant of the servo's speed.
+    sensor_zero_deg: zero offset of the angle sensor, which the factory configuration corrects.
+    angle_noise_deg, gyro_noise_dps, accel_noise_mps2: standard deviations. gyro_bias_dps,
+    accel_bias_mps2: biases that a calibration must find. clock_ppm: errors of the two crystals,
+    drive first. boot_s: duration of a boot. uptime_s: how long the boards have run at construction;
+    if longer than boot_s, they have booted. swapped: the drive Teensy is at the second port. ids:
+    the boards' numbers in heartbeats, drive first. lose_inbound: probability that a byte to a board
+    is lost. front_m: distance from the start to a wall in front. faults: planned faults, in any
+    order.
     """
 
     firmware: Firmware = field(default_factory=Firmware)

@@ -45,10 +45,10 @@ class Teensy(Generic[C]):
     commands: the lines that the Teensy executed, newest last. received: all bytes that reached the
     Teensy.
 
-    The caller may set these faults at any time. sums: whether lines carry checksums. silent: the
-    Teensy obeys, but sends nothing. hung: the Teensy neither obeys nor sends, and its last control
-    outputs stay in effect. unplugged: the cable is out, but the Teensy keeps running. powered:
-    False once the power is cut.
+    The caller may change the following attributes at any time. sums: whether lines carry checksums.
+    silent: the Teensy obeys, but sends nothing. hung: the Teensy neither obeys nor sends, and its
+    last control outputs stay in effect. unplugged: the cable is out, but the Teensy keeps running.
+    powered: False once the power is cut.
     """
 
     version = 0

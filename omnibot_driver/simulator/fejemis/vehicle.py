@@ -2,7 +2,7 @@
 
 """The robot that the two Teensys move: driving wheels, the steered wheel's servo, lift, brush.
 
-This module knows speeds and angles, and the pose that results. It must not know the boards or their
+This module knows speeds and angles, and the resulting pose. It must not know the boards or their
 lines.
 """
 
