@@ -21,8 +21,8 @@ BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
 """Period in s at which ``brush 1`` is repeated while the brush is on, as a line may be lost."""
 PACE_S: Final = 0.05
-"""Shortest time in s between two lift commands, or between two light commands. Of the commands that
-come earlier, only the newest is sent."""
+"""Shortest time in s between two lift commands, or between two light commands. If more commands
+come within this time, only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5

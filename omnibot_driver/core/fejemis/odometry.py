@@ -63,8 +63,7 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection; keep the last pose, as the frame of the poses may be
-        unchanged."""
+        """Begin a new connection; keep the last pose, whose frame the board may still use."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
         """Count of rejected poses in a row that agreed with the one before."""

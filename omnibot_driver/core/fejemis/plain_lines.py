@@ -3,11 +3,11 @@
 """``rc`` lines without a sum, written so that undetected damage has little effect.
 
 An ``rc`` line has a source (``2``), a speed and a turn rate. If a space or the source is lost, each
-later number moves one place forward. The drive board uses only the root of the sum of the squares
-of speed and turn rate. So the driver sends this root as the speed, and 0 as the turn rate. If these
-numbers move by one place, the line commands a stop. The remaining risk is a lost decimal point or a
-lost digit after the point; such a line is obeyed until the next line, which is sent with the next
-angle of the front wheel.
+later number takes the place of the number before it. The drive board uses only the root of the sum
+of the squares of speed and turn rate. So the driver sends this root as the speed, and 0 as the turn
+rate. If these numbers move by one place, the line commands a stop. The remaining risk is a lost
+decimal point or a lost digit after the point; such a line is obeyed until the next line, which is
+sent with the next angle of the front wheel.
 """
 
 import math

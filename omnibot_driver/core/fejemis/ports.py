@@ -57,7 +57,7 @@ class Ports:
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:
-        """Return the half with the role ``role``; None if neither half or both have it."""
+        """Return the half with the role ``role``; None if neither half or both have this role."""
         first, second = self.halves
         if first.role == role:
             return None if second.role == role else first

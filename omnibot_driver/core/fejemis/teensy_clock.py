@@ -71,8 +71,7 @@ class TeensyClock:
         return near_s + (host_s - self.host_s(near_s))
 
     def see(self, board_s: float, now: float) -> bool:
-        """Take a line's board time and its arrival ``now``; return whether the time is
-        plausible."""
+        """Take the board time of a line that came at ``now``; return False if it is implausible."""
         self.restarted = False
         if self._fit is not None:
             late_s = now - self.host_s(board_s)

@@ -119,7 +119,7 @@ class Assembler:
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
-        """Forget the last counts and poses, because a reset of the board sets them to zero."""
+        """Forget the last counts and poses, because a reset of the board may set them to zero."""
         self._ticks_gate.forget()
         for gate in self._odometry_gates.values():
             gate.forget()

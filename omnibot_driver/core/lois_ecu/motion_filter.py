@@ -58,8 +58,8 @@ EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
 """Fraction by which a wheel that rolls backward is faster than its set-point: mean ``EXCESS_MEAN``,
 standard deviation ``EXCESS_STDDEV``, and additional standard deviation ``EXCESS_CHANGE`` after a
-change of the set-point. Each has two values: for the board's own gains, and for gains that the user
-set. The wheel is faster because the firmware lowers the target with each tick until the
+change of the set-point. Each constant has two values: for the board's own gains, and for gains that
+the user set. The wheel is faster because the firmware lowers the target with each tick until the
 controller's next step. A feed-forward may make the wheel much faster still."""
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6

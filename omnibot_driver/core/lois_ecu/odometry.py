@@ -228,7 +228,9 @@ class LoisOdometry:
         self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
-        """Add the errors of a long silence, and make the present 0x20 the later reference.
+        """Add the errors that arise during a long silence.
+
+        The present values of 0x20 (odometry) become the reference for later values.
 
         A stop may not have reached the board, so each wheel may have continued at its speed.
         """

@@ -14,9 +14,9 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""The last reported speed of a wheel that came to rest is from ``SLOWEST_RPM`` to ``FASTEST_RPM``.
-A lower speed is that of a starting wheel, and a faster wheel ticks once more before it is at
-rest."""
+"""The last reported speed of a wheel that came to rest lies between ``SLOWEST_RPM`` and
+``FASTEST_RPM``. A lower speed is that of a starting wheel, and a faster wheel ticks once more
+before it is at rest."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
