@@ -28,8 +28,8 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""If damage turns an angle to the right into an angle to the left, the latter must be smaller than
-this number of degrees."""
+"""A damaged angle to the right may arrive as an angle to the left only below this limit, in
+degrees."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

@@ -283,7 +283,7 @@ class FejemisBoard(Board):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return the packets of a Stop, and those of an emergency stop, for the guard process.
 
-        Both also switch brush and lift off.
+        Both groups of packets also switch brush and lift off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

@@ -189,7 +189,7 @@ def _near(told: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
 _KEY: Final[Mapping[bytes, str]] = {
     text: text.decode("ascii")[:-1] for texts in ASKED.values() for text in texts
 }
-"""Keyword of the answer, by the line that requests it."""
+"""For each line that requests a part of the configuration: the keyword of the answer."""
 _REPORT: Final[Mapping[Written, str]] = {
     Written.WHEELS: "conf",
     Written.STEERING: "confs",
@@ -199,5 +199,5 @@ _REPORT: Final[Mapping[Written, str]] = {
     Written.ACCELEROMETER: "acco",
     Written.STEERING_GAINS: "cpsteer",
 }
-"""Keyword of the line that reports a setting."""
+"""For each setting: the keyword of the line that reports the setting."""
 _SHOWN: Final = frozenset(_KEY.values())

@@ -25,7 +25,7 @@ from omnibot_driver.core.fejemis.teensy_clock import EARLY_S, TeensyClock
 
 Role = Literal["drive", "front"]
 ROLES: Final[Mapping[int, Role]] = {90: "drive", 91: "front"}
-"""Role of a board, by the identity in its heartbeat (manual, Meta info)."""
+"""For each identity in a heartbeat (manual, Meta info): the role of the board."""
 STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
     "drive": {
         "hbt": 400, "pose": 20, "vel": 20, "gyro": 10, "acc": 10, "imupose": 20, "mag": 100,
@@ -194,7 +194,7 @@ class Half:
             self._identify(message.identity)
         elif isinstance(message, BoardPose) and self.heartbeat is None:
             self.heard_at = now
-            return False  # its time may be that of another board
+            return False  # the time may be that of another board
         if isinstance(message, Heartbeat | BoardPose) and not self._see(message.time_s, now):
             return False
         if isinstance(message, Heartbeat):
@@ -202,7 +202,7 @@ class Half:
             self.note("hbt", now)
             if self._unsure_at is not None:
                 sent_at = self.clock.host_s(message.time_s)
-                if sent_at >= self._unsure_at - EARLY_S:  # an older one may precede a restart
+                if sent_at >= self._unsure_at - EARLY_S:  # an older heartbeat may precede a restart
                     self._unsure_at = None
         self.heard_at = now
         return True

@@ -20,7 +20,7 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""Function that takes the front angle in rad and the time in s; it returns whether the wheel fails
+"""Function that takes the front angle in rad and the time in s, and returns whether the wheel fails
 to follow its commanded angle."""
 
 

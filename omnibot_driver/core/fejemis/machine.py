@@ -26,8 +26,8 @@ come within this time, only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest fraction of the wanted voltage that the driver sends: it reduces the voltage if the sum
-of a line with the wanted voltage does not detect damage."""
+"""Smallest fraction of the wanted voltage that the driver sends: the driver reduces the voltage if
+the sum of a line with the wanted voltage does not detect damage."""
 LEAST_TIME_S: Final = 0.04
 
 

@@ -36,7 +36,7 @@ class Told:
 
 
 class OdometryReader:
-    """Comparison of each odometry group with the last; ``rpm_mps``: rim speed at one RPM."""
+    """Comparison of each odometry group with the one before; ``rpm_mps``: rim speed at 1 RPM."""
 
     def __init__(self, track_m: float, rpm_mps: float) -> None:
         self._track_m, self._rpm_mps = track_m, rpm_mps

@@ -20,8 +20,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored groups: those of five seconds. A clock with an error of 100 ppm drifts by 0.5 ms
-in this time."""
+"""Number of stored groups: the groups of five seconds. In this time, a clock with an error of 100
+ppm drifts by 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s; a longer delay means that the board has restarted, or that its

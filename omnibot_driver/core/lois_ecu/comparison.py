@@ -33,12 +33,12 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Age in s of ticks when their last line arrives; ``ODOMETRY_AGE_S`` is the same for odometry."""
+"""Age in s of ticks when their last line arrives; ``ODOMETRY_AGE_S`` is the age of odometry."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
 """Error variances, in squared ticks: ``TICK_VARIANCE`` of a count, ``TURN_VARIANCE`` of the heading
-in 0x20, and ``ALONG_VARIANCE`` of the distance in 0x20."""
+in 0x20 (odometry), and ``ALONG_VARIANCE`` of the distance in 0x20."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
 """Residual in ticks that shows a change of the wheel's speed without a change of its set-point."""
@@ -125,9 +125,10 @@ class Comparison:
         self._motion.differing_mps = math.inf
 
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
-        """Correct the filter by the changes of 0x20 since the last group, ``duration_s`` ago.
+        """Correct the filter by the changes of 0x20 (odometry) since the last group.
 
-        ``late_s``: how much later than usual the group arrived, in s.
+        ``duration_s``: time since the last group. ``late_s``: how much later than usual the group
+        arrived, in s.
         """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)

@@ -289,7 +289,7 @@ class LoisConversation:
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:
-        """Return the ball command; send it once only."""
+        """Return the ball command, which must be sent only once."""
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:

@@ -3,10 +3,10 @@
 """Decoder that turns a stream of bytes into reports.
 
 A line ends with a line feed and begins at the last ``:`` before it. So if the end of a line is
-lost, the next line can still be decoded. All other bytes are counted and discarded. A line that
-lost or gained characters has a wrong length. Two lines can become one only if fourteen characters
-in a row are lost: the end of one and the beginning of the next. The checksum of the resulting line
-would have to be right too.
+lost, the next line can still be decoded. Bytes outside of lines are counted and discarded. A line
+that lost or gained characters has a wrong length. Two lines can become one only if fourteen
+characters in a row are lost: the end of one and the beginning of the next. The checksum of the
+resulting line would have to be right too.
 
 This module does not read a clock, and no input raises an error. It holds less than ``LONGEST_LINE``
 bytes between calls, and looks at each byte a bounded number of times.

@@ -46,8 +46,8 @@ class HeadingFilter:
     def believes(self, heading_deg: float, yaw_rad: float) -> bool:
         """Return whether a heading is accepted.
 
-        ``heading_deg``: heading clockwise from north. ``yaw_rad``: yaw of the odometry at the same
-        time.
+        ``heading_deg``: heading clockwise from north. ``yaw_rad``: yaw of the odometry when the
+        heading arrived.
         """
         if self._last is not None and _goes_on(self._last, heading_deg, yaw_rad):
             self._last, self._other, self._agreed = (heading_deg, yaw_rad), None, 0

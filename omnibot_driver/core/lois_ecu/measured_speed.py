@@ -29,13 +29,13 @@ START_STDDEV_TICKS: Final = 0.9
 that 0x20 (odometry) misses when a wheel starts."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of a wheel's motion that 0x20 misses above ``FAST_RPM``. The
-firmware gives no speed to a tick that comes soon after a delayed one, and ticks are delayed while
-the board sends."""
+"""Variance, in squared ticks per s, of a wheel's motion that 0x20 (odometry) misses above
+``FAST_RPM``. The firmware gives no speed to a tick that comes soon after a delayed one, and ticks
+are delayed while the board sends."""
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
-    """Predict the speeds that the firmware keeps, and the resulting changes of 0x20.
+    """Predict the speeds that the firmware keeps, and the resulting changes of 0x20 (odometry).
 
     The firmware updates 0x20 at each tick of either wheel, with the speed that it measured last for
     each wheel. So if only one wheel rolls, 0x20 uses the present speed of this wheel, and an old

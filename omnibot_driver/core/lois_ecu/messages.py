@@ -204,7 +204,7 @@ Command = (
 
 @dataclass(frozen=True, slots=True)
 class EStopButton:
-    """A press or release of the e-stop button; both make the board set its set-points to zero."""
+    """A press or release of the e-stop button; at either, the board zeroes its set-points."""
 
     pressed: bool
 

@@ -5,8 +5,8 @@
 States of each wheel: distance, speed, acceleration, the ticks that the board should have counted,
 the speed that the firmware measured last, a bias, and the fraction by which the wheel rolls
 backward faster than its set-point. States of the body: position, and the changes of the heading and
-the distance in 0x20. The errors of all these states are correlated with the error of the position,
-so each report of the board also corrects the position.
+the distance in 0x20 (odometry). The errors of all these states are correlated with the error of the
+position, so each report of the board also corrects the position.
 
 Left and right are those of the board; distances and speeds are for wheels of nominal size. This
 module works on commands and the firmware's counters, without messages.
@@ -75,7 +75,7 @@ class MotionFilter:
 
     ``tuned``: whether the controllers have gains that the user set. If a wheel is halted soon after
     a change of its set-point, it did not roll at the speed of the model, and perhaps rolled in the
-    other direction. The error of its distance is then this change of speed times
+    other direction. The error of its distance is then the change of speed times
     ``UNSETTLED_S[tuned]``.
     """
 

@@ -3,10 +3,10 @@
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
 Counts of ticks are exact, but the public firmware counts only while a wheel is commanded forward.
-At other times the commands show how the wheels should move (``motion_filter``), and 0x20 shows how
-they moved (``comparison``). The reports do not show errors of the wheels' sizes, nor slip, so the
-effect of both errors is estimated separately (``size_errors``). Time is an argument; all times are
-arrival times in s.
+At other times the commands show how the wheels should move (``motion_filter``), and 0x20 (the
+board's odometry) shows how the wheels moved (``comparison``). The reports do not show errors of the
+wheels' sizes, nor slip, so the effect of both errors is estimated separately (``size_errors``).
+Time is an argument; all times are arrival times in s.
 """
 
 import math
@@ -191,7 +191,7 @@ class LoisOdometry:
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
-        """Process odometry (0x20, or odometry that was appended to 0x12).
+        """Process odometry (0x20, or odometry that was appended to the ticks, 0x12).
 
         The odometry corrects the next predictions and the next estimate.
         """
@@ -270,8 +270,8 @@ class LoisOdometry:
         fused = self._fused(self._at_s)
         self._uncertainty.move(self._pose.yaw_rad, self._tangent(fused.wheel_ways_m))
         self._sizes.move(*fused.wheel_ways_m, motion.turn_sign * motion.track_m)
-        # An error of less than a tick is usually cancelled by the next error. After a turn it is
-        # not, because the two have different directions.
+        # An error of less than a tick is usually cancelled by the next error. After a turn the
+        # two errors do not cancel, because they have different directions.
         turned = min(abs(fused.displacement.yaw_rad), 1.0)
         hidden = HIDDEN_PART * (self._settings.tick_m * turned) ** 2
         for state in (X, Y):

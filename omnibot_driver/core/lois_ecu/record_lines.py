@@ -93,8 +93,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether a line with ``code`` and ``payload`` ends the record.
 
-        The end of a torque record looks like a sample of two motors without current, so it is
-        accepted as the end only after all samples.
+        The end of a torque record looks like a sample of two motors without current, so such a line
+        is accepted as the end only after all samples.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

@@ -5,12 +5,12 @@
 The public firmware's controller continues to use the last measured speed of a wheel at rest. If
 this speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
 
-Ticks show whether a wheel turns forward, and 0x20 whether it turns backward. If a wheel that should
-turn backward is at rest, there are two cases. While the other wheel is also at rest, the pose in
-0x20 does not change. While the other wheel turns, 0x20 repeats the same speed for the wheel at
-rest. A wheel that rolls steadily also repeats a speed, but this speed is not far above its
-set-point: far above it the controller gives no power, so the wheel would slow down. There are two
-exceptions. A feed-forward gives power at any speed. A saturated controller may keep full power
+Ticks show whether a wheel turns forward, and 0x20 (odometry) shows whether it turns backward. If a
+wheel that should turn backward is at rest, there are two cases. While the other wheel is also at
+rest, the pose in 0x20 does not change. While the other wheel turns, 0x20 repeats the same speed for
+the wheel at rest. A wheel that rolls steadily also repeats a speed, but this speed is not far above
+its set-point: far above it the controller gives no power, so the wheel would slow down. There are
+two exceptions. A feed-forward gives power at any speed. A saturated controller may keep full power
 until RPM 0/0 restarts it; the wheel is then faster than any wheel that comes to rest. This module
 works on set-points, reports and times.
 """

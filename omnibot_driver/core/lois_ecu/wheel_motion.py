@@ -19,9 +19,9 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², counted ticks in
 m, and the speed in m/s that was measured last."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""States of the body: position, and the turn and distance that 0x20 should show. ``BIAS`` and
-``EXCESS`` are the first of two states each, one for each wheel: a bias, and the fraction by which
-the wheel rolls backward faster than its set-point."""
+"""States of the body: position, and the turn and distance that 0x20 (odometry) should show.
+``BIAS`` and ``EXCESS`` are the first of two states each, one for each wheel: a bias, and the
+fraction by which the wheel rolls backward faster than its set-point."""
 STATES: Final = 18
 
 CONTROL_RATE: Final = 2.0

@@ -68,7 +68,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.imu.boot()
 
     def started(self) -> None:
-        """Reset the pose at the end of a boot, so that turns during the boot are not counted."""
+        """Reset the pose at the end of a boot, so wheel turns during the boot are not counted."""
         self._reset_pose()
 
     # Each cycle

@@ -22,7 +22,7 @@ class Firmware:
     sums: lines carry the checksum ``;NN`` and are checked, as with the public host programs. If
         False, as in the manual, a line that begins with ``;`` is an unknown command.
     reverse: how the steering handles an angle beyond 90° at a negative speed. mirrored: the wheel
-        takes the angle of the same curve; clamped: it stays at 90°.
+        takes the angle of the same curve driven forward; clamped: the wheel stays at 90°.
     timed_velocity: ``vel`` begins with the time.
     acceleration_in_g: ``acc`` is in g, not m/s².
     tilt: ``pose`` has a fifth number.

@@ -158,7 +158,7 @@ class SimulatedLois:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
-        """Block the wheels for which the argument is true; release the others."""
+        """Block the wheels whose argument is true; release the others."""
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
@@ -276,7 +276,7 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """Finish the current pass over the timers, then make another; both take less than 1 ms."""
+        """Finish the pass over the timers, then make another pass; both take less than 1 ms."""
         for _ in range(2):
             if not self._scan:
                 self._read_input()

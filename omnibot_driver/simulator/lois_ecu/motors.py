@@ -74,7 +74,7 @@ class Motor:
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """Return the turns of the wheel, after backlash, for these turns of the motor."""
+        """Return the turns of the wheel, after backlash, for the given turns of the motor."""
         backlash = self._settings.backlash_turns
         if not backlash:
             return turns
