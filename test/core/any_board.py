@@ -234,8 +234,7 @@ class AnyBench:
             self.settle()
 
     def stall(self, seconds: float) -> None:
-        """Stall the process for ``seconds``, then read at once all data that arrived during the
-        stall."""
+        """Stall the process for ``seconds``, then read all data of that time at once."""
         waiting: list[Packet] = []
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S

@@ -42,8 +42,10 @@ def by_wheels(bench: Bench, command: Triple) -> None:
 
 
 def goes_astray(bench: Bench, command: Triple) -> bool:
-    """Return whether the twist is 0.05 m/s or 0.15 rad/s outside the range from rest to the
-    command."""
+    """Return whether the robot's twist is clearly outside the range from rest to the command.
+
+    The limits are a distance of 0.05 m/s and of 0.15 rad/s from the range.
+    """
     truth, (x, y, yaw) = bench.board.truth, command
     square = x * x + y * y
     part = (truth.vx_mps * x + truth.vy_mps * y) / square if square else 0.0
@@ -56,8 +58,7 @@ def goes_astray(bench: Bench, command: Triple) -> bool:
 def stopped_after_s(
     bench: Bench, command: Triple, by: Callable[[Bench, Triple], None] = by_velocity
 ) -> float:
-    """Command the robot; return the board time from its first deviation until Stop is written, in
-    s."""
+    """Command the robot; return the board time from its first deviation to Stop, in s."""
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick
     while bench.now < begun + 3.0:

@@ -95,7 +95,7 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether the board is driven; a paused board could take a byte of a command for a letter."""
+        """Whether commands are sent, as a paused board could take a byte of one for a letter."""
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property

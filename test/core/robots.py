@@ -8,7 +8,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def standing() -> Bench:
-    """A started board that stands still, half a second after the last Stop."""
+    """Return a bench whose board is started and whose robot is at rest."""
     bench = Bench()
     bench.open()
     bench.run_until_state("nominal")
@@ -17,7 +17,7 @@ def standing() -> Bench:
 
 
 def paused() -> Bench:
-    """Return a bench whose board is paused, reports it, and is not to be started."""
+    """Return a bench whose board is paused and reports this; the driver does not start it."""
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state("paused")
@@ -25,7 +25,7 @@ def paused() -> Bench:
 
 
 def driving(**settings: object) -> Bench:
-    """Return a bench with a robot that has just been commanded to drive, and drives, at 0.4 m/s."""
+    """Return a bench whose robot drives at 0.4 m/s by a command that was just sent."""
     bench = Bench(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")

@@ -2,9 +2,9 @@
 
 """A board's byte stream with known sampling times, and the ways in which it reaches a host.
 
-It is written from the manual and shares no code with the driver. The board's crystal has ticks of
-10 ms. Frames are sent back to back at 115200 baud: IMU in every tick, delta in every fourth, pose
-in every twentieth. Times are host times in s.
+The module is written from the manual and shares no code with the driver. The board's crystal has
+ticks of 10 ms. Frames are sent back to back at 115200 baud: IMU in every tick, delta in every
+fourth, pose in every twentieth. Times are host times in s.
 """
 
 import math
@@ -66,7 +66,7 @@ class Board:
 
 
 def bursts(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """Yield what arrives on an ideal line: all bytes between two idle gaps in one read."""
+    """Yield what arrives on an ideal line: one read of all bytes between two idle gaps."""
     held = bytearray()
     last = line[0][0]
     for at, byte in line:
@@ -105,8 +105,8 @@ def ftdi(
 ) -> Chunker:
     """Return a chunker like a USB adapter.
 
-    It delivers packets of 62 bytes when they are full, and a shorter one when its timer expires.
-    The timer runs freely on the adapter's crystal, or begins with a packet's first byte.
+    The adapter delivers packets of 62 bytes when they are full, and a shorter packet when its timer
+    expires. The timer runs freely on the adapter's crystal, or begins with a packet's first byte.
     """
 
     def chunk(line: list[Byte], rng: random.Random) -> Iterator[Read]:
@@ -139,9 +139,9 @@ def late(
     jitter_s: float = 0.0,
     stalls: list[tuple[float, float]] | None = None,
 ) -> Iterator[Read]:
-    """Delay reads like a host that wakes up late: a little each time, and until the end of a stall.
+    """Delay reads like a host that wakes up late: a little each time, and until a stall ends.
 
-    What has arrived meanwhile is read at once.
+    Data that arrives before the host wakes up is read at once.
     """
     pending = bytearray()
     wakes = -math.inf

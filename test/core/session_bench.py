@@ -27,12 +27,12 @@ OPENING = STOP
 
 
 def bare(data: bytes) -> bytes:
-    """Return a transmission without the zeros before it."""
+    """Return ``data`` without the zeros before the frame."""
     return data.lstrip(b"\0")
 
 
 class Bench:
-    """A session and a board. ``hears``, ``speaks``: whether the board receives, and sends."""
+    """A session and a simulated board. ``hears``: the board receives; ``speaks``: it sends."""
 
     def __init__(
         self,
@@ -120,12 +120,12 @@ class Bench:
             self.run(TICK_S)
 
     def configure(self, **changed: Any) -> None:
-        """Change fields of SessionSettings; the others keep their first values."""
+        """Change fields of SessionSettings; all other fields keep the values from the start."""
         self.session.configure(replace(self.settings, **changed), self.now)
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Change fields of OmniBotSettings; the others have their defaults."""
+        """Change fields of OmniBotSettings; all other fields have their defaults."""
         board = self.board.settings
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed
@@ -134,11 +134,11 @@ class Bench:
         self.settle()
 
     def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
-        """Interpret deltas as given in this frame."""
+        """Let the driver interpret deltas in ``frame``."""
         self.session.configure(self.settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def last_words(self, on_exit: OnExit) -> bytes:
-        """Return what is written before the port is closed."""
+        """Return the bytes that a shutdown writes before the port is closed."""
         return joined(self.session.shutdown.sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:

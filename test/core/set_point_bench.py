@@ -26,7 +26,7 @@ TIMEOUT_S = 0.5
 
 
 class Words:
-    """An encoder whose orders are already bytes."""
+    """An encoder for orders that are already bytes."""
 
     def stop(self) -> Packets:
         return packed(STOP)
@@ -44,7 +44,7 @@ class Words:
 
 
 class Stream(CommandPolicy):
-    """A command policy with a stream of set points in bytes."""
+    """A command policy whose stream of set points consists of bytes."""
 
     def __init__(self, settings: CommandSettings) -> None:
         proof = StopProof()
@@ -66,7 +66,7 @@ def make_stream() -> Stream:
 
 
 def run(stream: Stream, start: float, end: float) -> list[tuple[float, bytes]]:
-    """Serve the stream each time it is due, as the pacer does; return what it writes, and when."""
+    """Serve the stream each time it is due, as the pacer does; return times and bytes written."""
     written = []
     now = start
     while now <= end:

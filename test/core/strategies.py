@@ -22,7 +22,7 @@ small_moves = st.builds(Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.flo
 
 
 def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
-    """Draw readings that are displacements."""
+    """Draw displacement readings in ``frame``."""
     return st.builds(
         DisplacementReading,
         dx_m=st.floats(-0.1, 0.1),
@@ -35,11 +35,11 @@ def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
 
 
 def chunkings(data: bytes) -> st.SearchStrategy[list[bytes]]:
-    """Draw ways to cut the bytes into pieces, empty ones included."""
+    """Draw divisions of the bytes into pieces, some of which may be empty."""
     cuts = st.lists(st.integers(0, len(data)), max_size=30).map(sorted)
     return cuts.map(lambda at: cut(data, at))
 
 
 def cut(data: bytes, at: Sequence[int]) -> list[bytes]:
-    """Return the pieces between cuts at ascending positions."""
+    """Return the pieces of ``data`` between cuts at ascending positions."""
     return [data[start:end] for start, end in zip([0, *at], [*at, len(data)], strict=True)]

@@ -2,7 +2,7 @@
 
 """A synthetic board for odometry tests: body twists in, readings of the manual's firmware out.
 
-It uses rotation matrices and shares no code with the code under test.
+The board uses rotation matrices and shares no code with the code under test.
 """
 
 import math
@@ -35,7 +35,7 @@ def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
 
 
 class Trip:
-    """A board with a given initial heading, whose axes may have the opposite signs."""
+    """A board with a given initial heading, whose axes may be reversed."""
 
     def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
         self.board = (12.0, -34.0, heading)

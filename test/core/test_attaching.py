@@ -42,7 +42,7 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 
 
 def test_the_first_pose_must_be_confirmed_too() -> None:
-    """A single damaged pose must not turn the odometry, so two that agree are needed."""
+    """A single damaged pose must not turn the odometry, so two poses must agree."""
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.0, 0.1), 0.0) == []
     assert odometry.settle(heading(-1.0)) == []
@@ -56,14 +56,14 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 
 
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
-    """The duration of the first displacement is unknown, but it cannot add any uncertainty yet."""
+    """The first displacement has an unknown duration, but adds no uncertainty to the start."""
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
     assert attach(odometry, trip.pose)[-1].covariance == Covariance()
 
 
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
-    """If the next pose is lost, the pose before it is accepted after a second."""
+    """If the next pose is lost, the first pose is accepted after a second."""
     odometry = Odometry(SETTINGS)
     odometry.settle(heading(math.pi / 2))
     for _ in range(25):
@@ -73,7 +73,7 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 
 
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
-    """The first 25 deltas are published together, later ones at once."""
+    """The first 25 deltas are published together, later deltas one by one."""
     odometry = Odometry(SETTINGS)
     for _ in range(24):
         assert odometry.displace(earth(0.01, 0.0), 0.0) == []
@@ -86,7 +86,7 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """The pose that was driven on the assumption stays; later motion has the right heading."""
+    """Estimates with the assumed heading stay; later motion has the confirmed heading."""
     odometry = Odometry(SETTINGS)
     for _ in range(25):
         odometry.displace(earth(0.0, 0.0), 0.0)
@@ -112,7 +112,7 @@ def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) ->
 
 
 def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
-    """Each of the poses is damaged in its own way."""
+    """Three poses, each damaged in another way, do not confirm each other."""
     odometry = Odometry(SETTINGS)
     attach(odometry, heading(0.0))
     for yaw in (1.0, 2.0, -1.0):
@@ -121,7 +121,7 @@ def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
 
 
 def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> None:
-    """A step from +π to −π is not a jump."""
+    """A step of the board's heading from +π to −π is not a jump."""
     odometry = Odometry(SETTINGS)
     attach(odometry, heading(math.pi - 0.01))
     odometry.displace(earth(0.0, 0.0, 0.02), 0.0)
@@ -131,7 +131,7 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 
 
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
-    """The pose is right, not the sum of rounded displacements; it is approached in five steps."""
+    """Each pose corrects the sum of rounded displacements, in five steps."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.01, -0.005, 0.02))
@@ -142,7 +142,7 @@ def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
-    """The pose is ignored before the first valid pose and after it."""
+    """A pose with NaN or infinity is ignored, before the first valid pose and after it."""
     odometry = Odometry(SETTINGS)
     odometry.displace(earth(0.0, 0.1), 0.0)
     assert odometry.settle(PoseReading(0.0, 0.0, bad)) == []
@@ -181,7 +181,7 @@ def test_a_board_that_restarts_goes_on_from_here(
 
 
 def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
-    """Pose and covariance are zero afterwards, and the x axis points forward."""
+    """After a reset, pose and covariance are zero, and the x axis points forward."""
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     attach(odometry, trip.pose)
     for _ in range(10):
@@ -195,7 +195,7 @@ def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
 
 
 def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """Motion that still waited for the board's first pose does not move the pose either."""
+    """After a reset, motion that waited for the board's first pose does not move odom."""
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     for _ in range(3):
         odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)
@@ -206,7 +206,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """Each change of the board's frame makes goals in the old frame invalid."""
+    """Each change of the board's frame is counted, as it makes goals in the old frame invalid."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
     counted = [odometry.alignments]

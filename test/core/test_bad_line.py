@@ -17,7 +17,7 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, FaultyLin
 
 
 class Drive:
-    """Curves at up to 0.3 m/s along each axis, on a board that has driven before."""
+    """A drive in curves at up to 0.3 m/s along each axis; the board's first pose is not zero."""
 
     def __init__(self, frame: str, faults: LineFaults) -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)
@@ -28,7 +28,7 @@ class Drive:
         self.bench.board.step = lambda: self.line.carry(step())  # type: ignore[method-assign]
         self.attached = self.told()
         self.errors: list[Pose] = []
-        """Differences of the newest odom from the board's own pose, when both are of one tick."""
+        """Differences of odom from the board's own pose at the same tick."""
         self.bench.open()
         self.bench.run(1.0)
         self.line = FaultyLine(faults, seed=3)
@@ -70,7 +70,7 @@ class Drive:
 @pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 3), ("body", 1)])
 def test_after_minutes_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: int) -> None:
-    """One byte in 1000 and five bursts in 10,000 are lost, until 1.5 s before the last check."""
+    """Bytes are lost alone (1 in 1000) and in bursts; the line is good for the last 1.5 s."""
     drive = Drive(frame, LineFaults(lose=0.001, burst=0.0005))
     drive.run(60.0 * minutes)
     assert drive.line.lost > 4000 * minutes

@@ -31,7 +31,7 @@ STANDS = DisplacementReading(0.0, 0.0, 0.0, "body", 0.2, 0)
 
 
 class Teller(line_board.LineBoard):
-    """A board that returns the readings in ``next`` with its next bytes, and odometry at 10 Hz."""
+    """A board with odometry at 10 Hz; its next bytes also give the readings in ``next``."""
 
     traits = replace(
         line_board.LineBoard.traits, own_odometry=True, requests=frozenset({Request.RESET})
@@ -84,7 +84,7 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
 
 
 def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
-    """The board's odometry keeps its own rate, covariance and variances of the twist."""
+    """The board's own odometry is published with its own rate and variances of the twist."""
     before = len(bench.odometry)
     bench.drive_on(0.3, 2.0)
     told = bench.odometry[before:]
@@ -94,7 +94,7 @@ def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: Any
 
 
 def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
-    """Only received data lets the driver continue to drive the robot."""
+    """Predicted odometry does not let the driver drive on; only received data does."""
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from the board|connecting"):
@@ -103,7 +103,7 @@ def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> 
 
 
 def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
-    """The new frame begins where the robot stands."""
+    """After a reset, the board's own odometry begins at zero where the robot stands."""
     bench.drive_on()
     bench.run(1.5)
     assert bench.odometry[-1].pose.x_m > 0.1
@@ -113,7 +113,7 @@ def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
 
 
 def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: AnyBench) -> None:
-    """Both events are published."""
+    """Press and release of the button are both published, but only the press has an effect."""
     bench.drive_on()
     tell(bench, EStopButtonReading(True))
     assert bench.session.estop_active
@@ -127,7 +127,7 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
-    """Data that was already on its way at the request is ignored."""
+    """A report of a reset that was on its way before the request is ignored."""
     bench.session.request(Request.RESET, "token", bench.now)
     bench.settle()
     tell(bench, ResetReading())
@@ -141,7 +141,7 @@ def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
 
 
 def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
-    """Any number of such displacements proves nothing."""
+    """Displacements that are not measured never prove that a robot is at rest."""
     proof = StopProof()
     proof.stopped(0.0)
     for step in range(1, 20):
@@ -150,7 +150,7 @@ def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
 
 
 def test_a_proof_takes_as_long_as_the_board_needs() -> None:
-    """A board with displacements of 0.2 s that needs 0.6 s needs three of them."""
+    """A proof of rest that needs 0.6 s needs three displacements of 0.2 s."""
     proof = StopProof(0.6)
     proof.stopped(0.0)
     proved = []
@@ -161,7 +161,7 @@ def test_a_proof_takes_as_long_as_the_board_needs() -> None:
 
 
 def test_the_estop_is_not_released_while_the_button_is_held(bench: AnyBench) -> None:
-    """The button's last event is valid even if it came before a disconnection.
+    """The e-stop is not released while the button is held, even after a reconnection.
 
     The refusal says what to do.
     """

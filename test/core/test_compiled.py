@@ -46,7 +46,7 @@ def told(piece: int, lost: float) -> str:
 @pytest.mark.parametrize("lost", LOST)
 @pytest.mark.parametrize("piece", PIECES)
 def test_both_cores_say_the_same(piece: int, lost: float) -> None:
-    """The interpreted core is the source in this repository, run in a process of its own."""
+    """The compiled core gives the same digest as the interpreted core in another process."""
     path = os.pathsep.join(str(ROOT / part) for part in (".", "test", "test/core"))
     script = f"import test_compiled as t; print(t.core_kind(), t.told({piece}, {lost}))"
     done = subprocess.run(

@@ -23,7 +23,7 @@ def bench(request: pytest.FixtureRequest) -> AnyBench:
 
 
 def test_every_board_of_the_driver_is_among_them() -> None:
-    """A board that is missing in the list would not be tested."""
+    """A board that is missing in the list of boards would not be tested."""
     missing = set(PROFILES) - {name.split()[0] for name in MAKERS}
     assert not missing, "add a robot and an entry of MAKERS to test/core/any_board.py"
 
@@ -37,7 +37,7 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The speed is 0.3 m/s for 4 s, less the time until the controller reaches it."""
+    """The robot drives at 0.3 m/s for 4 s, less the time until it reaches this speed."""
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
     assert bench.robot.stands
@@ -47,7 +47,7 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """All of a hundred commands are accepted."""
+    """All of a hundred commands are accepted, however rarely odometry arrives."""
     for _ in range(100):
         bench.drive(0.2)
         bench.run(0.05)
@@ -55,7 +55,7 @@ def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) 
 
 
 def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
-    """The robot does not start again by itself."""
+    """After the timeout the robot stands, and does not start again by itself."""
     bench.drive_on()
     assert not bench.robot.stands
     bench.run(0.6)
@@ -77,7 +77,7 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
     bench: AnyBench, seconds: float
 ) -> None:
-    """The amount of unread data does not matter; the bench has no guard that stops the robot."""
+    """After a stall of up to 9 s with unread data, the robot stands and obeys a new command."""
     for _ in range(2):
         bench.drive_on()
         bench.stall(seconds)
@@ -90,7 +90,7 @@ def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:
-    """The release of the button does not move the robot."""
+    """The latched e-stop refuses commands, and its release does not move the robot."""
     bench.drive_on()
     bench.estop(True)
     with pytest.raises(CommandRefused, match="e-stop"):
@@ -119,7 +119,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """A command that came before the event, of any kind, has no effect."""
+    """A command from before the event, of any kind, has no effect after it."""
     bench.drive_on()
     event(bench)
     bench.settle()
@@ -129,7 +129,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None:
-    """The board still receives, so it is stopped, and new commands are refused."""
+    """The silent board still receives, so it is stopped; new commands are refused."""
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from|no angle of|no pose from|connecting"):
@@ -145,7 +145,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """The robot may have continued with its last command."""
+    """A robot that was cut off may have driven on; it is stopped when its data arrives again."""
     bench.drive_on()
     bench.speaks = bench.hears = False
     bench.run(5.0)
@@ -155,7 +155,7 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 
 
 def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
-    """The previous command stays active."""
+    """A command that is not a number is refused, and the command before it stays active."""
     bench.drive_on()
     with pytest.raises(CommandRefused, match="NaN or infinity"):
         bench.session.command_twist(BodyTwist(math.nan, 0.0, 0.0), bench.now)
@@ -164,7 +164,7 @@ def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> N
 
 
 def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
-    """The limit is 0.5 m/s; 5 % more is allowed for the measurement."""
+    """At a command of 100 m/s the robot drives at most 0.5 m/s, plus 5 % for the measurement."""
     bench.drive_on(100.0, 2.0)
     before = bench.robot.way_m
     bench.drive_on(100.0, 2.0)
@@ -172,7 +172,7 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """Stop is sent until the robot is seen at rest; then the final bytes are written."""
+    """At shutdown, Stop is sent until the robot is seen at rest; then the last bytes follow."""
     bench.drive_on()
     bench.session.shutdown.begin(bench.now)
     bench.settle()

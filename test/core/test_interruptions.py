@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry over pauses, restarts and an hour, and from wheel counts, on the simulated board."""
+"""Odometry over pauses, restarts and an hour of driving, and odometry from wheel counts."""
 
 import math
 import struct
@@ -27,7 +27,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """The robot rolls out during 1.3 s of pause, whether or not its frames are received."""
+    """Odom is right after a pause in which the robot rolled out, even if frames were lost."""
     on = line(seed)
     if hidden:
         on.loses = lambda _data, _now: True
@@ -43,9 +43,9 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """Text, SEQ and pose begin at zero.
+    """After a restart the board's text, SEQ and pose begin at zero, and odom continues.
 
-    The result is the same if text or the first frames are lost.
+    The result is the same if the text or the first frames are lost.
     """
     on = line(seed)
     on.drives = False
@@ -67,7 +67,7 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 
 def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
-    """How the robot rolled out remains unknown."""
+    """After a restart the covariance stays larger, as the way that the robot rolled is unknown."""
     on = line(1)
     before = on.estimates[-1].covariance
     on.board.receive(b"R")
@@ -79,7 +79,7 @@ def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
 
 
 def test_a_driver_that_restarts_begins_at_the_identity() -> None:
-    """The board's pose at that time does not matter; odom follows it from there."""
+    """When the driver restarts, odom begins at zero, whatever the board's pose is."""
     on = line(1)
     on.translation, on.odometry = Translation(OmniBotSettings()), Odometry(OdometrySettings())
     on.attached = on.told
@@ -90,7 +90,7 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Zero is where odom had the robot at the reset, although that was 14 to 42 mm off."""
+    """After a reset in a gap odom begins at zero; the error of the gap is not corrected later."""
     for seed in range(4):
         on = line(seed)
         lose(on, 1.0)
@@ -103,7 +103,7 @@ def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
 
 
 def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """The robot drives for three seconds during the silence."""
+    """While the line is closed the robot drives for three seconds, and odom then includes it."""
     on = line(2)
     on.loses = lambda _data, _now: True
     on.run(3.0)
@@ -121,7 +121,7 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
 def test_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
     frame: str, count: int
 ) -> None:
-    """Each delta is rounded to 0.1 mm and 0.1 mrad; a pose follows every fifth one."""
+    """Each delta is rounded to 0.1 mm and 0.1 mrad; a pose follows every fifth delta."""
     odometry = attached()
     x = y = yaw = worst_m = worst_rad = 0.0
     for number in range(1, count + 1):
@@ -150,7 +150,7 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """A turn of every wheel by -1/8 turns the robot by 2πr/8L; B against A drives it forward."""
+    """-1/8 turn of each wheel rotates the robot by 2πr/8L; B against A drives it forward."""
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)
     odometry = Odometry(OdometrySettings())

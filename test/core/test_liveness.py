@@ -14,7 +14,7 @@ UNHEARD_S, SILENCE_S = 0.5, 2.0
 
 @pytest.fixture
 def liveness() -> Liveness:
-    """Return a liveness whose line was opened at 10 s."""
+    """Return the liveness of a line that was opened at 10 s."""
     made = Liveness(
         Traits(
             imu_period_s=None,
@@ -29,7 +29,7 @@ def liveness() -> Liveness:
 
 
 def test_a_silence_is_found_once(liveness: Liveness) -> None:
-    """The silence is found as soon as the limit of 2 s has passed."""
+    """A silence is reported once, as soon as the limit of 2 s has passed."""
     assert [liveness.fell_silent(now) for now in (11.9, 12.0, 12.1, 99.0)] == [
         False,
         True,
@@ -39,7 +39,7 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 
 
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
-    """The time of the second silence is counted from that reading."""
+    """A silence after a new reading is reported again, 2 s after that reading."""
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0
     assert not liveness.fell_silent(21.9)

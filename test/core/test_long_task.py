@@ -15,7 +15,7 @@ NAME = next(name for name in BOARDS if name == "two lines")
 
 
 def test_it_is_answered_once() -> None:
-    """Only the first end is reported to the client."""
+    """Only the first end of a task is reported to the client."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.is_current("token")
@@ -29,7 +29,7 @@ def test_it_is_answered_once() -> None:
 
 
 def test_a_second_one_is_refused() -> None:
-    """The refusal names the task that is under way."""
+    """The refusal of a second task names the task that is under way."""
     task = LongTask()
     task.begin("record of RPM", "one", 120.0, 0.0)
     with pytest.raises(RequestRefused, match="a record of RPM is under way"):
@@ -38,7 +38,7 @@ def test_a_second_one_is_refused() -> None:
 
 
 def test_it_ends_when_its_time_is_over() -> None:
-    """The task does not end before its time is over."""
+    """A task fails when its time is over, and not before."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.wake_at == 125.0
@@ -51,7 +51,7 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """Only a robot that was driven can be stopped."""
+    """A task ends when a driven robot is stopped, but not while a robot stands all along."""
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)
     for driven in (False, False, True, True):
@@ -73,7 +73,7 @@ ENDS: dict[str, Callable[[AnyBench], object]] = {
 
 @pytest.mark.parametrize("words", ENDS)
 def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
-    """The task fails at once, with the reason in its message."""
+    """A stop, an e-stop or a lost board ends the task, with the reason in the message."""
     bench = nominal(NAME)
     if "stopped" in words:
         bench.drive_on()
@@ -89,7 +89,7 @@ def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
 
 
 def test_none_is_begun_under_the_estop_or_without_a_board() -> None:
-    """The task could not be carried out."""
+    """No task begins under the e-stop or without a board, as it could not be carried out."""
     bench = nominal(NAME)
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop is latched"):

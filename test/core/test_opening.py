@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Opening a line and finding the board on it: zeros, Stop, S, and the state's names."""
+"""Opening a line and finding the board on it: zeros, Stop, S, and the names of the states."""
 
 import pytest
 from robots import standing
@@ -17,7 +17,7 @@ def bench() -> Bench:
 
 
 def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
-    """A booting board ignores the first bytes; it must not act on the rest of a cut command."""
+    """The opening is zeros, Stop and S; S is repeated, because a booting board ignores bytes."""
     bench = Bench(BoardSettings(boot_time_s=2.0))
     bench.open()
     bench.run(1.25)
@@ -40,7 +40,7 @@ def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
 
 
 def test_without_auto_start_a_paused_board_stays_paused() -> None:
-    """The opening does not contain S."""
+    """If the board is not to be started, the opening does not contain S."""
     bench = Bench(run=False)
     bench.open()
     bench.run(3.0)
@@ -58,7 +58,7 @@ def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
 
 
 def test_garbage_is_not_an_understood_board() -> None:
-    """The port is open and bytes arrive, but the state remains ``connecting``."""
+    """Bytes that form no frame leave the state ``connecting`` and cause one notice."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -71,7 +71,7 @@ def test_garbage_is_not_an_understood_board() -> None:
 
 
 def test_a_silent_board_is_told_once() -> None:
-    """The silence is reported again only after data has arrived in between."""
+    """A silence is reported once, and again only after data has arrived in between."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -102,7 +102,7 @@ def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -
 
 
 def test_a_paused_robot_is_still_paused_after_a_reconnect(bench: Bench) -> None:
-    """The wanted mode is kept while the port is closed."""
+    """The mode wanted by the user is kept while the port is closed."""
     bench.ask(Request.PAUSE, 5.0)
     bench.close()
     bench.open()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pausing a board whose P is a toggle: it never resumes by mistake, and a pause needs proof."""
+"""Pausing with P, a toggle: the board never resumes by mistake, and a pause needs proof."""
 
 import pytest
 from robots import drive_on, paused, standing
@@ -17,7 +17,7 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """Stop is sent at once, P when data shows that the board runs."""
+    """After a request to pause, Stop is sent at once, and P when data shows that the board runs."""
     bench.drive(0.5)
     bench.run(0.3)
     start = len(bench.written)
@@ -29,7 +29,7 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
-    """The second time no P is sent, and the answer waits for a new notice."""
+    """A second request to pause sends no P, and its answer waits for a new notice."""
     bench.ask(Request.PAUSE, 5.0)
     start, asked_at = len(bench.written), bench.now
     answer = bench.ask(Request.PAUSE, 5.0)
@@ -42,7 +42,7 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """The driver still believes nominal, but only data received after the request allows a P."""
+    """P is sent only if data received after the request shows that the board runs."""
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
     assert bench.ask(Request.PAUSE, 5.0).success
@@ -51,7 +51,7 @@ def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
 
 
 def test_a_lost_p_is_said_again(bench: Bench) -> None:
-    """If data continues for longer than the time between two notices, P was lost."""
+    """If data continues for longer than the time between two notices, P is sent again."""
     bench.hears = False
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.settle()
@@ -65,7 +65,7 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Another program has just paused the board; our P, sent because of older data, resumes it."""
+    """A P sent on old data resumes a board that another program paused; P is then repeated."""
     data = bench.board.step()
     bench.board.receive(b"P")
     notice = bench.board.step()
@@ -86,7 +86,7 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
-    """S is in flight, and the board sent the notice before it obeyed S."""
+    """A notice from before S was obeyed does not confirm a pause that is requested after S."""
     bench = paused()
     notice = b""
     while not notice:
@@ -106,7 +106,7 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
 
 
 def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
-    """The host sent P and slept for 3 s; the data it then reads is from before P was obeyed."""
+    """Data from before P, read after the host slept for 3 s, does not mean that P was lost."""
     on_its_way = b"".join(bench.board.step() for _ in range(10))
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.session.inbound.receive(on_its_way[:80], bench.now)
@@ -123,10 +123,7 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """The caller wants the robot at rest.
-
-    P is repeated, motion is refused, and the answer says so.
-    """
+    """After a failed pause the answer says so, motion is refused, and P is repeated."""
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -141,7 +138,7 @@ def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None
 
 
 def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
-    """A fresh command moves the robot again."""
+    """After ~/start a failed pause is not repeated, and a fresh command moves the robot."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     bench.hears = True
@@ -155,7 +152,7 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
 
 
 def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:
-    """The request to pause still applies, so motion is refused until the board is paused."""
+    """A paused board that another program starts is paused again, and motion stays refused."""
     assert bench.ask(Request.PAUSE, 5.0).success
     bench.board.receive(b"S")
     bench.run(0.2)

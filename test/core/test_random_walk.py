@@ -72,7 +72,7 @@ class Walk(Bench):
             self.judge_time()
 
     def stall(self, seconds: float) -> None:
-        """Do not serve the session for a time, while the line carries data."""
+        """Let the line carry data for ``seconds`` without serving the session."""
         for _ in range(round(seconds / TICK_S)):
             self.step_board()
         if self.session.estop_active:
@@ -157,7 +157,7 @@ class Walk(Bench):
         self.board.reboot()
 
     def act_letter(self) -> None:
-        """Send a letter that is not from the driver."""
+        """Send the board a letter that is not from the driver."""
         self.meddled_at = self.now
         self.board.receive(self.random.choice([b"P", b"S", b"R"]))
 

@@ -25,7 +25,7 @@ def bench() -> Bench:
 def test_on_a_silent_board_every_request_is_answered_in_time(
     request_: Request, limit_s: float
 ) -> None:
-    """The answer says what to check."""
+    """On a silent board each request fails in time, and the answer says what to check."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -36,7 +36,7 @@ def test_on_a_silent_board_every_request_is_answered_in_time(
 
 
 def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> None:
-    """The line to the board is cut: pause and reset both fail in time."""
+    """If the line to the board is cut, a pause and a reset both fail in time."""
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -46,14 +46,14 @@ def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> 
 
 
 def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
-    """The second request is refused at once, with the reason."""
+    """A second request is refused at once, with the reason."""
     bench.session.request(Request.RESET, object(), bench.now)
     with pytest.raises(RequestRefused, match="a reset is under way"):
         bench.session.request(Request.PAUSE, object(), bench.now)
 
 
 def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None:
-    """The port was not lost, and there is nothing to call again."""
+    """A request that is cut short by the shutdown is answered that the driver shuts down."""
     bench.speaks = False
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.shutdown.begin(bench.now)
@@ -64,13 +64,13 @@ def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None
 
 
 def test_requests_without_a_port_are_refused() -> None:
-    """The refusal is immediate, not after a timeout."""
+    """Requests without a port are refused at once, not after a timeout."""
     with pytest.raises(RequestRefused, match="port is not open"):
         Bench().session.request(Request.START, object(), 0.0)
 
 
 def test_a_request_ends_with_the_port(bench: Bench) -> None:
-    """The caller does not wait for an answer that cannot come."""
+    """A request fails when the port is lost, so the caller does not wait in vain."""
     bench.session.request(Request.RESET, token := object(), bench.now)
     bench.close()
     answers = [event for event in bench.events if isinstance(event, RequestDone)]
@@ -78,7 +78,7 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """Stop and R, which had not been written yet, are discarded."""
+    """Stop and R that were not written to a lost port are not written to the next port."""
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.closed(bench.now)
@@ -89,7 +89,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """Needless wake-ups cost CPU time; the session is tested during requests and in silence."""
+    """During requests and in silence, the session never asks to be woken at once."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -111,7 +111,7 @@ def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench)
 
 
 def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Bench) -> None:
-    """The board counts from zero after Stop, R and its opening; odom continues from its pose."""
+    """A reset sends Stop and R; the board counts from zero, and odom continues from its pose."""
     for _ in range(20):
         bench.drive(0.5)
         bench.run(0.1)
@@ -129,7 +129,7 @@ def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Ben
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
-    """The board was found paused, or was paused by request; the answer says so."""
+    """A board that was paused before a reset stays paused, and the answer says so."""
     bench = standing() if asked else paused()
     if asked:
         assert bench.ask(Request.PAUSE, 5.0).success
@@ -143,7 +143,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """The numbers in the board's notices continue, so it has not restarted."""
+    """A paused board whose notices continue their numbers has not restarted."""
     bench = Bench(run=False)
     bench.open()
     bench.run(2.5)
@@ -154,7 +154,7 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
-    """The board ran before the reset, so it runs after it.
+    """The board ran before the failed pause, so a reset starts it again.
 
     The robot stands until a fresh command.
     """
@@ -171,7 +171,7 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """The board has not restarted, so the earlier request to pause still applies."""
+    """After a failed pause and a failed reset, the driver still pauses the board."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     assert not bench.ask(Request.RESET, 10.0).success
@@ -183,7 +183,7 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 
 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
-    """The state is connecting until it is known that the board has not restarted."""
+    """The state is ``connecting`` until it is certain that the board has not restarted."""
     bench.hears = False
     bench.events.clear()
     shown = [bench.session.state]

@@ -39,8 +39,7 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return time and words of each Stop and each mode 1 frame (base velocity) written since
-    ``mark``."""
+    """Return time and words of each Stop and mode 1 frame (base velocity) since ``mark``."""
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -50,7 +49,7 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """When a base command follows wheel commands, Stop is sent first, then the newest base command."""
+    """For a base command after wheel commands, Stop is sent first, then the newest command."""
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)
@@ -128,7 +127,7 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """Each new command continues the ramp of the command before it; a set point is due every 18 ms."""
+    """Each new command continues the ramp before it; a set point is due every 18 ms."""
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)

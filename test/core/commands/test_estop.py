@@ -63,7 +63,7 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """An e-stop latched on a closed port is answered with a warning and sent when the port opens."""
+    """If the port is closed, the answer says so, and the e-stop is sent when the port opens."""
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
@@ -90,7 +90,7 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """If a robot ignores commands for 1 s after a release, one notice advises ~/reset, which helps."""
+    """A robot that ignores commands after a release causes one notice, which advises ~/reset."""
     bench = driving(estop_latches=True)
     estop(bench, True)
     bench.run(1.0)
@@ -119,7 +119,7 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
 
 
 def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
-    """Only the first request to latch the e-stop and the first request to release it are reported."""
+    """Repeated requests to latch the e-stop, or to release it, are not reported again."""
     for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
         bench.session.estop(active, bench.now, by=by)
         bench.settle()
@@ -127,7 +127,7 @@ def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) ->
 
 
 def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
-    """The answer warns if no data has arrived from the board for 2 s, or if the port is not open."""
+    """The answer warns if the board has sent no data for 2 s, or if the port is not open."""
     assert estop(bench, True) == "e-stop latched"
     bench.speaks = False
     bench.run(2.0)

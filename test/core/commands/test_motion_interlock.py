@@ -20,7 +20,7 @@ def test_motion_is_allowed_until_something_trips() -> None:
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """The refusal ends after a timeout without commands; each refused command restarts the timeout."""
+    """A timeout without commands ends the refusal; each refused command restarts the timeout."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -60,8 +60,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A trip counts as a first one if it comes more than a minute after the last trip or after
-    ~/start."""
+    """A trip counts as a first one if the last trip was over a minute ago, or after ~/start."""
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)
@@ -73,7 +72,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """A release of the e-stop ends the refusal after the second trip, but not after the first trip."""
+    """A release of the e-stop ends the refusal after a second trip, but not after a first."""
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

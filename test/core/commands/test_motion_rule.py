@@ -1,7 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The motion rule: only a fresh command moves the robot, and only while data from the board
-arrives."""
+"""The motion rule: only a fresh command moves the robot, and only while the board sends data."""
 
 import contextlib
 from collections.abc import Callable
@@ -59,7 +58,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """The board restarts while its data is lost on the line, so only its counters show the restart."""
+    """The board restarts while its data is lost, so only its counters show the restart."""
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -78,7 +77,7 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """Commands end before the board has booted: an S inside a motion frame would start the board."""
+    """Commands end before the board has booted: an S in a motion frame would start it."""
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -155,7 +154,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(ben
 
 
 def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
-    """A zero command is sent as Stop even to a silent board, because the board may still receive."""
+    """A zero command is sent as Stop even to a silent board, which may still receive."""
     bench.speaks = False
     bench.run(1.45)
     start = len(bench.written)

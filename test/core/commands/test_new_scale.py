@@ -17,8 +17,7 @@ def last(bench: Bench) -> bytes:
 
 
 def going_to(x_m: float) -> Bench:
-    """Return a bench whose robot drives to a goal ``x_m`` ahead, with its switch on position
-    control."""
+    """Return a bench whose robot drives to a goal ``x_m`` ahead, on position control."""
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()
     bench.run_until_state("nominal")
@@ -89,7 +88,7 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """A speed that the new scale rounds to 0 is sent as Stop; zeros in mode 1 have another meaning."""
+    """A speed that the new scale rounds to 0 is sent as Stop, not as zeros in mode 1."""
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)

@@ -108,7 +108,7 @@ def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
 
 
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
-    """With its switch on position, the board would take 0.3 m/s for a goal 21 mm from its origin."""
+    """With its switch on position, the board would take 0.3 m/s for a goal at 21 mm."""
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
         with pytest.raises(CommandRefused, match="`control_method` is 'position'"):
@@ -117,7 +117,7 @@ def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench
 
 
 def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
-    """With its switch on velocity, the board would take a goal at 1 m for a velocity of 14 m/s."""
+    """With its switch on velocity, the board would take a goal at 1 m for 14 m/s."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(1.5)
@@ -136,8 +136,7 @@ def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str,
 
 
 def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
-    """A displacement lost on the line does not change the conversion from odom to the board's
-    frame."""
+    """A displacement lost on the line does not change how a goal in odom is converted."""
     bench.go_to(1.0, 0.0, 0.0)
     bench.run(0.5)
     bench.speaks = False
@@ -172,8 +171,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """After the event the robot rests until a newer goal, which is converted to the board's new
-    frame."""
+    """After the event the robot rests until a newer goal, which uses the board's new frame."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -191,7 +189,7 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """A halt on the way to a goal sends Stop; zeros in mode 1 would send the robot to its origin."""
+    """A halt before a goal sends Stop; zeros in mode 1 would send the robot to its origin."""
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)

@@ -15,7 +15,7 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """On a new connection the e-stop is sent twice, even if it was sent just before the connection."""
+    """On a new connection the e-stop is sent twice, even just after another e-stop."""
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -23,7 +23,7 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """A latched e-stop cancels the Stop and the command that were due after a change of authority."""
+    """The e-stop cancels the Stop and the command that a change of authority had made due."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -33,8 +33,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """Each e-stop is followed by Stop, for firmware that ignores mode 10; the first pair is sent
-    twice."""
+    """Stop follows each e-stop, for firmware without mode 10; the first pair is sent twice."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
@@ -59,7 +58,7 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A node may request e-stops at any rate; only 20 a second are sent, to leave room on the line."""
+    """A node may request e-stops at any rate; 20 a second are sent, to leave room on the line."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001

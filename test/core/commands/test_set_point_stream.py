@@ -52,8 +52,7 @@ def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> 
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """Only the newest command is sent, because each additional frame adds bytes that may be
-    corrupted."""
+    """Only the newest command is sent: each further frame has bytes that may be corrupted."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
@@ -76,7 +75,7 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """Stop is repeated 20 times a second for 1 s if the robot is seen at rest, otherwise for 5 s."""
+    """Stop is repeated at 20 Hz, for 1 s if the robot is seen at rest, otherwise for 5 s."""
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
     stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
@@ -179,7 +178,7 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
     stream: Stream,
 ) -> None:
-    """If Stop has just been sent, a second Stop between two authorities would only cause a delay."""
+    """If Stop has just been sent, a second Stop between two authorities is left out."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)
@@ -198,7 +197,7 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """After a long stall of the process, Stop is sent instead of the command from before the stall."""
+    """After a long stall of the process, Stop is sent instead of the command before it."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(60.0) == STOP

@@ -37,7 +37,7 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 
 
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
-    """A zero twist is sent as Stop; on position control, zeros in mode 1 mean: drive to the origin."""
+    """A zero twist is sent as Stop; on position control, zeros in mode 1 mean the origin."""
     bench.drive(0.3)
     start = len(bench.written)
     bench.drive()
@@ -59,7 +59,7 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """A wheel command without exactly three rates is refused; the refusal states the number given."""
+    """A wheel command without three rates is refused; the refusal states the number given."""
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)

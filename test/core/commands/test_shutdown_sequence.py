@@ -32,7 +32,7 @@ def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """At the shutdown a P is sent but not confirmed; a second P alone would resume the board."""
+    """A P is sent but not confirmed yet; at shutdown a second P would resume the board."""
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
     bench.speaks = False
@@ -47,7 +47,7 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """At the shutdown the last notice says paused, but an S, which starts the board, is on its way."""
+    """The last notice says paused, but an S, which starts the board, is on its way."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -96,7 +96,7 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """A paused board sends no displacements, but its motors are off, so the shutdown does not wait."""
+    """A paused board sends no displacements, but its motors are off, so it counts as at rest."""
     bench = paused()
     left(bench)
     assert not bench.session.shutdown.fall_silent(bench.now)

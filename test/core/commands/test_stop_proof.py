@@ -47,7 +47,7 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """With displacements every 0.4 s, the first one after Stop may contain motion from before it."""
+    """With displacements every 0.4 s, the first one after Stop may have begun before Stop."""
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
     proof.look(rare, 10.3)
@@ -70,8 +70,7 @@ def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopPro
 
 
 def test_without_stop_standing_still_proves_nothing() -> None:
-    """Without a Stop, displacements of zero prove nothing: a command may be on its way to the
-    wheels."""
+    """Without a Stop, rest is not proved, because a command may still be on its way."""
     assert not shown(StopProof(), *[0.0] * 50)
 
 
@@ -113,7 +112,7 @@ def test_a_robot_that_moves_is_not_proved_to_stand(
 
 
 def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) -> None:
-    """A displacement of unknown duration, such as the first one after a pause, does not prove rest."""
+    """A displacement of unknown duration, as after a pause, does not prove rest."""
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
         proof.look(unknown, 10.1 + number * PERIOD_S)
@@ -166,7 +165,7 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
-    """The board misses Stop and drives on; the motion monitor, which would report it too, is off."""
+    """The board misses Stop and drives on, while the motion monitor is off."""
     bench = driving()
     bench.configure(motion_monitor=False)
     bench.hears = False

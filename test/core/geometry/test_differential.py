@@ -40,8 +40,7 @@ def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() ->
 
 
 def test_about_a_wheel_that_stands() -> None:
-    """If the right wheel is at rest and the left at 0.4 m/s, the robot turns at -1 rad/s, at 0.2
-    m/s."""
+    """Right wheel at rest, left at 0.4 m/s: the yaw rate is -1 rad/s, the speed 0.2 m/s."""
     assert triple(ROBOT.body_twist((4.0, 0.0))) == pytest.approx((0.2, 0.0, -1.0))
 
 
@@ -59,8 +58,7 @@ def test_wheels_and_back_is_the_feasible_part(
 def test_body_and_back_is_the_same_wheels(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """Converting wheel rates to a twist and back loses nothing, as both have two degrees of
-    freedom."""
+    """Wheel rates and twist have two degrees of freedom each, so the conversion loses nothing."""
     back = robot.wheel_rates(robot.body_twist(wheel_rates))
     assert back == pytest.approx(wheel_rates, rel=1e-9, abs=1e-7)
 

@@ -37,8 +37,7 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The expected matrix has 1/(2 cos 30°); the manual's expanded matrix is wrong by a factor of
-    4/3."""
+    """The expected matrix has 1/(2 cos 30°); the manual's expanded matrix is wrong by 4/3."""
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
     expected = (
@@ -61,7 +60,7 @@ def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base
 def test_body_and_back_is_the_same_wheels(
     rates: tuple[float, float, float], radius: float, base: float
 ) -> None:
-    """Converting wheel rates to a twist and back loses nothing: both have three degrees of freedom."""
+    """Wheel rates and twist have three degrees of freedom each, so nothing is lost."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     assert kinematics.wheel_rates(kinematics.body_twist(rates)) == close(rates, rel=1e-9, abs_=1e-7)
 
@@ -78,6 +77,6 @@ def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
 
 
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
-    """At 1 rad/s to the left each rim moves at −L; the manual's «rotate all» command turns right."""
+    """At 1 rad/s to the left each rim moves at −L; the manual's «rotate all» turns right."""
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

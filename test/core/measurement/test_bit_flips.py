@@ -53,8 +53,7 @@ class Drive:
         return Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau))
 
     def run(self, seconds: float) -> None:
-        """Drive curves for ``seconds``, and keep the worst odometry error since the bit was
-        changed."""
+        """Drive curves for ``seconds``, and keep the worst error since the bit was changed."""
         for _ in range(round(seconds / TICK_S)):
             t, count = self.bench.now, len(self.bench.odometry)
             if self.bench.session.state == "nominal" and round(t / TICK_S) % 5 == 0:
@@ -102,7 +101,7 @@ def begins(data: bytes, kind: bytes) -> int:
 def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """After a changed bit, odom is off by at most 17 mm and 0.052 rad, and right again after 1.5 s."""
+    """After a changed bit, odom is off by at most 17 mm and 0.052 rad; 1.5 s later it is right."""
     kind, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)
@@ -168,8 +167,7 @@ def test_what_is_refused_is_counted_and_told() -> None:
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("byte", range(4))
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
-    """If a bit of the heading in the first pose is wrong, the next two poses agree and are
-    accepted."""
+    """If the first pose has a wrong heading, the next two poses agree and are accepted."""
     start = BoardPose(3000.0, -2000.0, 700.0)
     drive = Drive.__new__(Drive)
     drive.bench = Bench(BoardSettings(running=True, initial_pose=start))

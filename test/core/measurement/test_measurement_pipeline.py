@@ -56,7 +56,7 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """After a reset, odom is right except for the displacement under way, which is at most 20 mm."""
+    """After a reset, odom is right except for the displacement under way, at most 20 mm."""
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)
@@ -96,8 +96,7 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
-    """The robot rolls out in a pause; the first twist after the pause is unknown, later ones are
-    zero."""
+    """The robot rolls out in a pause; its twist after the pause is unknown once, then zero."""
     bench.drive(0.5)
     bench.run(0.4)
     bench.ask(Request.PAUSE, 5.0)

@@ -130,7 +130,7 @@ def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
 def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
-    """A shock that rings is delivered, because the force does not return to its old value at once."""
+    """The force in a shock that rings does not return at once, so every reading is delivered."""
     readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
     through = gate()
     assert list(chain(*admitted(readings, through))) == readings
@@ -156,7 +156,7 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement above 2 m/s or 8 rad/s is rejected; the next displacement counts it as lost."""
+    """A displacement above 2 m/s or 8 rad/s is rejected; the next one counts it as lost."""
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
     assert came == [[ahead()], [], [ahead(lost=4)], [ahead()]]
@@ -171,7 +171,7 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """A jump from 0.25 to 1.5 m/s and back within 80 ms is rejected; a pose waits for the decision."""
+    """A jump from 0.25 to 1.5 m/s and back in 80 ms is rejected; a pose waits meanwhile."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
@@ -195,8 +195,7 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """The restart and the unknown duration of a rejected displacement pass to the next
-    displacement."""
+    """The next displacement takes over the restart and unknown duration of a rejected one."""
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
     assert came[2:] == [[replace(ahead(), duration_s=None, restarted=True)], [ahead()]]
@@ -256,8 +255,7 @@ def bare(reading: Reading) -> Reading:
 
 
 def test_two_displacements_that_came_with_one_read_are_believed() -> None:
-    """Two displacements from one read are zero seconds apart, which must not cause a division by
-    zero."""
+    """Two displacements from one read are zero seconds apart, which causes no division by zero."""
     through = gate()
     assert through.admit(ahead(), 1.0) == [(ahead(), 1.0)]
     at_once = replace(ahead(), duration_s=0.0)
@@ -290,8 +288,7 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 
 
 def test_an_estimate_that_is_put_right_may_leap() -> None:
-    """With ``corrected``, a jump is accepted, as it may be a correction by the board's own
-    odometry."""
+    """With ``corrected``, a jump may be a correction by the board's odometry; it is accepted."""
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)

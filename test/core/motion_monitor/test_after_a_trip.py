@@ -31,7 +31,7 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """A motion limit is too low, but is corrected before the motion monitor is switched on again."""
+    """A motion limit is too low, but is corrected before the motion monitor is on again."""
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
         bench.configure(motion_monitor=False, motion=limits)
@@ -64,8 +64,7 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """A zero command ends the first refusal; after the second trip within a minute only ~/start
-    does."""
+    """A zero command ends the first refusal; after the second trip only ~/start does."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 3.0) == 0
@@ -95,7 +94,7 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """A stall of the driver loses commands, so the sender's silence is counted from its end."""
+    """The sender's silence is counted from the end of a stall, which loses commands."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     bench.now += 3.0

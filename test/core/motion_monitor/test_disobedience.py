@@ -59,7 +59,7 @@ DISOBEYING = {
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """The robot is stopped within 0.3 s; the log contains the measured velocity and what to check."""
+    """The robot is stopped within 0.3 s; the log has the measured velocity and what to check."""
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -87,8 +87,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """Distance lost in one long displacement is not wind-up, so it does not explain the motion
-    back."""
+    """Distance lost in one long displacement is not wind-up; it does not explain motion back."""
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)
@@ -155,8 +154,7 @@ def test_a_wrong_delta_frame_is_among_what_to_check(heading_mrad: float, what: s
 
 
 def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> None:
-    """If deltas come less often than ``delta_period`` says, the driver computes too large
-    velocities."""
+    """If deltas come less often than ``delta_period``, every velocity is computed too large."""
     bench = Bench(BoardSettings(running=True))
     bench.board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     bench.open()
@@ -177,7 +175,7 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """If leaving the goal did not trip, a node that repeats goals could restart the robot for ever."""
+    """Without this trip, a node that repeats its goal could restart the robot for ever."""
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)

@@ -51,7 +51,7 @@ near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
 def test_what_is_on_the_way_is_inside(
     setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
 ) -> None:
-    """A twist that the shortcut ``on_the_way`` accepts is inside by the full computation as well."""
+    """A twist that the shortcut ``on_the_way`` accepts is inside by the full computation too."""
     one, other = setpoints[0], setpoints[-1]
     x, y, yaw = off
     motion = BodyTwist(
@@ -148,7 +148,7 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """During one long displacement the robot may have turned round; a second one makes both count."""
+    """In one long displacement the robot may have turned round; a second one makes both count."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
     assert wind_up.way_m == 0.0

@@ -113,8 +113,7 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """A robot that is up to 25 % too fast trips nothing; one that is too slow may be called
-    blocked."""
+    """A robot that is 25 % too fast does not trip; one that is too slow is at most "blocked"."""
     drive = Drive()
     drive.command(*commanded)
     x, y, yaw = (scale * value for value in commanded)
@@ -192,7 +191,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """A robot held for 1 s at 0.4 m/s may catch up 0.4 m, because its wheel controllers integrate."""
+    """A robot held for 1 s at 0.4 m/s may catch up 0.4 m: its wheel controllers integrate."""
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
     drive.move((0.4, 0.0, 0.0), 1.0)
@@ -203,7 +202,7 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """A robot pushed at rest may be moved back by wound-up wheel controllers at the next command."""
+    """A robot pushed at rest may move back at the next command: its controllers have wound up."""
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)

@@ -119,7 +119,7 @@ def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_boar
 
 
 def test_what_took_an_unknown_time_has_no_rate() -> None:
-    """A displacement of unknown duration, as after a pause, has no rate, but its distance counts."""
+    """A displacement of unknown duration, as after a pause, has a distance but no rate."""
     odometry = Odometry(OdometrySettings())
     (estimate,) = odometry.displace(DisplacementReading(0.1, 0.0, 0.0, "body", None, 0), 1.0)
     assert estimate.rolling is None

@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
-    """A robot that does not move is reported once; in this case its switch is on position control."""
+    """A robot that does not move is reported once; in this test its switch is on position."""
     bench = started(BoardSettings(running=True, control="position"), control="velocity")
     for _ in range(10):
         drive_on(bench)
@@ -34,8 +34,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     held_s: float, gains: WheelGains
 ) -> None:
-    """A released robot may leap: its wheel controllers have wound up, and Stop would not unwind
-    them."""
+    """A released robot may leap: its controllers have wound up, and Stop would not unwind them."""
     bench = driving(wheel_gains=gains)
     bench.board.grip()
     for _ in range(round(held_s / PERIOD_S)):
@@ -111,7 +110,7 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
 
 
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """For a pushed robot, Stop is sent at once, then ever more rarely; a later command is obeyed."""
+    """For a pushed robot, Stop is sent at once, then ever more rarely; commands still work."""
     bench = standing()
     bench.board.grip(0.3, 0.0, 0.2)
     start = len(bench.written)

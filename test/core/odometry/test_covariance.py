@@ -28,7 +28,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def minors(c: Covariance) -> Triple:
-    """Return the leading principal minors of ``c``; all are positive if ``c`` is positive definite."""
+    """Return the leading principal minors; all are positive if ``c`` is positive definite."""
     first = c.xx
     second = c.xx * c.yy - c.xy**2
     third = (
@@ -54,8 +54,7 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """An error of 1 % in one wheel's size turns the robot by 0.025 rad per metre and shifts it by 5
-    mm."""
+    """An error of 1 % in one wheel's size gives errors of 0.025 rad and 5 mm per metre."""
     noise = OdometryNoise(
         wheel_drift=0.0,
         wheel_scale=0.01,
@@ -120,8 +119,7 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """The yaw error from wheel sizes is ten times larger after 10 m than after 1 m, and 0 on
-    return."""
+    """The yaw error from wheel sizes grows tenfold from 1 m to 10 m, and is zero on return."""
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -173,8 +171,7 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board's pose comes from the same wheels, so it does not reduce the variance of their
-    drift."""
+    """The board's pose comes from the same wheels, so it does not reduce their drift."""
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):

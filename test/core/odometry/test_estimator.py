@@ -75,7 +75,7 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 
 @given(st.lists(small_moves, min_size=1, max_size=40), axis_signs)
 def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
-    """Deltas in the body's axes are published at once, without a pose, and give the true position."""
+    """Deltas in the body's axes are published at once, without a pose, at the true position."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(1.0, signs)
     for move in moves:
         estimates = odometry.displace(trip.move(*xyyaw(move), "body"), 0.0)
@@ -111,7 +111,7 @@ def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
 
 
 def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odometry]:
-    """Drive smooth curves for 12 s and stop, through the protocol; return estimates and odometry."""
+    """Drive curves for 12 s through the protocol, then stop; return estimates and odometry."""
     settings_ = board.settings
     bot = OmniBot(OmniBotSettings(delta_frame=settings_.frame))
     odometry, estimates, random = Odometry(SETTINGS), [], Random(seed)
@@ -160,7 +160,7 @@ def test_the_odometry_is_the_truth_of_the_simulated_robot(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_twist_is_the_velocity_of_the_simulated_robot(frame: str) -> None:
-    """The twist is right for a robot that drives forward, drives left and turns at the same time."""
+    """The robot drives forward, drives left and turns, all at the same time."""
     board = SimulatedBoard(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 1571.0), running=True)
     )

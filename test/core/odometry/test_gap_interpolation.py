@@ -16,8 +16,7 @@ def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> Displa
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four displacements that are missing between 0.5 and 1 m/s are filled in at the mean, 0.75
-    m/s."""
+    """Four displacements missing between 0.5 and 1 m/s are filled in at the mean, 0.75 m/s."""
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)

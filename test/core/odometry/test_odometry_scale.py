@@ -44,8 +44,7 @@ def drive(on: Bench) -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """With the scales, the error after metres of curves is below 5 mm and 3 mrad; without, it is
-    not."""
+    """With the scales, the error after metres of curves is below 5 mm and 3 mrad."""
     on = bench(TRUE, frame=frame, initial_pose=BoardPose(4000.0, -1000.0, 2000.0))
     drive(on)
     truth, pose = on.board.truth, on.odometry[-1].pose

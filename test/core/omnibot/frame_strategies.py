@@ -32,7 +32,7 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 
 
 def believable(frame: Frame) -> bool:
-    """Return whether an undamaged board may send this frame.
+    """Return whether an undamaged board may send ``frame``.
 
     A coordinate of a pose is at most 1e7 (mm or mrad). An IMU frame with -6 among its accelerations
     shows at least 0.5 g.
@@ -93,7 +93,7 @@ byte_orders = st.sampled_from(["big", "little"])
 
 
 def float32(value: float) -> float:
-    """Return the nearest value that four bytes can hold."""
+    """Return the nearest value of a 32-bit float."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", value))
     assert isinstance(rounded, float)
     return rounded

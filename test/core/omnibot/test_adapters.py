@@ -2,8 +2,8 @@
 
 """An IMU frame is returned with the packet that completes it, however the adapter splits the line.
 
-Arrival times show that a last byte like 0xFF does not begin the next frame, because that frame is
-not due yet.
+If the last byte of an IMU frame is like 0xFF, arrival times show that the byte does not begin the
+next frame, which is not due yet.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,10 +19,10 @@ from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICKS = 1200
 SETTLED = 300
-"""Number of readings after which the decoder knows the adapter."""
+"""Number of readings after which the decoder has learned how the adapter sends."""
 IMU_LENGTH = 14
 DRIFT = 1.0002
-"""Rate of the adapter's clock: its packets end at every moment of a tick."""
+"""Relative rate of the adapter's clock; the packets end at every phase of a tick."""
 
 Handed = Iterator[tuple[float, bytes]]
 
@@ -30,7 +30,7 @@ Handed = Iterator[tuple[float, bytes]]
 def ticks() -> Iterator[tuple[float, bytes]]:
     """Yield time in s and bytes of each tick of a robot at rest.
 
-    Its gyro reads -1 more often than any value but 0.
+    The robot's gyro reads -1 more often than any value but 0.
     """
     board = SimulatedBoard(BoardSettings(seed=1, running=True))
     for tick in range(TICKS):
@@ -38,7 +38,7 @@ def ticks() -> Iterator[tuple[float, bytes]]:
 
 
 def pieces() -> Handed:
-    """Yield pieces of 1 to 16 bytes at the pace of the line."""
+    """Yield the bytes in pieces of 1 to 16, at the pace of the line."""
     random = Random(1)
     for at, data in ticks():
         start = 0
@@ -49,7 +49,7 @@ def pieces() -> Handed:
 
 
 def behind_timer(timer_s: float) -> Handed:
-    """Yield the bytes that have arrived each time the adapter's timer runs out."""
+    """Yield all bytes that the adapter holds, each time its timer runs out."""
     held, out = b"", 0.0
     for at, data in ticks():
         for number in range(len(data)):
@@ -69,7 +69,7 @@ def behind_timer(timer_s: float) -> Handed:
 def test_hardly_a_frame_waits_for_the_next_packet(
     adapter: Callable[[], Handed], waits: float
 ) -> None:
-    """Only an uncertain frame waits: a delta may follow it, or the adapter splits it."""
+    """A frame waits only if a delta may follow it or if the adapter splits it."""
     board = OmniBot(OmniBotSettings())
     ends: list[int] = []
     sent = 0
@@ -89,7 +89,7 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
-    """On such a line a frame waits until its last byte is surely not the next header's."""
+    """For ten seconds after a lost byte, the decoder does not treat the line as calm."""
     decoder = FrameDecoder()
     lost_s, calm = 1.0, {}
     for at, data in ticks():

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings of the OmniBot in SI units, the letters that it is sent, and a new connection."""
+"""Readings of the OmniBot in SI units, letters sent to the board, and a new connection."""
 
 import math
 
@@ -41,14 +41,14 @@ def bot(**settings: object) -> OmniBot:
 
 
 def readings(board: OmniBot, *sent: Frame) -> list[Reading]:
-    """Return the board's readings of these frames, after two frames that synchronize it."""
+    """Return the readings of the given frames, after two frames that synchronize the decoder."""
     board.receive(encode(REST) * 2, 0.0)
     found = [reading for frame in sent for reading in board.receive(encode(frame), 0.0)]
     return found + board.flush(0.0)
 
 
 def in_mode(mode: Mode) -> OmniBot:
-    """Return a board that is in this mode according to the data it received."""
+    """Return a board whose received data puts it in ``mode``."""
     board = bot()
     if mode is Mode.PAUSED:
         board.receive(TEXT, 0.0)
@@ -76,7 +76,7 @@ def test_a_delta_is_in_tenths_of_millimetres_and_milliradians_over_40_ms() -> No
 
 
 def test_the_frame_of_the_deltas_is_the_settings() -> None:
-    """The board does not report in which frame its deltas are."""
+    """A setting gives the frame of the deltas, because the board does not report it."""
     (reading,) = readings(bot(delta_frame="body"), moved(0))
     assert isinstance(reading, DisplacementReading)
     assert reading.frame == "body"
@@ -84,7 +84,7 @@ def test_the_frame_of_the_deltas_is_the_settings() -> None:
 
 @pytest.mark.parametrize("order", ["big", "little"])
 def test_a_pose_is_in_millimetres_and_milliradians(order: str) -> None:
-    """A value of 1000 is 1 m or 1 rad; its byte order is a setting."""
+    """A value of 1000 is 1 m or 1 rad; a setting gives the byte order of poses."""
     board = bot(pose_byte_order=order)
     board.receive(encode(REST) * 2, 0.0)
     found = board.receive(encode(PoseFrame(1500.0, -250.0, 3142.0, 0), order), 0.0)  # type: ignore[arg-type]
@@ -101,27 +101,27 @@ def test_imu_counts_are_scaled_by_the_ranges_of_the_settings() -> None:
 
 
 def test_a_text_says_that_the_board_is_paused() -> None:
-    """The number in the text is not part of the reading."""
+    """The number in a paused text is not part of its reading."""
     assert readings(bot(), PausedFrame(3)) == [PausedReading()]
 
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """Bytes between two texts show that the board ran; it may have restarted since."""
+    """Data between two paused texts shows that the board ran, and it may have restarted."""
     texts = readings(bot(), *map(PausedFrame, (255, 0, 2)))
     assert texts == [PausedReading(), PausedReading(continues=True), PausedReading()]
     assert readings(bot(), PausedFrame(0), data, PausedFrame(1))[-1] == PausedReading()
 
 
 def test_readings_come_in_the_order_of_the_line() -> None:
-    """The order matters, because a pose includes the delta before it."""
+    """Readings keep the order of the line, because a pose includes the delta before it."""
     sent = [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0), PausedFrame(0)]
     kinds = [type(reading) for reading in readings(bot(), *sent)]
     assert kinds == [ImuReading, DisplacementReading, PoseReading, PausedReading]
 
 
 def test_readings_are_finite_but_for_poses() -> None:
-    """Readings are scaled integers, but a pose consists of floats, which may have any value."""
+    """IMU and delta readings are scaled integers, so only a pose can contain infinity or NaN."""
     edge = (32767, -32768, -32768)
     found = readings(bot(), ImuFrame(edge, edge), DeltaFrame(*edge, 0))
     assert isinstance(found[0], ImuReading)
@@ -150,9 +150,9 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """SEQ wraps within each read.
+    """SEQ wraps within each read, which holds seconds of data.
 
-    Between the reads three deltas are lost, and all frames near them.
+    Between the two reads three deltas are lost, and all other frames of that time.
     """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
@@ -169,7 +169,7 @@ def test_a_regular_sequence_has_no_losses() -> None:
 
 
 def test_the_first_delta_has_lost_nothing() -> None:
-    """Losses before the connection, or before a pause, are unknown."""
+    """The first delta of a connection, and the first after a pause, reports no losses."""
     board = bot()
     assert lost(board, moved(7)) == [0]
     assert lost(board, PausedFrame(0), moved(100)) == [0]
@@ -186,7 +186,7 @@ def test_the_poses_have_a_counter_of_their_own() -> None:
 
 
 def test_faults_are_counted_over_all_connections() -> None:
-    """A new connection has a new decoder, but the counters describe the same cable."""
+    """A new connection has a new decoder, but the fault counters continue."""
     board = bot()
     board.receive(encode(REST) * 8, 0.0)
     assert (board.figures.faults, board.figures.discarded_bytes) == (0, 0)
@@ -205,13 +205,13 @@ def test_stop_and_emergency_stop_are_the_manuals() -> None:
 
 
 def test_waking_is_eight_zeros_and_stop() -> None:
-    """The zeros end any command that was cut, and are not letters."""
+    """The zeros before Stop complete any command that was cut, and are not letters."""
     assert joined(bot().wake()) == STOP
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
-    """S is harmless, and the mode changes only with received data."""
+    """S is sent in every mode, because it is harmless; only received data changes the mode."""
     board = in_mode(mode)
     assert joined(board.start()) == ZEROS + b"\x53"
     assert board.mode is mode
@@ -219,7 +219,7 @@ def test_start_is_s_in_every_mode(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -> None:
-    """P is a toggle, so it is sent only where the mode is known; a refusal changes nothing."""
+    """P is a toggle, so it is refused unless the board runs; a refusal changes nothing."""
     board = in_mode(mode)
     if mode.running:
         assert joined(board.pause()) == STOP + ZEROS + b"\x50"
@@ -231,7 +231,7 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
 
 @pytest.mark.parametrize("mode", Mode)
 def test_reset_is_stop_and_r(mode: Mode) -> None:
-    """The mode is unknown afterwards."""
+    """After a reset the mode is unknown."""
     board = in_mode(mode)
     assert joined(board.reset()) == STOP + ZEROS + b"\x52"
     assert board.mode is Mode.UNKNOWN
@@ -239,7 +239,7 @@ def test_reset_is_stop_and_r(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
-    """The mode depends on received data only."""
+    """The mode is known only from received data, so silence or a new line makes it unknown."""
     board = in_mode(mode)
     board.silence()
     assert board.mode is Mode.UNKNOWN
@@ -249,7 +249,7 @@ def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
 
 
 def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
-    """Half a frame has no meaning on another line."""
+    """Bytes on a new line do not complete a frame from the old line."""
     board = bot()
     board.receive(encode(REST) * 2 + encode(moved(0))[:5], 0.0)
     board.connect()

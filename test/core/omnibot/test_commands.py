@@ -42,12 +42,12 @@ def encoder(**settings: object) -> CommandEncoder:
 def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
     twist: tuple[float, float, float], typed: str
 ) -> None:
-    """The scales are the vendor's, in mode 1."""
+    """In mode 1, the vendor's scales are 70 LSB per m/s and 500 LSB per rad/s."""
     assert bare(encoder().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
 
 
 def test_the_scales_are_those_of_the_settings() -> None:
-    """The scales are 100 LSB per m/s and 200 per rad/s."""
+    """Commands use the scales of the settings: 100 LSB per m/s and 200 LSB per rad/s."""
     commands = encoder(linear_scale=100.0, angular_scale=200.0)
     typed = bytes.fromhex("FF FE 01 00 64 FF 38 00 C8")
     assert bare(commands.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
@@ -69,7 +69,7 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """In mode 1, with the board's switch on position, zeros would mean: drive to the origin."""
+    """Zeros in mode 1 are never sent: with the switch on position they mean the origin."""
     command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
@@ -103,7 +103,7 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
 
 @given(words, words, words)
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
-    """Integer counts survive scaling, rounding and the wire, except harmful bytes."""
+    """A velocity of whole counts is sent as exactly these counts, unless a byte is harmful."""
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
     command = bare(encoder().velocity(BodyTwist(x / 70, y / 70, omega / 500)))
@@ -132,7 +132,7 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """A 16-bit word ends at 32.77 m or rad, and a limited value would be another place."""
+    """A 16-bit word ends at 32.77 m or rad; a goal beyond it is refused rather than limited."""
     values = [0.0, 0.0, 0.0]
     values[place] = far
     with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
@@ -140,7 +140,7 @@ def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
 
 
 def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
-    """A command exactly at the limit is not counted."""
+    """A command that exceeds the range of the wire is counted; one exactly at the limit is not."""
     commands = encoder(linear_scale=10_000.0)
     commands.velocity(BodyTwist(3.2767, 0.0, 0.0))
     assert commands.saturated == 0
@@ -173,7 +173,7 @@ def test_settings_may_be_replaced_while_it_runs() -> None:
 def test_a_frame_means_the_velocity_that_it_commands(
     typed: str, twist: tuple[float, float, float]
 ) -> None:
-    """The last frame in the bytes decides, and zeros before it have no meaning."""
+    """The last frame in the bytes gives the velocity; the zeros before it have no meaning."""
     found = encoder().meaning(packed(bytes(8) + bytes.fromhex(typed)))
     assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
 
@@ -182,7 +182,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """The error is half a unit, or up to 1.5 units where a byte would be a letter."""
+    """The error is 0.5 LSB by rounding, or up to 1.5 LSB where a byte would be a letter."""
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
     assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)

@@ -28,14 +28,14 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """Five turns of 1 mrad are 5 mrad in all; a rounding error is not a contradiction."""
+    """Five turns of 1 mrad are 5 mrad; a rounding error of the pose is not a contradiction."""
     context = after_a_cycle([10] * 5, [10, 11, 12, 13, 14])
     cost, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, theta_mrad, 2), context)
     assert (cost > 0.0) is contradicts
 
 
 def test_a_pose_after_a_lost_delta_contradicts_nothing() -> None:
-    """The robot's turn during the lost delta is unknown."""
+    """The turn of the lost delta is unknown, so the pose may have any heading."""
     context = after_a_cycle([10] * 5, [10, 11, 13, 14, 15])
     near, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 105.0, 2), context)
     far, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 180.0, 2), context)

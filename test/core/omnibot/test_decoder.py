@@ -75,7 +75,7 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
-    """A spike, or a frame that ends in a header's byte, waits for the next bytes."""
+    """Only a frame that jumps, or that ends in a header's byte, waits for the next bytes."""
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
     for number, tick in enumerate(ticks_of(name)):
@@ -96,7 +96,7 @@ def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
 
 @given(believable_frames.filter(lambda frame: not isinstance(frame, PausedFrame)), st.data())
 def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataObject) -> None:
-    """Odd content may be damage, but two good frames right behind it show that it is not."""
+    """Content that looks like damage is accepted when two good frames follow it."""
     made, content = FrameDecoder(), encode(odd) + LEAD_IN + encode(REST)[:2]
     assert made.feed(LEAD_IN, 0.0) == [REST, REST]
     found = [frame for chunk in data.draw(chunkings(content)) for frame in made.feed(chunk, 0.0)]
@@ -104,7 +104,7 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """An adapter's pause within the last frame, together with its leap, does not discard it."""
+    """A frame with a jump is returned, although an adapter pauses within the frame."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # it learns how calm the sensor is
     shock = [
@@ -118,7 +118,7 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """The line was calm, an adapter pauses within the frame, and then the line falls silent."""
+    """A frame with a knock is returned, although a pause splits it and a silence follows."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
     knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))
@@ -127,7 +127,7 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """The frame waits for one byte, not for one frame."""
+    """A doubtful frame waits for one byte, not for a whole frame."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -199,12 +199,12 @@ def test_a_robot_on_a_slope_is_not_misread_for_ever(
 
 
 def test_one_whole_text_is_enough_to_believe() -> None:
-    """Texts come once a second, so the decoder does not wait for the second one."""
+    """Texts come once a second, so the decoder accepts the first complete text."""
     assert FrameDecoder().feed(b"used: 3 \nPaused: 4 \n", 0.0) == [PausedFrame(4)]
 
 
 def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
-    """The two frames are out of step, and no frame follows them, so both are rejected."""
+    """Two frames at the beginning are rejected if a wrong byte follows instead of a frame."""
     look_alike = encode(DeltaFrame(1, 2, 3, 4)) + encode(DeltaFrame(5, 6, 7, 8))
     assert decoded([look_alike + b"\x00" + LEAD_IN * 2]) == [REST] * 4
 
@@ -222,7 +222,7 @@ def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> N
 
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_has_no_faults(name: str) -> None:
-    """Every byte belongs to a frame."""
+    """Every byte of an undamaged stream belongs to a frame."""
     made = FrameDecoder()
     for number, tick in enumerate(ticks_of(name)):
         made.feed(tick, number * TICK_S)
@@ -235,7 +235,7 @@ def test_an_undamaged_stream_has_no_faults(name: str) -> None:
 @given(st.lists(st.one_of(frames.map(encode), st.binary(max_size=20)), max_size=20))
 @example([LEAD_IN, b"\x00", LEAD_IN])
 def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> None:
-    """No byte is lost silently."""
+    """Every byte belongs to a returned frame or is counted as discarded."""
     made, stream = FrameDecoder(), b"".join(pieces)
     found = made.feed(stream, 0.0) + made.flush(0.0)
     in_frames = sum(len(encode(frame)) for frame in found if not isinstance(frame, PausedFrame))
@@ -245,7 +245,7 @@ def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> 
 
 
 def test_a_pose_is_read_in_the_byte_order_asked_for() -> None:
-    """The manual can be read either way."""
+    """The byte order of poses is a setting, because the manual can be read either way."""
     pose = PoseFrame(1000.0, -2.5, 1.0, 9)
     for order in ("big", "little"):
         made = FrameDecoder(order)

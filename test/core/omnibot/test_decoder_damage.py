@@ -37,7 +37,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 def assert_back_in_step(
     sent: list[tuple[int, Frame]], hurt: set[int], found: list[Frame], place: int
 ) -> None:
-    """Check that only frames near the damage are missing, and that none is false.
+    """Check that only frames near the damage are missing, and that no false frame was found.
 
     ``hurt``: numbers of the frames whose bytes are changed or pushed apart. ``place``: position of
     the damage, for messages.
@@ -66,7 +66,7 @@ def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
-    """Any byte may be lost; the decoder is in step again within two frames."""
+    """Any byte of a frame may be lost; the decoder is in step again within two frames."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     for place, number in damage_places(sent):
@@ -83,7 +83,7 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("extra", [0x00, 0x50, 0x7E, 0xFA, 0xFB, 0xFC, 0xFF])
 def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: int) -> None:
-    """The byte is inserted anywhere; the decoder is in step again within two frames."""
+    """After an inserted byte the decoder is in step again, with at most one false frame."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -100,7 +100,7 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """Without a checksum, a gyro that reads like a header may cause one: once in 30 times."""
+    """A gyro that reads like a header may cause a false frame, in at most 1 of 30 insertions."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -116,7 +116,7 @@ def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
     "extra", [b"\x00", b"P", b"\xfa", b"\xff", b"\xff\xff", b"\xff\xfd", b"Pau"]
 )
 def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes) -> None:
-    """The bytes may belong to that frame; the frame behind them is returned."""
+    """Bytes between two frames may belong to the first one; the second one is returned."""
     other = ImuFrame((100, 90, -16300), (4, 5, 6))
     after = LEAD_IN * 2
     found = decoded([LEAD_IN + encode(other) + extra + after])
@@ -126,7 +126,7 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """The FF that completes the frame is held until the next byte shows the error."""
+    """The FF of the next header completes the frame, which is held until the byte after FF."""
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
     for number in range(8, 24):
@@ -163,7 +163,7 @@ def test_rubbish_between_frames_costs_a_few_frames_only(
 @pytest.mark.parametrize("count", [0, 42, 255])
 @pytest.mark.parametrize("ends", ["text", "data"])
 def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> None:
-    """The board pauses amid data, or starts amid texts, and two reads split the stream anywhere."""
+    """A text before data or before another text is decoded, wherever a read ends."""
     text = encode(PausedFrame(count))
     stream = LEAD_IN + text + (LEAD_IN if ends == "data" else text)
     last = [REST, REST] if ends == "data" else [PausedFrame(count)]
@@ -175,7 +175,7 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A lost digit cannot be detected, so it is left out; a text without its blank is valid."""
+    """Every byte but the digit is left out in turn; only a text without its blank is valid."""
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
     found = decoded([LEAD_IN + hurt + LEAD_IN + LEAD_IN])
@@ -190,7 +190,7 @@ def test_a_damaged_text_does_not_come_out(place: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
-    """The line was interrupted: later bytes must not complete the frame that was begun before."""
+    """Bytes after an interruption of the line do not complete the frame that was cut."""
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
     after = [DeltaFrame(1, 2, 3, 4), REST, PoseFrame(1.0, 2.0, 3.0, 4), DeltaFrame(5, 6, 7, 8)]
@@ -200,7 +200,7 @@ def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: int) -> None:
-    """The rest of the frame never comes, but the text after the boot is decoded at once."""
+    """The rest of the cut frame never comes, and the text after the boot is decoded at once."""
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
     assert made.feed(b"Paused: 0 \n", 0.3) == [PausedFrame(0)]
@@ -209,7 +209,7 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
-    """The reader was late, not the line: the backlog completes the frame that was cut."""
+    """The reader is late, not the line, so the backlog completes the frame that was cut."""
     ticks = ticks_of(name)
     stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
     sent = [frame for _, frame in frames_of(stream)]
@@ -225,7 +225,7 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """The frame is valid, because bytes that contradict it did not come."""
+    """If silence follows a doubtful frame, no bytes contradict the frame, so it is returned."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -234,7 +234,7 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """A complete frame in step is returned, but partial and unproved frames are not."""
+    """``flush`` returns a complete frame in step, but no partial and no unproved frame."""
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()
     in_step.feed(LEAD_IN + encode(doubtful), 0.0)
@@ -249,7 +249,7 @@ def test_flush_tells_what_can_still_be_told() -> None:
 
 
 def test_a_decoder_goes_on_after_a_flush() -> None:
-    """The next complete frames are decoded."""
+    """After ``flush``, complete frames are decoded as before."""
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:5], 0.0)
     made.flush(0.0)

@@ -28,13 +28,15 @@ from omnibot_driver.core.omnibot.frames import LENT, Frame, decode_measured, mea
 
 REST = encode(ImuFrame((120, -80, -16384), (1, 2, 3)))
 THIRD = 300
-"""Number of bytes in a third of a stream: much more than is held, so the second third begins with
-full buffers."""
+"""Number of bytes in a third of a stream; the buffers are full before the second third."""
 times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
 
 
 def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
-    """Check that the stream holds these frames in order; compare texts, as a pose may hold NaN."""
+    """Check that the stream holds the frames in order.
+
+    Frames are compared as text, because a pose may hold NaN.
+    """
     at = 0
     for frame in found:
         while at < len(stream):
@@ -52,7 +54,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
 ) -> None:
-    """Nothing raises, and fewer than ``DOUBT_BYTES`` are held between calls."""
+    """Any bytes raise nothing, and fewer than ``DOUBT_BYTES`` are held between calls."""
     made, now, found = FrameDecoder(), 0.0, []
     for chunk in data.draw(chunkings(stream)):
         now += data.draw(times_s)
@@ -80,9 +82,9 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """The frame's content and count follow the frame before.
+    """A frame whose content and count follow the frame before is returned with its last byte.
 
-    Only a last byte like a header's must wait.
+    Only a frame that ends in a header's byte must wait.
     """
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
@@ -129,7 +131,7 @@ def work(
 ) -> tuple[list[int], int]:
     """Return the work until the end of each chunk, beginning with 0, and the most bytes held.
 
-    The work is the number of looks at a byte and of edges in the trellis.
+    The work is counted in examined bytes and in edges of the trellis.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 
@@ -162,7 +164,7 @@ def work(
 def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, pattern: bytes, chunk_length: int, pause_s: float
 ) -> None:
-    """All buffers are full after the first third, so the last costs no more than the second."""
+    """With full buffers, the last third of a stream costs about as much work as the second."""
     stream = pattern * (THIRD // len(pattern))
     if chunk_length < THIRD:
         sums, most = work(monkeypatch, stream * 3, chunk_length, pause_s)
@@ -183,7 +185,7 @@ def test_work_is_linear_and_memory_bounded(
 def test_no_repeated_pattern_costs_much_more_than_another(
     pattern: bytes, chunk_length: int
 ) -> None:
-    """The number of edges in the trellis is bounded for each byte."""
+    """Any repeated pattern costs a bounded amount of work for each byte."""
     stream = pattern * (1000 // len(pattern))
     with pytest.MonkeyPatch.context() as patch:
         sums, _ = work(patch, stream, chunk_length)

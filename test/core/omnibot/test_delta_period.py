@@ -78,7 +78,7 @@ def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str
 
 @EVERY_PERIOD
 def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s: float) -> None:
-    """Every frame is returned, and the order of frames causes no fault."""
+    """At every delta period each frame is returned, and the order of frames causes no fault."""
     board = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
     ticks = [board.step() for _ in range(600)]
     stream = b"".join(ticks)
@@ -98,7 +98,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 
 
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
-    """At 25 Hz, four IMU frames to a delta and five deltas to a pose are expected instead."""
+    """At 10 Hz a delta follows ten IMU frames and a pose two deltas; at 25 Hz, four and five."""
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
     for schedule, right in ((Schedule(0.1), True), (Schedule(), False)):
@@ -112,7 +112,7 @@ def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_1
 
 @EVERY_PERIOD
 def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
-    """At a lower rate a delta is a longer way."""
+    """A delta of up to 10 m/s times the delta period is possible."""
     expectation = Expectation(16384.0, Schedule(period_s))
     for speed_mps, possible in ((9.9, True), (10.1, False)):
         delta = DeltaFrame(round(speed_mps * period_s * 1e4), 0, 0, 8)
@@ -121,7 +121,7 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """Each may be off by half a digit, 0.05 mrad; twice as much contradicts it."""
+    """Each delta may be off by 0.05 mrad, half a digit; twice as much contradicts the pose."""
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
     before = Context(seq=7, pose=PoseFrame(0.0, 0.0, 0.0, 4), deltas=deltas, turned=0)
@@ -134,7 +134,7 @@ def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: 
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """The rate is 10 Hz, and SEQ wraps in the longest gap."""
+    """Deltas come at 10 Hz, and SEQ wraps in the longest gap."""
     for seed in range(3):
         on = Line(
             BoardSettings(running=True, delta_period_s=TEN_HZ_S, frame=frame, seed=seed), seed=seed
@@ -149,7 +149,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_lost_delta_is_bridged_and_settled() -> None:
-    """The pose after every second delta shows the lost motion."""
+    """At 10 Hz the pose after every second delta shows the motion of the lost deltas."""
     on = Line(BoardSettings(running=True, delta_period_s=TEN_HZ_S))
     on.run(3.0)
     on.loses = lambda data, _now: data[:2] == DELTA
@@ -161,7 +161,7 @@ def test_a_lost_delta_is_bridged_and_settled() -> None:
 
 @EVERY_PERIOD
 def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
-    """SEQ wraps several times in the longest gaps."""
+    """Lost deltas are counted correctly even if SEQ wraps several times in a gap."""
     schedule = Schedule(period_s)
     for lost in (0, 1, 7, 200, 256, 300, 1000):
         sequence = Sequence(schedule)
@@ -173,7 +173,7 @@ def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
 
 @pytest.mark.parametrize("period_s", [period_s for period_s in DELTA_PERIODS_S if period_s >= 0.04])
 def test_a_restart_shows_in_the_count(period_s: float) -> None:
-    """If counting had continued, a count of 1 would not fit a gap of 1.5 s."""
+    """A count of 1 after a gap of 1.5 s does not fit a continued count, so it is a restart."""
     sequence = Sequence(Schedule(period_s))
     for count in range(100):
         sequence.delta(count, count * period_s)
@@ -182,7 +182,7 @@ def test_a_restart_shows_in_the_count(period_s: float) -> None:
 
 @pytest.mark.parametrize("action", [Request.RESET, "pause", "unplugged"])
 def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> None:
-    """The board is reset, paused and started, or connected again."""
+    """Odom continues when a board at 10 Hz is reset, paused and started, or connected again."""
     bench = driving(TEN_HZ_S)
     bench.run(2.0)
     begun = off_by_m(bench)
@@ -203,7 +203,7 @@ def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> N
 
 @EVERY_PERIOD
 def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
-    """Fewer deltas may be lost on the line, so IMU frames alone do not change the mode sooner."""
+    """A few deltas may be lost by chance, so IMU frames alone do not change the mode at once."""
     schedule = Schedule(period_s)
     assert schedule.imus_alone > max(24, 6 * schedule.imus_per_delta)
     assert ModeTracker(schedule).imus_to_come == schedule.imus_alone
@@ -221,7 +221,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
-    """By the order of frames, 23 bytes were the last IMU frame before a delta, and the delta."""
+    """By the order of frames, 23 damaged bytes were one IMU frame and the delta after it."""
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)
     for _ in range(3):

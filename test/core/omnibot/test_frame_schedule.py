@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Frames that were lost, inferred from bytes that were not a frame."""
+"""Lost frames, inferred from bytes that form no frame."""
 
 import pytest
 from hypothesis import given
@@ -32,12 +32,12 @@ def nominal(imus: int) -> FrameSchedule:
 def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     imus: int, skipped: int, lost: int
 ) -> None:
-    """A delta among the damaged bytes is not counted."""
+    """IMU frames among the damaged bytes are counted; a delta among them is not."""
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
 
 def test_a_damaged_pose_is_not_an_imu_frame() -> None:
-    """The damaged pose has 15 bytes, which is close to the 14 bytes of an IMU frame."""
+    """Damage in place of a pose (15 bytes) is not counted as an IMU frame (14 bytes)."""
     rhythm = nominal(0)
     for _ in range(5):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -46,7 +46,7 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """An IMU frame and a delta are missing before the pose."""
+    """An IMU frame lost before a pose, with a delta, is counted at the frame after the pose."""
     rhythm = nominal(0)
     for _ in range(4):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -58,7 +58,7 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """Deltas have come before, but 30 IMU frames in a row show the mode."""
+    """After 30 IMU frames in a row, all damaged bytes are counted as IMU frames."""
     rhythm = nominal(0)
     for _ in range(30):
         rhythm.hear(ImuFrame, 0)

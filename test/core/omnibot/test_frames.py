@@ -119,7 +119,7 @@ def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
 
 @pytest.mark.parametrize("text", [b"Paused: 3\n", b"Paused: 3 \r\n", b"Paused: 3\r\n"])
 def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
-    """The mode must not be missed because a firmware ends its lines differently."""
+    """A text with other white space at its end is accepted, as firmware may differ in this."""
     assert decode(text) == PausedFrame(3)
 
 
@@ -144,7 +144,7 @@ def test_decoding_undoes_encoding_of_commands(command: CommandFrame) -> None:
 
 @given(st.one_of(frames, commands), byte_orders)
 def test_encoding_undoes_decoding(frame: Frame | CommandFrame, order: ByteOrder) -> None:
-    """Every byte of a frame has a meaning, so decoding keeps it."""
+    """Every byte of a frame has a meaning, so decoding and encoding give the same bytes."""
     data = encode(frame, order)
     assert encode(decode(data, order), order) == data
 
@@ -176,7 +176,7 @@ def test_the_simulated_board_understands_every_command(command: CommandFrame) ->
 
 
 def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
-    """Decoding does not judge values."""
+    """A pose with NaN or infinity is decoded, because decoding does not judge values."""
     frame = decode(bytes.fromhex("FF FC 7F C0 00 00 FF 80 00 00 00 00 00 00 01"))
     assert isinstance(frame, PoseFrame)
     assert math.isnan(frame.x)
@@ -185,7 +185,7 @@ def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
 
 @given(pose_frames, st.floats(allow_nan=False, allow_infinity=False))
 def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -> None:
-    """A number beyond the range of a 32-bit float is a mistake of the caller."""
+    """A coordinate is rounded to a 32-bit float, or refused if it is beyond the float's range."""
     wide = PoseFrame(x, pose.y, pose.theta, pose.seq)
     try:
         rounded = float32(x)
@@ -215,7 +215,7 @@ def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -
     ids=str,
 )
 def test_a_value_that_does_not_fit_its_field_is_refused(frame: Frame | CommandFrame) -> None:
-    """Values do not wrap silently; the message names the frame."""
+    """A value too large for its field is refused, and the message names the frame."""
     with pytest.raises(FrameError, match=type(frame).__name__):
         encode(frame)
 
@@ -232,7 +232,7 @@ def test_a_part_of_a_frame_is_not_a_frame(frame: Frame | CommandFrame, length: i
 def test_a_frame_and_something_more_is_not_a_frame(
     frame: Frame | CommandFrame, more: bytes
 ) -> None:
-    """The extra bytes may be in front or behind."""
+    """A frame with extra bytes in front or behind is refused."""
     data = encode(frame)
     with pytest.raises(FrameError, match="not exactly one frame"):
         decode(data + more)
@@ -255,14 +255,14 @@ def test_a_frame_and_something_more_is_not_a_frame(
     ],
 )
 def test_bytes_of_no_frame_are_refused(data: bytes) -> None:
-    """The message contains the bytes."""
+    """The refusal of bytes that form no frame contains the bytes."""
     with pytest.raises(FrameError, match=data.hex(" ") or "no bytes"):
         decode(data)
 
 
 @given(frames, st.binary(max_size=20), st.binary(max_size=20))
 def test_a_frame_is_measured_wherever_it_stands(frame: Frame, before: bytes, after: bytes) -> None:
-    """The result is the length of a complete frame, and INCOMPLETE for any part of it."""
+    """``measure`` returns the length of a complete frame, and INCOMPLETE for its beginning."""
     data = encode(frame)
     assert measure(before + data + after, len(before)) == len(data)
     for length in range(1, len(data)):
@@ -271,7 +271,7 @@ def test_a_frame_is_measured_wherever_it_stands(frame: Frame, before: bytes, aft
 
 @given(st.binary(min_size=1, max_size=20))
 def test_what_no_frame_begins_with_is_never_waited_for(data: bytes) -> None:
-    """Only the first bytes of a header or of the text may become a frame."""
+    """Bytes that begin neither a header nor the paused text are NO_FRAME at once."""
     headers = (b"\xff\xfa", b"\xff\xfb", b"\xff\xfc")
     may_become = data.startswith((*headers, b"P")) or data == b"\xff"
     assert may_become or measure(data, 0) == NO_FRAME

@@ -17,12 +17,14 @@ from omnibot_driver.core.omnibot.frames import Frame
 Reads = Iterator[tuple[bytes, float]]
 
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
-"""Durations of a stop in s. A line is idle for 8.8 ms between two ticks; lost frames make that
-longer by multiples of 10 ms."""
+"""Durations for which a reader stops, in s.
+
+A line is idle for 8.8 ms between two ticks, and longer by multiples of 10 ms if frames are lost.
+"""
 
 
 def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
-    """Return all bytes, and the arrival time of each in s."""
+    """Return all bytes, and the arrival time of each byte in s."""
     times = [
         number * TICK_S + (place + 1) * BYTE_S
         for number, tick in enumerate(ticks)
@@ -34,10 +36,10 @@ def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
 def stopped(
     ticks: Sequence[bytes], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
 ) -> Reads:
-    """Yield the reads of a reader that takes pieces as they come, and stops once for ``stop_s``.
+    """Yield reads of ``piece`` bytes by a reader that stops once for ``stop_s``.
 
-    It stops after ``place`` bytes. Then it reads all that has arrived, at most ``most`` bytes at
-    once, one read every 20 µs.
+    The reader stops after ``place`` bytes. After the stop, one read of at most ``most`` bytes every
+    20 µs takes the bytes that have arrived.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -80,7 +82,7 @@ def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: floa
 @pytest.mark.parametrize("most", [1, 8, 32])
 @pytest.mark.parametrize("piece", [1, 4])
 def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: int) -> None:
-    """Bytes that have not been read yet are not lost."""
+    """A reader that catches up a few bytes at a time after a stop loses no bytes."""
     ticks = ticks_of("driving")[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))
@@ -98,7 +100,7 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:
-    """A real shock and a late read together are not damage."""
+    """A reader that is always late still gets every frame, even during a shock."""
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
     for seq, (accel, gyro, delta) in enumerate(content):
@@ -125,7 +127,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """The last frame before it is returned too, since a paused board is not due to send another."""
+    """A reader that was stopped still gets the text, and the last frame before the text."""
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"
     made = FrameDecoder()
@@ -140,7 +142,7 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter that collects 8 bytes holds the end of one text until the next begins."""
+    """An adapter that collects 8 bytes holds the end of one text until the next text begins."""
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
     for number in range(0, len(texts), 8):
@@ -149,9 +151,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The front of one frame and the back of a later one are not a frame.
+    """The front of one frame and the back of a later frame do not form a frame.
 
-    At rest only the pause between them shows it, and a prompt reader measured that pause.
+    At rest only the pause between the two parts shows this, and a prompt reader measured that
+    pause.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
@@ -168,7 +171,7 @@ def test_where_the_line_was_cut_a_pause_still_tells() -> None:
 
 
 def test_a_line_that_was_out_for_long_is_read_anew() -> None:
-    """Bytes after the interruption do not complete the frame that was begun before it."""
+    """After an interruption of 0.5 s, new bytes do not complete the frame that was cut."""
     made = FrameDecoder()
     found = made.feed(LEAD_IN + encode(REST)[:5], 0.0)
     other = ImuFrame((100, -70, -16300), (2, 3, 4))
@@ -199,7 +202,7 @@ LATE_ENDS = {
 
 @pytest.mark.parametrize("name", LATE_ENDS)
 def test_a_late_end_belongs_to_its_frame_where(name: str) -> None:
-    """The reads are like those of a busy computer, directly or through an adapter."""
+    """A delta whose end is read late is decoded; the reads are like those of a busy computer."""
     made, ticks = FrameDecoder(), ticks_of("driving")[:96]
     found, now = [], 0.0
     for number, tick in enumerate(ticks):

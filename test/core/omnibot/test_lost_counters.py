@@ -30,7 +30,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """The drive has curves and wraps of SEQ; the pose is relative to where the driver connected."""
+    """A second after a gap odom is right, even in curves and if SEQ has wrapped."""
     for seed in range(5):
         on = line(seed, frame=frame)
         lose(on, lost * PERIOD_S)
@@ -39,7 +39,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_short_gap_is_bridged_at_once() -> None:
-    """The motion on both sides fills the gap: 0.12 s of loss leave less than 2 mm of error."""
+    """The motion on both sides fills a gap: 0.12 s of loss leave less than 2 mm of error."""
     for seed in range(5):
         on = line(seed)
         lose(on, 0.12)
@@ -76,7 +76,7 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """The limits are 2 m/s and 8 rad/s; the first step may use the time of the gap."""
+    """Steps of odom stay below 2 m/s and 8 rad/s; the first step may use the time of the gap."""
     for seed in range(5):
         on = line(seed, frame=frame)
         before = on.estimates[-1]
@@ -89,7 +89,7 @@ def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str
 
 
 def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_faster() -> None:
-    """The robot reversed in the gap: the interpolation is 0.5 m off and corrected at 2 m/s."""
+    """The robot reverses in a gap; the interpolation is 0.5 m off and is corrected at 2 m/s."""
     odometry, x, stamp_s = attached(), 0.0, 0.0
     estimates: list[OdometryEstimate] = []
 
@@ -115,7 +115,7 @@ def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_fa
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """Displacements wait at most 0.2 s for the board's pose, so a guess is never published."""
+    """After a long gap displacements wait up to 0.2 s for a pose, so no guess is published."""
     for seed in range(5):
         on = line(seed)
         lose(on, lost * PERIOD_S)
@@ -131,7 +131,7 @@ def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -
 
 
 def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
-    """The pose is lost too: after about 0.25 s the interpolation is used instead."""
+    """If the pose after a long gap is lost too, the interpolation is used after about 0.25 s."""
     on = line(1)
     lose(on, 2.0)
     on.loses = lambda data, _now: data[:2] == POSE
@@ -143,7 +143,7 @@ def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
 
 
 def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> None:
-    """A correction of the pose is not motion."""
+    """A correction of the pose after a gap does not appear in the twist."""
     on = line(3)
     lose(on, 1.0)
     twists = [estimate.twist for estimate in on.run(1.0)]
@@ -153,7 +153,7 @@ def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> N
 
 @pytest.mark.parametrize("lost", [2, 5, 10])
 def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: int) -> None:
-    """Settling removes the variance of the gap, while the drift's variance stays."""
+    """Settling a gap removes the variance of the gap, but not the variance of the drift."""
     whole, torn = line(2), line(2)
     whole.run(lost * PERIOD_S)
     lose(torn, lost * PERIOD_S)
@@ -167,7 +167,7 @@ def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: in
 
 
 def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
-    """The board's pose is received, but does not move the estimate."""
+    """With ``use_board_pose`` off, the board's pose does not correct the error of a gap."""
     on = line(1, OdometrySettings(use_board_pose=False))
     lose(on, 0.4)
     (first,) = on.run(PERIOD_S)
@@ -181,7 +181,7 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 @pytest.mark.parametrize("use_board_pose", [True, False])
 @pytest.mark.parametrize("phase", range(5))
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
-    """The pose reveals the loss before the next displacement does; it must not be counted twice."""
+    """A pose reveals lost deltas before the next delta does; their motion is filled in once."""
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)
     lose(on, 2 * PERIOD_S, DELTA)
@@ -191,7 +191,7 @@ def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose:
 
 
 def test_a_board_that_sends_no_pose_is_bridged() -> None:
-    """At constant speed in a constant curve the interpolation is exact."""
+    """Without poses, the interpolation is exact at constant speed in a constant curve."""
     odometry = Odometry(OdometrySettings())
     for number in range(60):
         if number < 30 or number >= 40:
@@ -214,7 +214,7 @@ def moved(lost: int = 0) -> DisplacementReading:
     "bad", [(math.nan, 0.0, 0.0), (1e9, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 1.0)]
 )
 def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None:
-    """The pose is not finite, out of reach, or a jump that the next pose does not confirm."""
+    """A pose that is not finite, out of reach or not confirmed by the next does not move odom."""
     odometry = attached()
     still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
     for pose in (bad, (0.0, 0.0, 0.0), bad, (0.0, 0.0, 0.0)):
@@ -225,7 +225,7 @@ def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None
 
 
 def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
-    """A displacement damaged on the line causes such a jump; it is spread over five steps."""
+    """When two poses agree that a displacement was wrong, odom is corrected in five steps."""
     odometry = attached()
     still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
     odometry.displace(DisplacementReading(0.05, 0.0, 0.0, "earth", PERIOD_S, 0), 0.0)
@@ -240,7 +240,7 @@ def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
 
 
 losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
-"""Numbers of frames that arrive, and then of frames that are lost, deltas and poses alike."""
+"""Pairs: the number of frames that arrive, then of frames that are lost, deltas and poses alike."""
 
 
 @pytest.mark.slow
@@ -249,7 +249,7 @@ losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
     pattern: list[tuple[int, int]], seed: int, frame: str
 ) -> None:
-    """No step until then exceeds 2 m/s."""
+    """After one good second odom is the board's pose; no step before that exceeds 2 m/s."""
     on = line(seed, frame=frame)
     fate = iter([lost for come, gone in pattern for lost in [False] * come + [True] * gone])
     on.loses = lambda _data, _now: next(fate, False)
@@ -279,7 +279,7 @@ def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
 def test_any_readings_give_finite_estimates_and_never_a_certain_one(
     readings: list[DisplacementReading | PoseReading], use_board_pose: bool
 ) -> None:
-    """Nothing raises, and x, y and yaw keep a variance of at least 1e-6."""
+    """For any readings nothing raises, and x, y and yaw keep a variance of at least 1e-6."""
     odometry = Odometry(OdometrySettings(use_board_pose=use_board_pose))
     for number, reading in enumerate(readings):
         if isinstance(reading, PoseReading):

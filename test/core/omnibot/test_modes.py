@@ -24,7 +24,7 @@ HEARD = [happening for happening in Happening if happening.name.startswith("HEAR
 
 
 def tracker(mode: Mode) -> ModeTracker:
-    """Return a tracker that is in this mode after received frames."""
+    """Return a tracker that received frames have put in ``mode``."""
     made = ModeTracker()
     heard = {Mode.UNKNOWN: [], Mode.PAUSED: [PAUSED], Mode.NOMINAL: [DELTA]}
     for frame in heard.get(mode, [IMU] * 25):
@@ -34,7 +34,7 @@ def tracker(mode: Mode) -> ModeTracker:
 
 
 def test_the_public_names_are_those_of_the_interface() -> None:
-    """The names are the values of ~/state."""
+    """The names of the modes are the values of ~/state."""
     assert {mode.value for mode in Mode} == {"connecting", "paused", "nominal", "imu_only"}
     assert {mode for mode in Mode if mode.running} == {Mode.NOMINAL, Mode.IMU_ONLY}
 
@@ -46,14 +46,14 @@ def test_nothing_is_believed_before_anything_is_heard() -> None:
 
 @pytest.mark.parametrize(("happening", "mode"), list(product(HEARD, Mode)))
 def test_the_table_is_total_over_what_is_heard(happening: Happening, mode: Mode) -> None:
-    """Data can arrive in any mode, and never raises."""
+    """Any data may arrive in any mode, so the table has an entry for each case."""
     made = tracker(mode)
     made.apply(happening)
     assert made.mode is TRANSITIONS[happening][mode]
 
 
 def test_only_p_is_ever_refused() -> None:
-    """S is harmless, and R is always allowed."""
+    """Only P has modes in which it is refused; S is harmless, and R is always allowed."""
     missing = {
         happening
         for happening, mode in product(Happening, Mode)
@@ -69,7 +69,7 @@ def test_only_p_is_ever_refused() -> None:
     ids=["text", "delta", "pose"],
 )
 def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard: Mode) -> None:
-    """The earlier mode does not matter."""
+    """One text, delta or pose sets the mode, whatever the mode before."""
     made = tracker(mode)
     made.hear(frame)
     assert made.mode is heard
@@ -77,7 +77,7 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """The mode does not change sooner, as five missing deltas may be chance, but six may not."""
+    """24 IMU frames alone may be five deltas lost by chance; 25 mean IMU-only mode."""
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
         made.hear(DELTA)
@@ -90,7 +90,7 @@ def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
 
 
 def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
-    """Even if five deltas in a row are lost, only 24 IMU frames come in between."""
+    """Even if five deltas in a row are lost, only 24 IMU frames arrive without a delta."""
     made = ModeTracker()
     for tick in range(1, 400):
         made.hear(IMU)
@@ -101,14 +101,14 @@ def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_r_makes_the_mode_unknown(mode: Mode) -> None:
-    """The mode stays unknown until data arrives after the reboot."""
+    """After R the mode is unknown until data arrives."""
     made = tracker(mode)
     made.apply(Happening.SENT_RESET)
     assert made.mode is Mode.UNKNOWN
 
 
 def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
-    """A reboot sets the count to zero."""
+    """R sets the count of IMU frames without a delta to zero."""
     made = tracker(Mode.NOMINAL)
     for _ in range(24):
         made.hear(IMU)
@@ -141,7 +141,7 @@ def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
 def test_an_illegal_request_raises_and_changes_nothing(
     happenings: list[Happening | Frame],
 ) -> None:
-    """A tracker that refused a request continues exactly like one that did not get it."""
+    """A tracker that refused a request continues exactly like one that never got it."""
     asked, spared = ModeTracker(), ModeTracker()
     for happening in happenings:
         if not isinstance(happening, Happening):

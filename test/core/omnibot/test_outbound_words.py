@@ -28,13 +28,13 @@ def payload(a: int, b: int, c: int) -> bytes:
 
 
 def words_of(counts: list[float]) -> tuple[int, ...]:
-    """Return the words for these counts, scaled down to fit the wire."""
+    """Return the words for ``counts``, scaled down to fit 16 bits."""
     return nearest(*slow(counts, MAX_WORD))
 
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """A parser that missed the frame's own header finds nothing to act on."""
+    """If a parser misses a frame's header, no byte of the payload acts as a letter or header."""
     assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
 
 
@@ -49,7 +49,7 @@ def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
 def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
     counts: tuple[float, float, float],
 ) -> None:
-    """Beyond 20,479 the high byte may be a letter; the nearest harmless value is further away."""
+    """Up to 20,479 a harmful word is changed by one LSB; beyond, its high byte may be a letter."""
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5
 
@@ -75,7 +75,7 @@ def test_words_that_would_act_take_the_nearest_value_that_does_not(
 
 
 def test_everything_goes_out_behind_zeros() -> None:
-    """The zeros complete a frame that was cut, and wake a board that has booted."""
+    """The zeros before each frame complete a frame that was cut, and wake a booted board."""
     board = OmniBot(OmniBotSettings())
     zeros = "00 00 00 00 00 00 00 00 "
     stop = zeros + "ff fe 02 00 00 00 00 00 00"
@@ -90,7 +90,7 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """The nearest harmless goal may be 0.26 m away, which is not what was requested."""
+    """The nearest harmless goal may be 0.26 m away from the requested goal."""
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset; choose"):
         encoder.drive_to(Pose(x_mm / 1000, 0.0, 0.0))
@@ -98,7 +98,7 @@ def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
 
 
 def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
-    """83 mm are 53 hex, the letter S."""
+    """A goal at 83 mm (53 hex, the letter S) is sent as a goal at 84 mm."""
     encoder = CommandEncoder(OmniBotSettings())
     assert bare(encoder.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")
 
@@ -107,7 +107,7 @@ def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
 @example([0.5, -0.5, 1.5])
 @example([0.49999999999999994, 2.5, -2.4999])
 def test_words_are_the_nearest_integers(counts: list[float]) -> None:
-    """Values are not truncated towards zero."""
+    """Words are rounded to the nearest integer, not truncated towards zero."""
     for word, count in zip(words_of(counts), counts, strict=True):
         assert isinstance(word, int)
         assert abs(word - count) <= 0.5
@@ -115,13 +115,13 @@ def test_words_are_the_nearest_integers(counts: list[float]) -> None:
 
 @given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
 def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
-    """With other rounding, a robot would drift."""
+    """If positive and negative values were rounded differently, a robot would drift."""
     mirrored = words_of([-count for count in counts])
     assert mirrored == tuple(-word for word in words_of(counts))
 
 
 def test_halves_are_rounded_away_from_zero() -> None:
-    """Halves above even numbers are included: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
+    """Halves are rounded away from zero, also above even numbers: 10.5 LSB are sent as 11."""
     assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
 
 

@@ -123,7 +123,7 @@ def examples(text: str) -> list[Example]:
 
 
 def section(title: str) -> str:
-    """Return the document's text under one heading of the second level."""
+    """Return the part of the document under the second-level heading that contains ``title``."""
     return next(part for part in DOCUMENT.split("\n## ") if title in part.partition("\n")[0])
 
 
@@ -132,7 +132,7 @@ EXAMPLES = examples(DOCUMENT)
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda e: f"{e.word} {e.data.hex()}")
 def test_each_example_means_what_the_document_says(example: Example) -> None:
-    """The bytes decode to the stated numbers, and these encode to the bytes."""
+    """The bytes of an example decode to its numbers, and the numbers encode to the bytes."""
     if example.word in SENT_AS_IT_IS:
         assert example.data == SENT_AS_IT_IS[example.word]
     else:
@@ -151,7 +151,7 @@ def test_no_line_of_bytes_escapes_the_check() -> None:
 
 
 def test_every_kind_of_frame_and_letter_has_an_example() -> None:
-    """The test fails for a document that loses its examples."""
+    """The document has an example of every kind of frame and of every letter."""
     assert {example.word for example in EXAMPLES} == FRAMES.keys() | SENT_AS_IT_IS.keys()
 
 
@@ -162,7 +162,7 @@ def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
 
 
 def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None:
-    """The remark gives the commanded motion, and the bytes are the driver's."""
+    """The driver encodes the motion in an example's remark as the bytes of the example."""
     wishes = [
         (example, [float(part.split()[0]) for part in example.remark.split(",")])
         for example in EXAMPLES
@@ -176,7 +176,7 @@ def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None
 
 
 def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() -> None:
-    """The bytes of the two true frames contain the false ones, which are not decoded."""
+    """The bytes of two true frames contain false frames, which the decoder does not return."""
     in_section = examples(section("Why framing is hard"))
     false = [example for example in in_section if example.remark.startswith("false")]
     true = [example for example in in_section if example not in false]

@@ -12,7 +12,7 @@ counts = st.integers(0, 255)
 
 
 def begun(count: int) -> Sequence:
-    """Return a sequence whose only delta had this count, at 100 s, and without a pose since."""
+    """Return a sequence that has seen one delta, with this count, at 100 s."""
     sequence = Sequence()
     sequence.delta(count, 100.0)
     return sequence
@@ -22,20 +22,20 @@ def begun(count: int) -> Sequence:
 def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
     count: int, lost: int, late_s: float
 ) -> None:
-    """Arrival times may be wrong by up to 0.4 s."""
+    """A gap is counted correctly even if an arrival time is wrong by up to 0.4 s."""
     step = begun(count).delta((count + 1 + lost) % 256, 100.0 + 0.04 * (lost + 1) + late_s)
     assert step == Step(lost)
 
 
 @given(counts, st.floats(0.0, 5.0))
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
-    """A host that hangs for up to five seconds does not lose a delta by that."""
+    """If a host hangs for up to five seconds, the next delta does not count as a gap."""
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The duration of the pause is unknown; a count of 0 after 255 may also be a restart."""
+    """A delta after a pause has an unknown duration; 0 after 255 may also be a restart."""
     sequence = begun(count)
     sequence.pause()
     step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
@@ -44,7 +44,7 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """The first deltas may be lost, but a count that also continues the old one is ambiguous."""
+    """A count means a restart if it implies no more lost deltas than a continued count does."""
     sequence = begun(count)
     sequence.pause()
     goes_on = (lost - count - 1) % 256
@@ -54,8 +54,7 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """If the count of 0 ended a gap, the gap would last (255 - count) x 40 ms, which is not two
-    seconds."""
+    """A count of 0 after two seconds does not fit a continued count, so it is a restart."""
     assert begun(count).delta(0, 102.0).restarted
 
 
@@ -65,7 +64,7 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
 def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
     elapsed_s: float, drift: float, imus: int
 ) -> None:
-    """The TTL side is unplugged, and the board's clock is 1 % slow or fast."""
+    """While the TTL side is unplugged, the board's clock runs 1 % slow or fast."""
     sequence = begun(100)
     passed = round(elapsed_s / 0.04 * (1 + drift))
     step = sequence.delta((100 + passed) % 256, 100.0 + elapsed_s, imus=imus)
@@ -76,7 +75,7 @@ def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
 
 
 def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
-    """120 s with a clock that is 1 % fast: the gap differs from the time by 1.2 s."""
+    """In 120 s a board whose clock is 1 % fast sends 30 more deltas than the time suggests."""
     sequence = Sequence()
     sequence.delta(100, 0.0)
     assert sequence.delta((100 + 3030) % 256, 120.0) == Step(3029)
@@ -84,7 +83,7 @@ def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
 
 @pytest.mark.parametrize("wraps", [0, 1, 3])
 def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
-    """The false count is near zero, and the next true delta comes after a gap."""
+    """A false count near zero looks like a restart; the next true delta refutes this."""
     sequence = begun(88)
     passed = 1 + 256 * wraps
     assert sequence.delta(1, 100.02 + 10.24 * wraps, imus=1).restarted
@@ -118,7 +117,7 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """Two seconds after 205 a continued SEQ is near 0 too, but the count of poses is not."""
+    """Two seconds after 205, a count of 0 may be a continued SEQ; the pose counter decides."""
     sequence = Sequence()
     for count in range(206):
         sequence.delta(count, count * 0.04)
@@ -132,7 +131,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
-    """Here a pose comes with every second delta."""
+    """With a pose after every second delta, a pose says nothing about lost deltas."""
     sequence = Sequence()
     for count in range(20):
         assert sequence.delta(count, count * 0.04) == Step(0)
@@ -141,7 +140,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """A gap of this size would be longer than the time since the last delta."""
+    """A pose counter that starts again is not a gap, which could not fit into the elapsed time."""
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -151,14 +150,14 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """The other board's count fits neither a restart nor a gap."""
+    """After a reconnect, a count that fits neither a restart nor a gap means another board."""
     sequence = begun(7)
     sequence.reconnect()
     assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)
 
 
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
-    """The first delta is false and came too early; the true one has the same count."""
+    """A false delta comes too early; the true one has the same count, which is not a wrap."""
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)
     assert sequence.delta(10, 100.04, imus=2) == Step(0)
@@ -167,7 +166,7 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """The host's clock stood still while the line did not."""
+    """If the host's clock stood still, the count is ahead of time; the next count confirms it."""
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
     assert sequence.delta(111, 100.08, imus=4) == Step(100)
@@ -175,7 +174,7 @@ def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it
 
 
 def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
-    """The false count is near zero, but the next true delta continues the old count."""
+    """A false count is near zero, but the next true delta continues the old count."""
     sequence = begun(88)
     assert sequence.delta(1, 100.02, imus=1).restarted
     assert sequence.delta(89, 100.04, imus=2) == Step(0)
@@ -183,7 +182,7 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """Frames that were held as uncertain come out late, and the next delta soon after them."""
+    """Frames held as uncertain come out late, so the next delta may follow at once."""
     sequence = Sequence()
     for count in range(11):
         sequence.delta(count, count * 0.04, imus=4)
@@ -197,7 +196,7 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """Four IMU frames arrived since, too few for the deltas that a continued count would lack."""
+    """Four IMU frames are too few for the deltas that a continued count would lack."""
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted

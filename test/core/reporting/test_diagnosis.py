@@ -88,7 +88,7 @@ class Robot:
 
 
 def test_a_healthy_robot_is_all_ok() -> None:
-    """The figures shown are rates, skew, delay and gravity."""
+    """For a healthy robot all statuses are OK and show rates, skew, delay and gravity."""
     robot = Robot()
     assert not robot.troubles
     stream, time = robot.statuses["Stream"].values, robot.statuses["Time"].values
@@ -131,7 +131,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
 def test_each_fault_alone_raises_its_own_status(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """All other statuses stay OK; the message says what to do."""
+    """Each fault changes only its own status, and the message says what to do."""
     robot = Robot()
     fault(robot)
     robot.seconds(5)
@@ -140,7 +140,7 @@ def test_each_fault_alone_raises_its_own_status(
 
 
 def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
-    """The link's status names the missing line."""
+    """If a line of a board is missing, the status says so, and not that the board is silent."""
     robot = Robot()
     robot.connect(trouble="the line 'front' is missing: unplugged")
     robot.set(state="connecting")
@@ -151,7 +151,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """An example is the rate of its own odometry."""
+    """Values that only some boards have, such as their own odometry's rate, are shown as well."""
     robot = Robot()
     assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
     robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
@@ -167,7 +167,7 @@ HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
 def test_what_happened_is_told_for_a_while_and_then_forgotten(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """The count remains visible."""
+    """Some time after an event its status is OK again."""
     robot = Robot()
     fault(robot)
     robot.seconds(round(RECENT_S) - 1)
@@ -177,7 +177,7 @@ def test_what_happened_is_told_for_a_while_and_then_forgotten(
 
 
 def test_a_count_that_begins_anew_has_not_grown() -> None:
-    """The port was opened again: the overruns of the last connection are not reported again."""
+    """After the port is reopened, the overruns of the last connection are not reported again."""
     robot = Robot()
     robot.connect(overruns=5)
     robot.seconds(round(RECENT_S) + 3)
@@ -187,7 +187,7 @@ def test_a_count_that_begins_anew_has_not_grown() -> None:
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """Late reads lose nothing; they are named as the cause if rates are wrong."""
+    """Late reads lose nothing, but they are named as the cause if rates are wrong."""
     robot = Robot()
     for second in range(12):
         robot.connect(waited_s=0.3 * second)
@@ -203,7 +203,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 
 
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
-    """A busy computer may show such a skew for up to a minute after the start."""
+    """A large skew is reported after 70 s, because a busy computer may show one for a minute."""
     robot = Robot()
     robot.set(skew_ppm=-119.0)
     robot.seconds(70)
@@ -237,7 +237,7 @@ def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     ],
 )
 def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str, Level]) -> None:
-    """What is unknown is stale; in IMU-only mode displacements are not expected."""
+    """A status without data is stale; in IMU-only mode displacements are not expected."""
     robot = Robot()
     robot.set(state=state)
     if state == "imu_only":
@@ -247,7 +247,7 @@ def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str,
 
 
 def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
-    """Rates are counted within one state only."""
+    """Rates are counted within one state, so a board that has just started is not too slow."""
     robot = Robot()
     robot.set(state="paused")
     robot.per_second.update(imu=0, displacements=0, poses=0)
@@ -261,7 +261,7 @@ def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
 
 
 def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
-    """The status stays OK and shows that commands are limited."""
+    """The status names the source and age of the command; limited commands leave it OK."""
     robot = Robot()
     robot.command(source="cmd_vel", age_s=0.05)
     robot.seconds(1)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The line fitted through ticks, with artificial bounds in s."""
+"""The line fitted through ticks, tested with artificial bounds."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ NEVER_BELOW = -1.0
 def followed(
     skew: float, above: Callable[[int], float], below: Callable[[int], float], *, ticks: int = 2000
 ) -> tuple[ClockFit, float]:
-    """Fit a line with bounds this far above and below the truth; return it and its last error."""
+    """Fit a line between bounds above and below the truth; return the line and its last error."""
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
     for tick in range(ticks):
@@ -27,20 +27,20 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """The slope is right as well."""
+    """Without bounds from below, the line follows the least delay and has the right slope."""
     line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
     assert late_s == pytest.approx(0.0, abs=1e-6)
     assert line.slope_s == pytest.approx(PERIOD_S * (1.0 + skew), rel=1e-6)
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """The bounds are 0.8 ms above and 0.1 ms below; late reads may explain 0.1 ms."""
+    """With bounds 0.8 ms above and 0.1 ms below the truth, the line is about 0.3 ms above."""
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """The bounds of the timer drift from the true time by 0.1 ms per second for 8 s."""
+    """Bounds that drift by 0.1 ms per second for 8 s bend the line by less than 0.5 ms."""
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
         start = 0.0 if drift[-1] > 0.0 else 0.87e-3
@@ -54,7 +54,7 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """One read in twenty is late; data missing in such a read may have come long before it."""
+    """One read in twenty is late; the bound from a late read does not lift the line."""
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
             0.0,
@@ -66,7 +66,7 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """For some seconds every read is late, each by too little to be noticed."""
+    """Lower bounds from seconds of slightly late reads are given up; upper bounds always hold."""
     _, late_s = followed(
         0.0,
         lambda tick: 0.9e-3 if tick in late else 0.0,

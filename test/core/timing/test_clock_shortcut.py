@@ -52,7 +52,7 @@ def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:
 @pytest.mark.parametrize("loss", [0.0, 0.01])
 @pytest.mark.parametrize("chunker", [ftdi(latency_s=0.001), bursts, singles, crumbs])
 def test_lines_are_stamped_alike(chunker: Chunker, loss: float) -> None:
-    """The stamps are equal with and without losses."""
+    """With and without the shortcut the stamps are equal, also if frames are lost."""
     reads = heard(Board(seconds=12, skew=1e-4, loss=loss), chunker, 1)
     assert stamped(reads, quick=True) == stamped(reads, quick=False)
 
@@ -76,7 +76,7 @@ surprises = st.tuples(
     edges,
     st.sampled_from([0, 1, 14]),
 )
-"""Readings, ticks since the last, their lateness in s; and the number of normal reads after."""
+"""Readings, ticks since the last ones, lateness in s, sample boundary, number of later reads."""
 
 
 @pytest.mark.slow
@@ -85,8 +85,7 @@ surprises = st.tuples(
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """The surprises follow a normal start, which enables the shortcut; all reads after them are
-    late."""
+    """Surprises follow a normal start, which enables the shortcut; all later reads are late."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:
@@ -102,7 +101,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If calm lines took the slow way, the tests above would compare the slow way with itself."""
+    """Calm lines use the shortcut; otherwise the other tests would compare nothing."""
     compared = 0
     compare = DeviceClock._compare
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The delay of measurements: only measurements contribute to it."""
+"""The delay of measurements, to which only measurements contribute."""
 
 import pytest
 from session_bench import TICK_S, Bench
@@ -9,7 +9,7 @@ from omnibot_driver.core.requests import Request
 
 
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
-    """A notice has no sampling time, and before the first measurement a delay is unknown."""
+    """Notices have no sampling time, so notices before the first measurement add no delay."""
     bench = Bench()
     bench.open()
     bench.run_until_state("paused")
@@ -21,7 +21,7 @@ def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
 
 
 def test_a_pause_is_not_a_delay() -> None:
-    """The time since the last measurement is not a delay."""
+    """The time since the last measurement before a pause is not a delay."""
     bench = Bench()
     bench.open()
     bench.run_until_state("nominal")

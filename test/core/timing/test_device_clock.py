@@ -29,7 +29,7 @@ COUNTS = 16384 / STANDARD_GRAVITY
 
 @dataclass(slots=True)
 class Stamped:
-    """Stamps of one stream: (tick, stamp, arrival), times in s, of samples and displacements."""
+    """Stamps of a stream's samples and displacements, as (tick, stamp in s, arrival in s)."""
 
     board: Board
     samples: list[tuple[int, float, float]] = field(default_factory=list)
@@ -44,7 +44,7 @@ class Stamped:
         ]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Return the standard deviation of the stamps' differences from 10 ms, in s."""
+        """Return the RMS deviation of the stamps' differences from 10 ms, in s."""
         return math.sqrt(
             fmean(
                 (after[1] - before[1] - 0.01) ** 2
@@ -55,7 +55,7 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Return half the width of the narrowest interval that contains this part of the errors."""
+    """Return half the width of the narrowest interval that contains ``part`` of the errors."""
     ordered = sorted(errors)
     count = math.ceil(part * len(ordered))
     ends = zip(ordered, ordered[count - 1 :], strict=False)
@@ -63,7 +63,7 @@ def spread(errors: list[float], part: float = 0.99) -> float:
 
 
 def stamp(clock: DeviceClock, board: Board, reads: Iterable[Read]) -> Stamped:
-    """Decode and stamp the reads; assert what must hold for every stamp."""
+    """Decode and stamp the reads; assert that stamps increase and are not in the future."""
     stamped = Stamped(board)
     omnibot = OmniBot(OmniBotSettings())
     last_s = -math.inf
@@ -106,7 +106,7 @@ def run(
 def test_stamps_are_even_and_true_to_a_constant(
     chunker: Chunker, skew: float, imu_only: bool
 ) -> None:
-    """From 2 s on the standard deviation is below 0.2 ms, and 99 % are within 0.5 ms."""
+    """From 2 s on the unevenness is below 0.2 ms, and 99 % of the errors are within ±0.5 ms."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
         assert stamped.unevenness() < 0.2e-3
@@ -119,7 +119,7 @@ def test_stamps_are_even_and_true_to_a_constant(
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     skew: float, imu_only: bool
 ) -> None:
-    """With a free timer of 16 ms, delays of 0.8 ms and of none look equal for seconds."""
+    """With a free timer of 16 ms, a delay of 0.8 ms looks like no delay for seconds."""
     stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -128,7 +128,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [bursts, singles], ids=["bursts", "bytes"])
 def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Chunker) -> None:
-    """Both the error and the evenness are compared."""
+    """On an ideal line, neither error nor evenness is worse than that of arrival times."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=1e-4), chunker, seed)
         arrivals = Stamped(stamped.board, [(tick, at, at) for tick, _, at in stamped.samples])
@@ -137,7 +137,7 @@ def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Ch
 
 
 def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> None:
-    """A block has 240 ticks; the clock's line is fitted after some blocks."""
+    """The ticks in blocks of 240 are stamped evenly, from 20 s after the start."""
     for seed in SEEDS:
         stamped = run(Board(seconds=120, skew=1e-4, imu_only=True), blocks, seed)
         assert stamped.unevenness(since_s=20.0) < 0.2e-3
@@ -173,7 +173,7 @@ def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) 
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, singles])
 def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
-    """One frame in 100 is lost; the counter of displacements shows how many."""
+    """One frame in 100 is lost; the counter of displacements shows how many are missing."""
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01), chunker, seed)
         errors = stamped.errors()
@@ -182,14 +182,14 @@ def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
 
 
 def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
-    """This line delivers at once, so 10 ms of silence is one missing tick."""
+    """On a line that delivers at once, 10 ms of silence is one missing tick."""
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01, imu_only=True), bursts, seed)
         assert spread(stamped.errors()) < 0.5e-3
 
 
 def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
-    """A network may deliver held packets one by one within a fraction of their usual time."""
+    """Packets that a network held back and delivers in quick succession get the right stamps."""
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4)
         rng = random.Random(seed)
@@ -204,7 +204,7 @@ def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
 
 @pytest.mark.parametrize("skew", [*SKEWS, 0.0])
 def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
-    """The skew is positive if the board's crystal is faster, so that its ticks are shorter."""
+    """The skew is positive if the board's crystal is fast, which makes its ticks shorter."""
     clock = DeviceClock(0.01)
     for tick in range(1000):
         clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew))
@@ -213,7 +213,7 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """Phase and SEQ are new; the stamps increase and keep the same constant offset."""
+    """After a restart, phase and SEQ are new; stamps increase and keep their constant offset."""
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
     before = run(Board(seconds=10, skew=skew), adapter, 1, clock=clock)
@@ -226,7 +226,7 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
-    """Five seconds are silent, which SEQ does not show; the clock's line is fitted again."""
+    """After five silent seconds, which SEQ does not show, the clock's line is fitted again."""
     clock = DeviceClock(0.01)
     run(Board(seconds=10), bursts, 1, clock=clock)
     after = run(Board(seconds=10, begins_at=1015.0055), bursts, 2, clock=clock)
@@ -235,7 +235,7 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
 
 
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
-    """The adapter may cut the stream between the two frames."""
+    """A displacement has its sample's stamp, even if an adapter cuts the stream between both."""
     for chunker in (ftdi(restarted_by_data=True), bursts, singles):
         stamped = run(Board(seconds=10), chunker, 0)
         stamp_of = {tick: stamp_s for tick, stamp_s, _ in stamped.samples}
@@ -244,7 +244,7 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """The false restart is two ticks after a true displacement, and two before the next."""
+    """A false restart between two true displacements does not move the stamps."""
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)
@@ -276,7 +276,7 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Counters and frame boundaries may claim anything."""
+    """Whatever counters and frame boundaries claim, no stamp decreases or exceeds its arrival."""
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
     for passed_s, readings, edge in reads:
@@ -288,7 +288,7 @@ def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
 
 
 def test_displacements_alone_are_stamped_forwards() -> None:
-    """All samples may be lost, or a board may have none."""
+    """Displacements alone are stamped 40 ms apart, as on a board without samples."""
     clock = DeviceClock(0.01)
     reading = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     stamps_s = [clock.stamps([reading], 1000.0 + 0.04 * k)[0] for k in range(500)]
@@ -297,7 +297,7 @@ def test_displacements_alone_are_stamped_forwards() -> None:
 
 
 def test_stamps_increase_even_where_arrival_times_do_not() -> None:
-    """A coarse clock shows the same time for all; the stamps differ by a microsecond each."""
+    """If a coarse clock gives all reads the same time, stamps differ by a microsecond each."""
     clock = DeviceClock(0.01)
     stamps_s = [clock.stamps([SAMPLE], 5.0)[0] for _ in range(100)]
     assert all(before < after for before, after in pairwise(stamps_s))

@@ -18,7 +18,10 @@ HELD = 4095
 
 
 def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:
-    """Hold back all data for some ticks, in both directions, so the robot drives on."""
+    """Return a bench after a stall of ``ticks`` ticks, in which an adapter held back all data.
+
+    The robot drives on during the stall.
+    """
     bench = Bench(BoardSettings(frame=frame))
     bench.open()
     bench.run_until_state("nominal")
@@ -50,7 +53,7 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 @example(ticks=592, frame="earth", vx=0.0)
 @example(ticks=291, frame="body", vx=0.4)
 def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
-    """Any loss is allowed, also one that the stamps do not show; the pose is right soon after."""
+    """Whatever a stall loses, no step of odom is too large, and odom is right 2 s later."""
     bench = through_a_stall(ticks, frame, vx, 0.5)
     fastest_mps = OdometrySettings().fastest_mps
     for before, after in pairwise(bench.odometry):
