@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A driver's topics recorded into a rosbag2, as `ros2 bag record` would, and read back."""
+"""Record the topics of a driver to a bag, as ``ros2 bag record`` does, and read a bag."""
 
 import importlib
 from functools import partial
@@ -35,7 +35,7 @@ def message_class(name: str) -> type:
 
 
 def as_recorded(qos: QoSProfile) -> Qos:
-    """Convert a quality of service of rclpy to that of a bag."""
+    """Convert a quality of service from the type of rclpy to the type that bags use."""
     return Qos(
         QosHistory[qos.history.name],
         qos.depth,
@@ -50,7 +50,7 @@ def as_recorded(qos: QoSProfile) -> Qos:
 
 
 def as_played(qos: Qos) -> QoSProfile:
-    """Convert a quality of service of a bag to that of a publisher or a subscription."""
+    """Convert the quality of service stored in a bag to one for a publisher or a subscription."""
     return QoSProfile(
         depth=DEPTH,
         reliability=ReliabilityPolicy[qos.reliability.name],
@@ -63,9 +63,9 @@ def _time(duration: Duration) -> QosTime:
 
 
 class Recorder:
-    """Records every topic of a driver, without knowing any of them.
+    """Records all topics that a driver publishes, found at run time.
 
-    ``messages``, ``types`` and ``offered`` (quality of service) are by topic.
+    The keys of ``messages``, ``types`` and ``offered`` (qualities of service) are topics.
     """
 
     def __init__(self, probe: Probe) -> None:
@@ -75,7 +75,7 @@ class Recorder:
         self._probe = probe
 
     def record(self, *expected: str) -> None:
-        """Subscribe to all topics of the driver, once the expected ones are there."""
+        """Wait for the topics ``expected``, then subscribe to all topics of the driver."""
         namespace = self._probe.node.get_namespace()
 
         def publishes() -> bool:
@@ -123,7 +123,7 @@ def _append(heard: list[Message], data: bytes, info: dict[str, int]) -> None:
 
 
 def read(path: Path) -> tuple[dict[str, list[Message]], dict[str, Qos]]:
-    """Read a bag: messages by topic, and their offered quality of service."""
+    """Return the messages of a bag by topic, and the quality of service offered on each topic."""
     with Reader(path) as bag:
         offered = {item.topic: item.ext.offered_qos_profiles[0] for item in bag.connections}
         messages: dict[str, list[Message]] = {topic: [] for topic in offered}
@@ -133,7 +133,7 @@ def read(path: Path) -> tuple[dict[str, list[Message]], dict[str, Qos]]:
 
 
 def equal(ours: Any, theirs: Any) -> bool:
-    """Return whether a message of rclpy and one of rosbags are equal, field by field."""
+    """Return whether all fields of a message from rclpy and of one from rosbags are equal."""
     if hasattr(ours, "get_fields_and_field_types"):
         names = ours.get_fields_and_field_types()
         return all(equal(getattr(ours, name), getattr(theirs, name)) for name in names)

@@ -28,7 +28,7 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture
 def stack() -> Iterator[ExitStack]:
-    """A stack of contexts that ends with the test, in reverse order."""
+    """A stack of context managers; the end of the test closes them in reverse order."""
     with ExitStack() as stack:
         yield stack
 
@@ -53,9 +53,10 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 
 @pytest.fixture
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
-    """Start a probe that publishes its newest message again after a stall of the driver.
+    """Return a function that starts a probe of a driver.
 
-    On a busy computer a driver may stall, and then asks for the command again.
+    On a busy computer a driver may stall and refuse a command. The probe then publishes its newest
+    message again, as the refusal asks.
     """
 
     def start(driver: Driver) -> Probe:
@@ -85,7 +86,7 @@ def probe(driver: Driver, probe_of: Callable[[Driver], Probe]) -> Probe:
 
 @pytest.fixture
 def silent_terminal() -> Iterator[tuple[int, str]]:
-    """A pseudo-terminal without a program behind it: descriptor of its far end, and its name."""
+    """Yield a pseudo-terminal on which nothing answers: descriptor of its far end, and its name."""
     far, near = os.openpty()
     tty.setraw(near)
     yield far, os.ttyname(near)
@@ -100,7 +101,7 @@ def silent_port(silent_terminal: tuple[int, str]) -> str:
 
 @pytest.fixture
 def write_to_silent_port(silent_terminal: tuple[int, str]) -> Callable[[bytes], None]:
-    """Return a function that writes all bytes, however slowly they are read."""
+    """Return a function that writes all bytes to the port, even if the driver reads slowly."""
 
     def write(data: bytes) -> None:
         while data:

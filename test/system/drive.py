@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A drive over a bad line, end to end: the published messages against the frames of the board.
+"""A drive over a bad serial line: compares the published messages with the board's frames.
 
-``python test/system/drive.py SECONDS --lose 0.001`` runs the driver as a process of its own on a
+``python test/system/drive.py SECONDS --lose 0.001`` runs the driver as a separate process on a
 simulated board, drives curves over ``cmd_vel``, and prints how many messages are wrong and how far
 ``odom`` is off. Every message must match a frame of the board: an Imu by its six values, an
-Odometry by the length and turn of its displacement; and its pose must be the pose of the board.
+Odometry by the length and the turn of its displacement. The pose in an Odometry is compared with
+that of the board.
 """
 
 import argparse
@@ -25,9 +26,9 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""Deltas that a timestamp may be off by, before and after a loss is detected."""
+"""Longest search, in deltas, to either side of the delta that a message's timestamp suggests."""
 LONGEST_STALL = 1000
-"""IMU frames that time may jump by when the computer, and the board with it, stalled."""
+"""Longest search, in IMU frames; after a stall of the computer, time may jump this far."""
 
 Triple = tuple[float, float, float]
 
@@ -36,8 +37,8 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    imu_sent, odom_sent: frames since the first one that was received. worst_m, worst_rad, last_m,
-    last_rad: errors of ``odom`` against the pose of the board.
+    imu_sent, odom_sent: number of frames sent, from the first received one on. worst_m, worst_rad,
+    last_m, last_rad: largest and last errors of ``odom`` against the pose of the board.
     """
 
     seconds: float
@@ -67,10 +68,7 @@ class Outcome:
 
 
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
-    """Drive for ``seconds``, stand still for two seconds, and compare.
-
-    Needs an initialised rclpy.
-    """
+    """Drive for ``seconds``, rest for 2 s, and compare the messages with the board's frames."""
     from driver_process import Driver
     from geometry_msgs.msg import Twist
     from nav_msgs.msg import Odometry
@@ -166,10 +164,10 @@ def compare(
 def trace(
     sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float]
 ) -> list[int | None]:
-    """Return the index of the sent IMU frame of each message, or None if it matches none.
+    """Return for each message the index of the IMU frame with its values, or None if there is none.
 
-    Of the frames after the previous match, it is the equal one that is nearest in time; noise makes
-    each frame different from all others.
+    Only frames after the previous match are searched, the nearest in time first. Noise makes each
+    frame different from all others.
     """
     found: list[int | None] = []
     at, at_s = -1, stamps_s[0]
@@ -184,19 +182,19 @@ def trace(
 
 
 def since(found: Sequence[int | None]) -> int:
-    """Return the index of the first frame that was received; before, the listener was not ready."""
+    """Return the index of the first received frame; the listener was not ready for earlier ones."""
     return next(number for number in found if number is not None)
 
 
 def outwards(middle: int, reach: int) -> Iterator[int]:
-    """Yield ``middle`` and the numbers around it, the nearest first."""
+    """Yield ``middle``, then the numbers up to ``reach`` away from it, the nearest first."""
     yield middle
     for distance in range(1, reach + 1):
         yield from (middle + distance, middle - distance)
 
 
 def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[float]) -> int:
-    """Return the index of the IMU frame at ``stamp_s``, from the nearest match."""
+    """Estimate the index of the IMU frame at ``stamp_s`` from a matched message nearby."""
     place = min(bisect_left(stamps_s, stamp_s), len(stamps_s) - 1)
     while (number := found[place]) is None:
         place -= 1
@@ -206,10 +204,10 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """Return the deltas, the pose of the board after each, and the IMU frame before each.
+    """Return all deltas, the board's pose after each delta, and the last IMU frame before each.
 
-    A delta is three integers. A pose is exact to the rounding of four deltas. An IMU frame is given
-    by its index.
+    A delta is three integers. The rounding of at most four deltas limits the accuracy of a pose. An
+    IMU frame is given by its index.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []
@@ -239,7 +237,7 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Return length in 0.1 mm and turn in 0.1 mrad of the displacement behind the twist."""
+    """Return the displacement behind a message's twist: length in 0.1 mm, turn in 0.1 mrad."""
     twist = message.twist.twist
     turn = twist.angular.z * PERIOD_S
     shrink = math.sin(turn / 2) / (turn / 2) if turn else 1.0
@@ -253,7 +251,7 @@ def _stamp(message: Any) -> float:
 
 
 def main() -> int:
-    """Print the outcome; return 1 if a message was wrong."""
+    """Print the outcome of a drive; return 1 if a message was wrong, else 0."""
     parser = argparse.ArgumentParser(description="A drive over a bad line, end to end.")
     parser.add_argument("seconds", type=float)
     for fault in ("lose", "burst", "flip"):

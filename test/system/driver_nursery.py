@@ -2,9 +2,10 @@
 
 """Driver processes that are forked from a process that has already imported the driver.
 
-A driver spends most of its start on imports, and the tests start hundreds. The nursery imports
-once; each driver is a child of it with output, environment, arguments and an exit code of its own,
-and runs the same ``main``. Tests of the start itself run a new interpreter instead.
+A driver spends most of its start on imports, and the tests start hundreds of drivers. A process
+called the nursery imports the driver once, and forks a child for each driver. The child has its own
+output, environment, arguments and exit code, and runs the usual ``main``. Tests of the start itself
+run a new interpreter instead.
 """
 
 import atexit
@@ -24,11 +25,11 @@ from pathlib import Path
 from typing import NoReturn
 
 LARGEST_REQUEST = 1 << 17
-"""Most bytes of a request: arguments and environment."""
+"""Largest size in bytes of a request, which has the arguments and environment of a driver."""
 
 
 class Forked:
-    """A driver process of the nursery, with the part of ``subprocess.Popen`` that the tests use."""
+    """A driver process that the nursery forked, with the methods of ``Popen`` that tests use."""
 
     def __init__(self, pid: int, output: int, status: int) -> None:
         self.pid = pid
@@ -54,7 +55,7 @@ class Forked:
         return None
 
     def send_signal(self, number: int) -> None:
-        """Send a signal, unless the driver has ended."""
+        """Send a signal to the driver, unless it has ended."""
         if self.poll() is None:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, number)
@@ -64,7 +65,7 @@ class Forked:
 
 
 class Nursery:
-    """The process that forks drivers, from the first driver until the tests end."""
+    """The process that forks drivers; it runs from the first driver until the tests end."""
 
     def __init__(self) -> None:
         self._control: socket.socket | None = None
@@ -104,7 +105,7 @@ def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
 
 
 def serve(descriptor: int) -> None:
-    """Fork a driver for each request, and write its exit code when it has ended."""
+    """Fork a driver for each request on the socket; write the exit code of each ended driver."""
     import omnibot_driver.node  # noqa: F401, which takes most of the time
     from omnibot_driver import boards
 
@@ -144,7 +145,7 @@ def serve(descriptor: int) -> None:
 
 
 def reap(statuses: dict[int, int]) -> None:
-    """Write the exit codes of all drivers that have ended."""
+    """Write the exit code of each ended driver to its descriptor in ``statuses``."""
     while statuses:
         pid, status = os.waitpid(-1, os.WNOHANG)
         if pid == 0:
@@ -158,8 +159,8 @@ def reap(statuses: dict[int, int]) -> None:
 def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoReturn:
     """Run the driver in this forked process.
 
-    It ends without the exit handlers of the libraries, because that of LTTng would stop a thread
-    that does not exist after a fork.
+    The process ends without calling the exit handlers of libraries, because the handler of LTTng
+    would stop a thread that does not exist after a fork.
     """
     from omnibot_driver import driver
 

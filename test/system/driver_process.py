@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver as a process of its own, with its output and its exit code."""
+"""The driver as a separate process, with its output and its exit code."""
 
 import contextlib
 import itertools
@@ -17,22 +17,23 @@ from typing import Any, Self
 from driver_nursery import Nursery
 
 PATIENCE_S = 120.0
-"""How long an event is awaited before a test gives up, in s. Tests do not assert durations."""
+"""Longest wait for an event, in s, after which a test fails. Tests do not assert durations."""
 
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     # Under nohup, children would inherit that SIGHUP is ignored; a handler is not inherited.
     signal.signal(signal.SIGHUP, lambda *_: None)
 
 _namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
-"""Namespaces that also differ from those of another test run in the same ROS domain."""
+"""Namespaces that no other driver uses, even one of another test run in the same ROS domain."""
 _nursery = Nursery()
 
 
 class Driver:
-    """The driver as a process of its own, in a namespace of its own.
+    """The driver as a separate process in a namespace.
 
-    before: Python code that a new interpreter runs first; without it, the process comes from the
-    nursery. namespace: that of another driver. more: further ROS arguments.
+    before: Python code that a new interpreter runs before the driver; without such code, the
+    nursery forks the process. namespace: namespace of the driver, by default an unused one. more:
+    further ROS arguments.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class Driver:
             self.process = _nursery.start(arguments, environment)
         self.lines: list[str] = []
         self.answers: dict[str, Callable[[], None]] = {}
-        """Functions to call at each line of output that contains the text, by text."""
+        """Functions by text; each is called for every line of output that contains its text."""
         self._said = threading.Condition()
         self._listener = threading.Thread(target=self._listen)
         self._listener.start()
@@ -88,7 +89,10 @@ class Driver:
         return "".join(self.lines)
 
     def wait_for_line(self, pattern: str, since: int = 0) -> str:
-        """Return the first line of the output, from ``since`` on, that matches the pattern."""
+        """Wait for a line of output that matches the pattern; return it.
+
+        The search begins at the line with the index ``since``.
+        """
 
         def find() -> str | None:
             return next((line for line in self.lines[since:] if re.search(pattern, line)), None)
@@ -101,14 +105,17 @@ class Driver:
         return line
 
     def end(self, *signals: signal.Signals) -> int:
-        """Send the signals in order; return the exit code when ``lines`` has all output."""
+        """Send the signals in order, wait until the driver has ended, and return its exit code.
+
+        ``lines`` then has all output of the driver.
+        """
         for number in signals:
             self.process.send_signal(number)
         self._listener.join(PATIENCE_S)
         return self.process.wait(PATIENCE_S)
 
     def guards(self) -> list[int]:
-        """Return the process ids of its children that guard its port."""
+        """Return the process ids of the driver's guards, which are its child processes."""
         found = []
         for directory in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):

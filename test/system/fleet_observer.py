@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A super client of a discovery server, which ends when it has found all drivers of a fleet.
+"""Program that, as super client of a discovery server, waits for all drivers of a fleet.
 
-``python fleet_observer.py COUNT PREFIX``. It is a process of its own, because Fast DDS finds
-nothing without a server in a process that has been a client of one.
+Run ``python fleet_observer.py COUNT PREFIX``. The program is a separate process, because with Fast
+DDS a process that has been a client of a server finds nothing without a server afterwards.
 """
 
 import sys
@@ -14,7 +14,7 @@ from omnibot_driver.tools.drivers import running_drivers
 
 
 def main(count: int, prefix: str) -> None:
-    """Spin until each driver of the fleet is discovered."""
+    """Wait until exactly the ``count`` drivers of the fleet are discovered."""
     wanted = {f"/{prefix}{number}/omnibot_driver" for number in range(count)}
     rclpy.init()
     node = rclpy.create_node("observer")

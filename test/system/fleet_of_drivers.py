@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Several drivers, each in a process of its own, that share one import.
+"""Program that runs several drivers, each in a separate process, after a single import.
 
 ``python fleet_of_drivers.py NUMBER PREFIX`` runs the drivers ``/PREFIX0``, ``/PREFIX1`` and so on
-until its input is closed, and prints their process ids. Their port does not exist, which saves
-computing time and is enough for discovery. Each has its own DDS participant, as on several robots.
+until its standard input is closed, and prints their process ids. The port of the drivers does not
+exist, which saves computing time and is enough for discovery. Each driver has its own DDS
+participant, as on several robots.
 """
 
 import os
@@ -18,7 +19,7 @@ from omnibot_driver.node import OmniBotDriver
 
 
 def drive(name: str) -> None:
-    """Run one driver until this process is killed."""
+    """Run the driver in the namespace ``name`` until this process is killed."""
     arguments = ["-r", f"__ns:=/{name}", "-p", "port:=/dev/no_such_port", "-p", "guard:=false"]
     rclpy.init(args=["--ros-args", *arguments])
     executor = SingleThreadedExecutor()
@@ -27,7 +28,7 @@ def drive(name: str) -> None:
 
 
 def main() -> None:
-    """Fork the drivers, print their process ids, and kill them when the input ends."""
+    """Fork the drivers, print their process ids, and kill them when the standard input ends."""
     children = []
     for index in range(int(sys.argv[1])):
         if not (child := os.fork()):

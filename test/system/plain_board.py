@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Profile of a board with few features: without IMU and pause, two wheels, ``cmd_vel`` only.
+"""Profile of a board with few features: two wheels and ``cmd_vel``, but no IMU and no pause.
 
-It uses the protocol of an OmniBot whose IMU is ignored, so the simulated OmniBot can play it. It
-has a topic and a service of its own.
+The board uses the protocol of the OmniBot and ignores the IMU, so the simulated OmniBot can replace
+it. The profile has a topic and a service of its own.
 """
 
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ PARAMETERS: Final = table(
 
 
 class PlainBoard(OmniBot):
-    """A board without an IMU."""
+    """A board with the protocol of the OmniBot, without its IMU readings."""
 
     traits = TRAITS
 
@@ -59,7 +59,7 @@ class PlainBoard(OmniBot):
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """A reading that only this board has."""
+    """A reading that only the plain board has."""
 
     times: int
 

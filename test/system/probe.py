@@ -68,7 +68,7 @@ class Probe:
     def listen_raw(
         self, kind: type, topic: str, qos: QoSProfile, append: Callable[[bytes, Any], None]
     ) -> None:
-        """Subscribe to the serialised messages of a topic, with the message info of each."""
+        """Subscribe to a topic; pass each serialised message and its message info to ``append``."""
 
         def take(data: bytes, info: Any) -> None:
             with self._changed:
@@ -79,18 +79,18 @@ class Probe:
         self._executor.wake()
 
     def wait_for(self, predicate: Callable[[], object]) -> None:
-        """Wait until the predicate holds; it is evaluated whenever a message arrives."""
+        """Wait until the predicate holds; the probe checks it whenever a message arrives."""
         assert self.comes_about(predicate), "it did not come about"
 
     def comes_about(self, predicate: Callable[[], object]) -> bool:
-        """Return whether the predicate comes to hold within ``PATIENCE_S``."""
+        """Wait for the predicate; return whether it holds within ``PATIENCE_S``."""
         with self._changed:
             return bool(self._changed.wait_for(predicate, PATIENCE_S))
 
     def wait_for_later_stamp(self, messages: list[Any]) -> None:
-        """Wait until the last message has a timestamp at least 1 s from now.
+        """Wait until the newest message has a timestamp more than 1 s after the call.
 
-        Older messages may still be on their way.
+        Messages from before the call may still be on their way.
         """
         then_ns = self.node.get_clock().now().nanoseconds + 10**9
         self.wait_for(
@@ -117,9 +117,9 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the probe's newest message again, when a stall is surely over.
+        """Publish the probe's newest message again, after the end of a stall of the driver.
 
-        By then the driver also logs another refusal, so that a second stall is noticed, too.
+        After the delay the driver logs a refusal again, so the probe notices a second stall.
         """
 
         def publish() -> None:
@@ -130,7 +130,7 @@ class Probe:
 
     @contextmanager
     def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:
-        """Publish this velocity, in m/s and rad/s, at 10 Hz on ``cmd_vel`` in the context."""
+        """Publish a velocity, in m/s and rad/s, on ``cmd_vel`` at 10 Hz while the context lasts."""
         publisher = self.publisher(Twist, "cmd_vel")
         twist = Twist()
         twist.linear.x, twist.angular.z = vx, yaw_rate
@@ -141,7 +141,7 @@ class Probe:
             self.remove(timer)
 
     def wait_for_graph(self, predicate: Callable[[], object]) -> None:
-        """Wait until the predicate holds; it is evaluated every 20 ms."""
+        """Wait until the predicate holds; the probe checks it every 20 ms."""
         held = threading.Event()
 
         def look() -> None:
@@ -154,16 +154,19 @@ class Probe:
         self.remove(timer)
 
     def wait_for_node(self, name: str, namespace: str) -> None:
-        """Wait until the node is discovered, which may be later than its topics."""
+        """Wait until the node is discovered; its topics may have been discovered earlier."""
         self.wait_for_graph(lambda: (name, namespace) in self.node.get_node_names_and_namespaces())
 
     def remove(self, entity: Any) -> None:
-        """Destroy a publisher, client or timer in the executor, which must not wait for it."""
+        """Destroy a publisher, client or timer while the executor does not wait for it."""
         destroy = getattr(self.node, f"destroy_{type(entity).__name__.lower()}")
         self.wait_for_future(self._executor.create_task(destroy, entity))
 
     def client(self, kind: type, service: str) -> Any:
-        """Return the client of a service; reused, as the middleware never forgets a client."""
+        """Return the client of a service.
+
+        Each client is created only once, because the middleware never forgets a client.
+        """
         if service not in self._clients:
             self._clients[service] = self.node.create_client(
                 kind, f"omnibot_driver/{service}", qos_profile=QoSProfile(depth=1000)
@@ -182,7 +185,10 @@ class Probe:
         assert done.wait(PATIENCE_S), "no answer"
 
     def call(self, kind: type, service: str, **request: object) -> Any:
-        """Call a service; return its answer. Call again if a stall has ended the driver's task."""
+        """Call a service and return its answer.
+
+        The call is repeated if a stall has ended the driver's task.
+        """
         for _ in range(20):
             answer = self.call_async(kind, service, **request).wait()
             if "the driver stalled meanwhile" not in getattr(answer, "message", ""):

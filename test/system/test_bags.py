@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bags: the topics of a driver survive recording, and a driver can replay its recorded bytes."""
+"""Bags keep the topics of a driver, and a driver can replay its recorded bytes."""
 
 import signal
 from contextlib import ExitStack
@@ -65,7 +65,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
 def test_every_topic_comes_out_of_a_bag_as_it_went_in(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """Bytes, times and qualities of service are kept, in both kinds of storage."""
+    """Both storage formats of bags keep all bytes, times and qualities of service."""
     recorder = drive.recorder
     recorder.write(tmp_path / "bag", plugin)
     messages, offered = read(tmp_path / "bag")
@@ -75,7 +75,7 @@ def test_every_topic_comes_out_of_a_bag_as_it_went_in(
 
 
 def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
-    """The message definitions of Jazzy give the same fields as rclpy."""
+    """Messages decoded with the standard definitions of Jazzy equal those decoded by rclpy."""
     for topic, kind in drive.recorder.types.items():
         for _, data in drive.recorder.messages[topic]:
             ours = deserialize_message(data, message_class(kind))
@@ -83,7 +83,7 @@ def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
 
 
 def test_a_bag_played_back_is_heard_as_it_was(drive: Drive) -> None:
-    """Types and qualities of service in the bag suffice to publish it again."""
+    """The types and qualities of service in a bag suffice to publish its messages again."""
     messages, offered = read(drive.bag)
     topics = [topic for topic in messages if topic.startswith(f"/{drive.namespace}/")]
     with Probe("playback") as probe:
@@ -108,7 +108,7 @@ def wire(drive: Drive, topic: str) -> list[bytes]:
 
 
 def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
-    """A message is one read or write: frames of the board, a command, the pause, a final Stop."""
+    """Each read or write of the port is one message: frames, a command, the pause, last a Stop."""
     received, sent = (wire(drive, topic) for topic in RAW)
     assert b"\xff\xfa" in b"".join(received)
     assert b"Paused: 0 \n" in b"".join(received)
@@ -118,7 +118,7 @@ def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
 
 
 def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
-    """Two drivers publish identical bytes with the recorded timestamps, then stay running."""
+    """Two drivers that replay one bag publish identical messages, and stay running afterwards."""
     with ExitStack() as stack:
         replays = [replay(stack, drive) for _ in range(2)]
         for driver, probe, _ in replays:
@@ -138,7 +138,7 @@ def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
 
 
 def replay(stack: ExitStack, drive: Drive) -> tuple[Driver, Probe, dict[str, list[Message]]]:
-    """Start a driver that replays the recorded bytes; return what it publishes, too."""
+    """Start a driver that replays the recorded bytes; return it, its probe and its messages."""
     driver = stack.enter_context(Driver(port=f"replay://{drive.bag}?speed=4&delay=7"))
     probe = stack.enter_context(Probe(driver.namespace))
     heard = {}
@@ -157,7 +157,7 @@ def by_stamp(messages: list[Message], kind: str) -> dict[tuple[int, int], bytes]
 
 
 def measured(data: bytes, kind: str) -> Any:
-    """Return the fields that do not depend on the time or the pose at the beginning."""
+    """Return the fields of a message that depend neither on time nor on the initial pose."""
     message = deserialize_message(data, message_class(kind))
     if kind == MEASURED["odom"]:
         return message.twist

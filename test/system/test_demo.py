@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The demo: its steering and drawing as functions, and the complete program as a user runs it."""
+"""Tests of the demo's steering and drawing, and of the complete program as a user runs it."""
 
 import math
 import os
@@ -40,7 +40,7 @@ poses = st.builds(Pose, coordinates, coordinates, st.floats(-10.0, 10.0))
 
 @given(poses, st.integers(0, 1000))
 def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> None:
-    """From any pose the speed is at most that of the demo, and never zero."""
+    """From any pose the demo commands a speed above zero, and at most its maximum speed."""
     _, twist = square.steer(pose, leg)
     assert 0.0 < math.hypot(twist.vx_mps, twist.vy_mps) <= square.SPEED_MPS + 1e-9
     assert abs(twist.yaw_rate_radps) <= square.YAW_RATE_RADPS
@@ -48,7 +48,7 @@ def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> 
 
 @given(poses, st.integers(0, 1000))
 def test_a_robot_that_cannot_drive_sideways_is_never_told_to(pose: Pose, leg: int) -> None:
-    """The robot drives ahead or turns, and is never at rest."""
+    """``steer_ahead`` always commands motion ahead or a turn, but never sideways motion."""
     _, twist = square.steer_ahead(pose, leg)
     assert twist.vy_mps == 0.0
     assert 0.0 <= twist.vx_mps <= square.SPEED_MPS
@@ -107,7 +107,7 @@ def test_the_square_closes(
 def test_a_status_row_stands_under_its_heading(
     pose: Pose, leg: int, speed: float, state: str
 ) -> None:
-    """Every row has the width of the heading, which fits a terminal of 80 columns."""
+    """Every status row is as wide as its heading, which is narrower than 80 columns."""
     twist = BodyTwist(speed, -speed, speed / 10)
     row = display.status_row(state, (100, 25), leg, pose, twist, twist)
     assert len(row) == len(display.HEADING.splitlines()[-1]) < 80
@@ -116,7 +116,7 @@ def test_a_status_row_stands_under_its_heading(
 
 @contextmanager
 def running_demo(**environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Run a demo; yield it and the mark of its processes, which are all killed in the end."""
+    """Run a demo; yield its process and a mark in its environment; kill all marked processes."""
     mark = uuid.uuid4().hex
     with subprocess.Popen(
         [sys.executable, "-m", "omnibot_driver.demo"],
@@ -138,7 +138,7 @@ def _python_path() -> str:
 
 
 def marked(mark: str, name: str = "") -> list[int]:
-    """Return the ids of processes with the mark and with ``name`` in their command line."""
+    """Return the ids of processes with ``mark`` in the environment and ``name`` in the command."""
     found = []
     for directory in Path("/proc").glob("[0-9]*"):
         try:
@@ -152,7 +152,7 @@ def marked(mark: str, name: str = "") -> list[int]:
 
 
 def wait_until_all_have_ended(mark: str) -> None:
-    """Wait until the processes with the mark have ended; a guard ends later than its driver."""
+    """Wait until all processes with the mark have ended; a guard ends later than its driver."""
     for pid in marked(mark):
         try:
             process = os.pidfd_open(pid)
@@ -165,7 +165,7 @@ def wait_until_all_have_ended(mark: str) -> None:
 
 
 def read_until_it_drives(process: subprocess.Popen[str]) -> None:
-    """Read the output up to the first row with a measured speed."""
+    """Read the output of the demo up to the first row with a measured speed."""
     assert process.stdout is not None
     for line in process.stdout:
         if re.match(r"nominal .* [ -]0\.[1-9]\d +-?\d\.\d\d +-?\d\.\d\d$", line):
@@ -174,7 +174,10 @@ def read_until_it_drives(process: subprocess.Popen[str]) -> None:
 
 
 def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
-    """The exit code is 0, IMU and odometry come at 4 to 1, and odometry is within 10 mm."""
+    """After 20 s the demo ends with exit code 0 and an odometry error below 10 mm and 2°.
+
+    Four IMU messages arrive for each odometry message, and no process is left.
+    """
     with running_demo(DEMO_SECONDS="20") as (process, mark):
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, output
@@ -198,7 +201,7 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
 def test_laps_are_told_in_english(
     laps: float, told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The plural s is absent for exactly one lap."""
+    """The demo reports "1 lap", but "0 laps" and "1.25 laps"."""
     display.report(
         display.Drive(
             seconds=20.0,
@@ -219,7 +222,10 @@ def test_laps_are_told_in_english(
 def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The text omits the IMU, and the page and the command for the real robot name the board."""
+    """The demo's text for such a robot omits the IMU, and says that the robot turns at corners.
+
+    The command for the real robot names the board.
+    """
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     page = "docs/boards/cart.md"
     cart = Capability(
@@ -250,7 +256,7 @@ def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_board_has_a_demo(name: str) -> None:
-    """The profile of each board has the facts that the demo needs."""
+    """The profile of each board gives the title and the ports that the demo needs."""
     capability = capability_of(name)
     assert any(capability.ports)
     assert capability.title
@@ -259,7 +265,7 @@ def test_every_board_has_a_demo(name: str) -> None:
 def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The message comes before anything is started."""
+    """For an unknown board the demo prints one line and starts nothing."""
     assert main(["--board", "zeppelin"]) == 2
     told = capsys.readouterr().err
     assert told.startswith("demo: parameter 'board' must be one of omnibot")
@@ -267,7 +273,7 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The monitor shows the driver of the demo until the time is over; then the result follows."""
+    """On a terminal the monitor shows the demo's driver; the result follows at the end."""
     monkeypatch.setenv("DEMO_SECONDS", "20")  # the monitor may find the driver or draw late
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
         terminal.wait_for("ros2 topic hz /demo_")
@@ -279,7 +285,7 @@ def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
-    """The result is printed, the exit code is 0, and every process has ended."""
+    """After SIGINT or SIGTERM the demo prints its result, exits with 0 and leaves no process."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.send_signal(number)
@@ -291,7 +297,7 @@ def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
 
 
 def test_who_ends_it_before_it_drives_is_told_so() -> None:
-    """One line replaces the result, which does not exist."""
+    """If a signal ends the demo before the robot has driven, one line says so."""
     with running_demo() as (process, mark):
         assert process.stdout is not None
         for line in process.stdout:
@@ -305,7 +311,7 @@ def test_who_ends_it_before_it_drives_is_told_so() -> None:
 
 
 def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
-    """The exit code is 1, the message names the driver, and the simulator ends too."""
+    """If the driver is killed, the demo says so, exits with 1, and ends the simulator."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         (driver,) = marked(mark, "omnibot_driver.driver")
@@ -318,7 +324,7 @@ def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
 
 
 def test_a_killed_demo_leaves_nobody_behind() -> None:
-    """SIGKILL leaves the demo no time to act, but simulator and driver still end."""
+    """After SIGKILL of the demo, which cannot act on it, the simulator and the driver still end."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.kill()
@@ -328,7 +334,7 @@ def test_a_killed_demo_leaves_nobody_behind() -> None:
 
 @pytest.mark.parametrize("value", ["soon", "0", "-3", "nan"])
 def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
-    """The exit code is 2, and the only line names the variable and the value."""
+    """For an invalid ``DEMO_SECONDS`` the demo prints one line and exits with code 2."""
     with running_demo(DEMO_SECONDS=value) as (process, _):
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 2
@@ -338,7 +344,7 @@ def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
 def test_an_argument_that_it_does_not_know_drives_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The exit code is 2, and the message names the argument."""
+    """For an unknown argument the demo prints a message with its name and exits with code 2."""
     with pytest.raises(SystemExit) as ended:
         main(["port:=/dev/ttyUSB0"])
     assert ended.value.code == 2
@@ -346,7 +352,7 @@ def test_an_argument_that_it_does_not_know_drives_nothing(
 
 
 def test_without_ros_it_says_so_in_one_sentence() -> None:
-    """A Python without site-packages lacks rclpy: one line, without traceback, exit code 1."""
+    """In a Python without rclpy the demo prints one line and exits with code 1."""
     ended = subprocess.run(
         [sys.executable, "-ES", "-m", "omnibot_driver.demo"],
         cwd=ROOT,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A fleet that discovers itself through a Fast DDS discovery server, as docs/fleet.md says."""
+"""A super client finds a fleet through a Fast DDS discovery server, as docs/fleet.md says."""
 
 import os
 import shutil
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(SERVER is None, reason="fast-discovery-server is
 def program(
     command: list[str], environment: dict[str, str], ends_within_s: float
 ) -> Iterator[subprocess.Popen[str]]:
-    """Run a program and close its input in the end; kill it if it runs ``ends_within_s`` longer."""
+    """Run a program in the context; then close its input, and kill it after ``ends_within_s``."""
     process = subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -56,7 +56,7 @@ def free_udp_port() -> int:
 
 
 def test_a_super_client_finds_16_drivers_through_the_server() -> None:
-    """Every participant is a client of the server, so none is discovered by multicast."""
+    """All participants are clients of the server, so the observer finds no driver by multicast."""
     port = str(free_udp_port())
     environment = {
         **os.environ,

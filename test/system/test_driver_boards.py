@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The interface of the driver follows its board: what the board lacks is absent."""
+"""The driver has no topics, services and parameters for features that its board lacks."""
 
 import json
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def start_plain(start_driver: Start, port: str | None, **parameters: object) -> 
 
 
 def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
-    """Return the names relative to the namespace, without those that every ROS node has."""
+    """Return the names relative to ``home``, without those that every ROS node has."""
     of_ros = ("parameter", "type_description", "/rosout", "/tf")
     relative = {name.removeprefix(f"{home}/") for name, _types in found}
     return {name for name in relative if not any(word in name for word in of_ros)}
@@ -47,7 +47,7 @@ def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
 def test_what_a_board_lacks_is_not_advertised(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Topics, services and parameters of IMU, wheel commands and pause are absent."""
+    """For a board without IMU, wheel commands and pause, the driver has no interface for them."""
     driver = start_plain(start_driver, start_board().path)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -79,7 +79,7 @@ def test_what_a_board_lacks_is_not_advertised(
 def test_a_deleted_parameter_does_not_block_the_others(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A parameter that may be unset is not deleted, because every later change reads it."""
+    """The driver refuses to delete an optional parameter, because each later change reads it."""
     probe: Probe = probe_of(start_plain(start_driver, start_board().path))
     deleted = [RosParameter(name="gain", value=ParameterValue())]
     (result,) = probe.call(SetParameters, "set_parameters", parameters=deleted).results
@@ -91,7 +91,7 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """The robot drives, its wheels have their names, and its own service replies."""
+    """The plain board drives, its wheels have their names, and its own service replies."""
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))
     joints, odometry = probe.listen(JointState, "joint_states"), probe.listen(Odometry, "odom")
@@ -119,7 +119,7 @@ def test_the_monitor_shows_what_the_board_has(
     probe_of: Start,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The monitor neither shows an IMU nor reports it as missing."""
+    """For a board without an IMU the monitor neither shows one nor reports it as missing."""
     driver = start_plain(start_driver, start_board().path)
     probe_of(driver).wait_for_state("nominal")
     assert main(["--json", "--namespace", driver.namespace]) == 0
@@ -150,14 +150,14 @@ def test_the_monitor_shows_what_the_board_has(
 def test_what_means_nothing_to_the_board_is_refused(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """The message names the board that has the parameter, or the expected values."""
+    """The driver refuses wrong names and values of parameters, and says what it expects."""
     driver = start_plain(start_driver, "/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2
 
 
 def test_a_board_that_is_not_there_ends_the_start(start_driver: Start) -> None:
-    """The message lists the boards, and the exit code is 2."""
+    """For an unknown board the driver lists the known boards and exits with code 2."""
     driver: Driver = start_driver("/dev/null", board="martha")
     driver.wait_for_line("cannot start: parameter 'board' must be one of omnibot")
     assert driver.end() == 2

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver reports about its calibration file at its start: it ignores nothing silently."""
+"""The driver reports at its start what it reads from its calibration file, and what it ignores."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +13,7 @@ WARNED = "calibration_file {} does not exist, so nothing is loaded from it; chec
 
 
 def said_of(path: Path, start_driver: Start) -> str:
-    """Return the only line about the file from a driver that has read it."""
+    """Start a driver with the calibration file; return its only log line about the file."""
     driver = start_driver("/dev/null", calibration_file=path)
     driver.wait_for_line("is not a serial port")
     (line,) = [line for line in driver.lines if "calibration_file" in line]
@@ -24,7 +24,7 @@ def said_of(path: Path, start_driver: Start) -> str:
 def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
     start_driver: Start, tmp_path: Path, is_there: bool
 ) -> None:
-    """The path may be mistyped, and the file that was meant may have the signs of the axes."""
+    """The driver starts with a missing or empty file, but warns, as its path may be mistyped."""
     path = tmp_path / "robt.yaml"
     if is_there:
         path.write_text("# nothing yet\n")
@@ -35,7 +35,7 @@ def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
 
 
 def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) -> None:
-    """Notes of the tools (``imu_rpy``, ``step``) are not reported."""
+    """One line names the parameters that the file sets, but not the notes of the tools."""
     path = tmp_path / "robot.yaml"
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
     line = said_of(path, start_driver)
@@ -46,7 +46,7 @@ def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) ->
 def test_names_that_are_not_read_are_told_with_the_nearest(
     start_driver: Start, tmp_path: Path
 ) -> None:
-    """Misspelt names and other parameters share one warning."""
+    """One warning lists all names that the driver does not read, with the nearest known name."""
     path = tmp_path / "robot.yaml"
     path.write_text("axis_sings: [1, -1, -1]\nmax_linear_speed: 0.2\n7: 1\n")
     line = said_of(path, start_driver)
@@ -60,7 +60,7 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
 
 
 def test_a_home_that_nobody_has_ends_the_start(start_driver: Start) -> None:
-    """The message asks for the complete path, and the exit code is 2."""
+    """For the home directory of an unknown user the driver asks for the full path and exits."""
     driver = start_driver("/dev/null", calibration_file="~nosuchuser/c.yaml")
     driver.wait_for_line("the calibration_file ~nosuchuser/c.yaml cannot be found: .*full path")
     assert driver.end() == 2

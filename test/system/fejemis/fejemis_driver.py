@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Helpers of tests of the driver with a simulated Fejemis: they start it, and drive."""
+"""Helpers that start the driver with a simulated Fejemis, and drive the robot."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -29,14 +29,14 @@ def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Drive
 
 @contextmanager
 def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command this motion ten times a second; the context begins when the robot moves."""
+    """Command ``vx`` and ``yaw`` at 10 Hz in the context, which begins when the robot moves."""
     with probe.commanding(vx, yaw):
         robot.wait_until(lambda board: not board.standing)
         yield
 
 
 def moves_again(probe: Probe, robot: TwoPorts) -> None:
-    """Return whether the robot moves again on a fresh command."""
+    """Command the robot until it moves, then wait until it stands; fail if it does not move."""
     with driven(probe, robot):
         pass
     robot.stands_for_good()

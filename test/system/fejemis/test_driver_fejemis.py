@@ -27,7 +27,10 @@ Start = Callable[..., Any]
 
 
 def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:
-    """The robot drives ahead, on the spot and in a curve, and stops when the commands end."""
+    """The pose in odom is within 2 cm of the truth after a straight, a turn and a curve.
+
+    The robot stops when the commands end.
+    """
     odometry = probe.listen(Odometry, "odom")
     joints = probe.listen(JointState, "joint_states")
     with driven(probe, robot):
@@ -52,7 +55,7 @@ def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> 
 def test_its_sensors_are_published(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The values are in SI units, and their frames are those of the description."""
+    """Sensor values are published in SI units, with the frames of the robot description."""
     robot = robot_of(stack, tmp_path, front_m=1.5)
     probe: Probe = probe_of(started(robot, start_driver))
     heard = {
@@ -85,7 +88,7 @@ def test_its_sensors_are_published(
 
 
 def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: Probe) -> None:
-    """``ros2 param set ... tof_maximum 2`` sends an integer."""
+    """The real parameter ``tof_maximum`` accepts the integer 2, as ``ros2 param set`` sends it."""
     ranges = probe.listen(Range, "range/tof")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=2)
     changes = [Parameter(name="tof_maximum", value=whole)]
@@ -94,7 +97,7 @@ def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: 
 
 
 def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe: Probe) -> None:
-    """Brush, lift and light do not come back by themselves."""
+    """The e-stop switches brush and lift off, and its release does not switch them on again."""
     lift, led = probe.publisher(Float32, "lift_cmd"), probe.publisher(ColorRGBA, "led_cmd")
     led.publish(ColorRGBA(r=1.0, g=0.5, b=0.0, a=1.0))
     robot.wait_until(lambda board: board.front.leds[5] == (255, 128, 0))
@@ -119,7 +122,7 @@ def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe
 def test_a_lift_command_that_waited_while_the_driver_was_stalled_is_refused(
     robot: TwoPorts, driver: Driver, probe: Probe
 ) -> None:
-    """The lift does not move, and the base still obeys the next command at once."""
+    """A refused lift command does not move the lift, and the base obeys the next command."""
     probe.wait_for_state("nominal")
     lift = probe.publisher(Float32, "lift_cmd")
     driver.process.send_signal(signal.SIGSTOP)
@@ -134,7 +137,7 @@ def test_a_lift_command_that_waited_while_the_driver_was_stalled_is_refused(
 
 
 def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) -> None:
-    """Commands continue, but the drive half gets ``stop`` and shows that in its heartbeat."""
+    """During the e-stop the robot stays at rest, although commands continue to arrive."""
     with driven(probe, robot):
         assert probe.call(SetBool, "estop", data=True).success
         robot.stands_for_good()
@@ -144,7 +147,7 @@ def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) 
 
 
 def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None:
-    """The pause ends with ``~/pause`` false; an earlier command has no effect."""
+    """A paused robot stays at rest, and after the pause only a new command moves it."""
     with driven(probe, robot):
         assert probe.call(SetBool, "pause", data=True).success
         robot.stands_for_good()
@@ -160,7 +163,7 @@ def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     robot: TwoPorts, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """The driver's own exit or the guard stops it: the robot stands, brush and lift are off."""
+    """The driver's exit or the guard stops the robot and switches brush and lift off."""
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
         driver.process.send_signal(number)
@@ -172,7 +175,7 @@ def test_whatever_ends_the_driver_stops_it(
 
 
 def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
-    """The jobs are the calibrations, and saving and loading the configuration."""
+    """The services for calibration and for saving and loading the configuration succeed."""
     for service in ("calibrate_gyro", "calibrate_accelerometer", "save_configuration"):
         answer = probe.call(Trigger, service)
         assert answer.success, (service, answer.message)
@@ -187,7 +190,7 @@ def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
 def test_power_off_is_refused_while_driving(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """Both boards of a robot at rest lose their power after the delay."""
+    """``~/power_off`` is refused while driving; at rest the power goes off after a delay."""
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))
     probe.wait_for_state("nominal")
@@ -200,7 +203,7 @@ def test_power_off_is_refused_while_driving(
 
 
 def test_diagnostics_name_the_boards(probe: Probe) -> None:
-    """The diagnostics have version, name and id of each half."""
+    """The diagnostics show the version, name and id of each half of the Fejemis."""
     diagnoses = probe.listen(DiagnosticArray, "/diagnostics")
 
     def told() -> set[str]:

@@ -23,9 +23,9 @@ Start = Callable[..., Any]
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """The other half gets the stop, and so does the lost one once it is back.
+    """The driver stops the half that remains, and the lost half when it is plugged in again.
 
-    The brush stays off.
+    The brush is switched off, and stays off.
     """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
@@ -50,7 +50,7 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """The robot obeys again once both halves work."""
+    """The robot stops, and obeys new commands once both halves work again."""
     with driven(probe, robot):
         robot.do(lambda board: board.befall(name, what))
         if what != "restart":
@@ -67,7 +67,7 @@ def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
 def test_a_broken_angle_sensor_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, what: str
 ) -> None:
-    """One sentence says what is wrong with the sensor."""
+    """The driver stops the robot and logs that the angle sensor is faulty."""
     with driven(probe, robot):
         robot.do(lambda board: board.befall("front", what))
         robot.stands_for_good()
@@ -79,7 +79,7 @@ def test_a_broken_angle_sensor_stops_the_robot(
 def test_swapped_ports_are_found_out(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The ids in the heartbeats show the swap; the robot drives as usual."""
+    """The driver recognises swapped ports by the ids in the heartbeats, and still drives."""
     robot = robot_of(stack, tmp_path, swapped=True)
     driver = started(robot, start_driver)
     probe: Probe = probe_of(driver)
@@ -91,7 +91,10 @@ def test_swapped_ports_are_found_out(
 def test_it_drives_without_sums(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver learns the form from heartbeats; from then on the firmware accepts each line."""
+    """The driver learns from the heartbeats that the firmware uses no checksums, and omits them.
+
+    The firmware then accepts every line from the driver.
+    """
     robot = robot_of(stack, tmp_path, firmware=Firmware(sums=False))
     probe: Probe = probe_of(started(robot, start_driver))
     probe.wait_for_state("nominal")
@@ -101,7 +104,7 @@ def test_it_drives_without_sums(
 
 
 def test_the_same_port_twice_ends_the_start(robot: TwoPorts, start_driver: Start) -> None:
-    """The driver ends with one sentence that gives the reason."""
+    """The driver exits with code 2 and says that each half needs a port of its own."""
     driver: Driver = start_driver(robot.ports[0], board="fejemis", front_port=robot.ports[0])
     driver.wait_for_line("'front_port' must not be .* have a port each")
     assert driver.end() == 2
@@ -119,7 +122,7 @@ def test_a_teensy_of_another_kind_is_named_and_nothing_moves(
     ids: tuple[int, int],
     wrong: str,
 ) -> None:
-    """The notice names the id of the other board."""
+    """The driver logs what is wrong with the ids of the boards, and the robot stays at rest."""
     robot = robot_of(stack, tmp_path, ids=ids)
     driver = started(robot, start_driver)
     probe: Probe = probe_of(driver)

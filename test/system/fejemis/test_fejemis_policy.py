@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Comparison of config/fejemis.policy.xml with the running node of this board."""
+"""Compare config/fejemis.policy.xml with the running driver of a Fejemis."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -21,7 +21,7 @@ POLICY: Final = Path(__file__).parents[3] / "config" / "fejemis.policy.xml"
 
 
 def rules() -> dict[str, Rules]:
-    """Return the rules by the path of their enclave."""
+    """Return the rules of each enclave in the policy, by the path of the enclave."""
     enclaves = ElementTree.parse(POLICY).getroot().iter("enclave")
     return {one.attrib["path"]: allowed(next(one.iter("profile"))) for one in enclaves}
 
@@ -29,7 +29,7 @@ def rules() -> dict[str, Rules]:
 def test_the_driver_may_do_what_it_does_and_nothing_else(
     stack: ExitStack, tmp_path: Path, start_driver: Callable[..., Any], probe_of: Any
 ) -> None:
-    """The node's own topics and services, as the graph shows them."""
+    """The policy allows exactly the topics and services that the driver has in the ROS graph."""
     robot = stack.enter_context(TwoPorts(SimulatedFejemis(), tmp_path))
     port, front_port = robot.ports
     driver: Driver = start_driver(port, board="fejemis", front_port=front_port)
@@ -49,7 +49,7 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
-    """Navigation may drive, but may not use brush and lift."""
+    """Only the operator's enclave may call services and publish lift commands."""
     every = rules()
     driver = every.pop("/omnibot/driver")
     everywhere = {"/rosout", "/parameter_events", "/clock"}

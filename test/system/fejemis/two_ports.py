@@ -19,14 +19,15 @@ from omnibot_driver.simulator.fejemis import CHANNELS, SimulatedFejemis
 
 PATIENCE_S: Final = 30.0
 STANDS_TICKS: Final = 750
-"""A second and a half of the simulated boards."""
+"""A time of 1.5 s in ticks of the simulated boards."""
 DRIVE, FRONT = 0, 1
 
 
 class TwoPorts(RunningBoard[SimulatedFejemis]):
-    """``ports``: the links that lead to the terminals, as udev makes them.
+    """A simulated Fejemis on two pseudo-terminals.
 
-    ``heard``: what each port received since it was plugged in last.
+    ports: paths of links to the terminals, like those that udev makes. heard: bytes that each port
+    has received since it was last plugged in.
     """
 
     def __init__(self, board: SimulatedFejemis, folder: Path) -> None:
@@ -53,35 +54,35 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
             self.unplug(channel)
 
     def plug(self, channel: int) -> None:
-        """Plug a cable in again: the old link leads to a new terminal, usually of another name."""
+        """Open a new terminal, usually of another name, and let the channel's link lead to it."""
         with self._plugging:
             self.heard[channel] = bytearray()
             self._terminals[channel] = Terminal(self.ports[channel])
 
     def unplug(self, channel: int) -> None:
-        """Remove the terminal; the Teensy continues with its last command."""
+        """Close the terminal, as if the cable were unplugged; the Teensy keeps its last command."""
         with self._plugging:
             terminal, self._terminals[channel] = self._terminals[channel], None
             if terminal is not None:
                 terminal.close()
 
     def wait_until(self, predicate: Callable[[SimulatedFejemis], object]) -> None:
-        """Wait until the condition holds; fail if it does not hold in time."""
+        """Wait until the predicate holds; fail after ``PATIENCE_S``."""
         found = self.wait_for(lambda board: bool(predicate(board)), PATIENCE_S)
         assert found, {**self.facts, "last": self.last()}
 
     def do(self, action: Callable[[SimulatedFejemis], Any]) -> Any:
-        """Call ``action`` with the board between two ticks, and return its result."""
+        """Call ``action`` with the board while no tick is running; return its result."""
         with self.lock:
             return action(self.board)
 
     def last(self) -> list[list[str]]:
-        """Return the lines that each half executed last."""
+        """Return the last twelve lines that each half has executed."""
         halves = (self.board.drive, self.board.front)
         return [[obeyed.text for obeyed in list(half.commands)[-12:]] for half in halves]
 
     def stands_for_good(self) -> None:
-        """Wait until the wheels were at rest for 1.5 s; then brush and lift must be off too."""
+        """Wait until both driving wheels have been at rest for 1.5 s."""
         since: list[int] = []
 
         def stood(board: SimulatedFejemis) -> bool:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A driver with a LOIS ECU, as documented and as its firmware is."""
+"""Fixtures: a driver with a simulated LOIS ECU that behaves as documented, or as its firmware."""
 
 from collections.abc import Callable
 from contextlib import ExitStack

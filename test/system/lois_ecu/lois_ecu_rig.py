@@ -18,7 +18,7 @@ NODE: Final = "omnibot_driver"
 
 
 class Ecu:
-    """A simulated board in real time."""
+    """A simulated LOIS ECU that runs in real time."""
 
     def __init__(self, firmware: Any, served: "PtyBoard[SimulatedLois]") -> None:
         self.firmware, self.served = firmware, served
@@ -57,14 +57,14 @@ def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
 
 @contextmanager
 def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command this motion at 10 Hz inside the context, which begins when the robot moves."""
+    """Command ``vx`` and ``yaw`` at 10 Hz in the context, which begins when the robot moves."""
     with probe.commanding(vx, yaw):
         ecu.wait_for(lambda board: not board.standing)
         yield
 
 
 def set_parameter(probe: Probe, name: str, value: str | float) -> None:
-    """Set a parameter of the running driver; a number is set as a double."""
+    """Set a parameter of the running driver; numbers are sent as doubles."""
     if isinstance(value, str):
         given = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
     else:

@@ -38,15 +38,16 @@ GAINS: Final = {
     "right_tn": 0.232542,
     "right_td": 0.60868,
 }
-"""Gains of docs/boards/lois_ecu.md, with which the wheels do not swing."""
+"""Controller gains from docs/boards/lois_ecu.md, with which the wheel speeds do not oscillate."""
 
 
 def test_it_drives_and_odometry_tells_how_far(
     ecu: Ecu, start_driver: Start, probe_of: Start
 ) -> None:
-    """Odometry is within 4 cm after 1 m, and the robot stops when the commands end.
+    """After a drive of 1 m odometry is within 4 cm, and the robot stops when the commands end.
 
-    With the board's own gains the robot swerves; other tests measure that in simulated time.
+    The test sets gains, because the robot swerves with the board's own gains. Other tests measure
+    the swerve in simulated time.
     """
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
     probe.wait_for_state("nominal")
@@ -70,7 +71,7 @@ def test_it_drives_and_odometry_tells_how_far(
 
 
 def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None:
-    """The robot stays at rest although commands continue to arrive."""
+    """During the e-stop the robot stays at rest, although commands continue to arrive."""
     with driven(probe, ecu):
         assert probe.call(SetBool, "estop", data=True).success
         ecu.stands_for_good()
@@ -82,7 +83,7 @@ def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     ecu: Ecu, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """Either the exit of the driver stops the robot, or the guard process does."""
+    """If a signal ends or suspends the driver, the driver's exit or the guard stops the robot."""
     with driven(probe, ecu):
         driver.process.send_signal(number)
         ecu.stands_for_good()
@@ -94,8 +95,10 @@ def test_whatever_ends_the_driver_stops_it(
 def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """Only the service releases the e-stop. The driver publishes no button state before the first
-    press."""
+    """A press of the board's button latches the e-stop, which only the service releases.
+
+    The driver does not publish the state of the button before the first press.
+    """
     button = probe.listen(Bool, "estop_button", latched=True)
     latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)
     with driven(probe, ecu):
@@ -114,7 +117,7 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """The board forgets its low-pass, which the driver writes again; odometry continues."""
+    """After a restart of the board the driver writes the low-pass again, and odometry continues."""
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.4)
@@ -131,7 +134,7 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 
 
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
-    """After the reset the robot can be driven again, and odometry continues."""
+    """A reset sets the ticks of the wheels to 0; the robot drives again, and odometry continues."""
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.6)
@@ -144,7 +147,7 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 
 
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
-    """The driver does not write settings that the user has not set."""
+    """The driver writes a gain that the user sets, and again after a restart, but no other gain."""
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.5)
@@ -161,7 +164,7 @@ def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, pr
 
 @pytest.mark.parametrize("firmware", QUIRKS)
 def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe_of: Start) -> None:
-    """The port ``sim://`` selects the simulator of this board."""
+    """With the port ``sim://`` the driver runs the simulated LOIS ECU in its own process."""
     driver = start_driver(f"sim://?firmware={firmware}", board="lois_ecu")
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -181,7 +184,7 @@ def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe
 def test_a_record_is_a_file_and_an_estop_ends_one(
     start_driver: Start, probe_of: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The service answers with the path of the file; an incomplete record leaves no file."""
+    """A record service answers with the path of its file; an interrupted record leaves no file."""
     ecu = ecu_of("firmware", stack, running=True)
     folder = tmp_path / "records"
     driver = start_driver(

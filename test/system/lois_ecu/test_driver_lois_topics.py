@@ -1,7 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a LOIS ECU on a real pseudo-terminal: topics and services that only this board
-has."""
+"""The topics and services of the driver that only a LOIS ECU has, on a real pseudo-terminal."""
 
 import math
 import signal
@@ -28,7 +27,7 @@ NODE: Final = "omnibot_driver"
 
 
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
-    """The driver sends the ball command only once."""
+    """The services switch the LED on and off; the driver sends the ball command only once."""
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
     assert probe.call(SetBool, "led", data=False).success
@@ -40,8 +39,10 @@ def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
 def test_gps_time_and_heading_are_published_where_the_board_tells_them(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """By the compass the robot points east; a declination of 0.1 rad turns the heading in ENU by
-    -0.1 rad."""
+    """The compass shows east, and a declination of 0.1 rad gives a heading of -0.1 rad in ENU.
+
+    Position and time of the GPS receiver are published, too.
+    """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
         ecu.path, board="lois_ecu", date_period=0.5, time_period=0.5, magnetic_declination=0.1
@@ -64,7 +65,7 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 def test_a_fix_of_the_public_firmware_is_none(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The public firmware sends zeros in place of a position."""
+    """The driver reports no fix, because the public firmware sends zeros instead of a position."""
     probe: Probe = probe_of(start_driver(ecu_of("firmware", stack).path, board="lois_ecu"))
     fixes = probe.listen(NavSatFix, "fix")
     probe.wait_for(lambda: fixes)
@@ -74,7 +75,7 @@ def test_a_fix_of_the_public_firmware_is_none(
 def test_duties_are_commanded_in_duty_mode_alone(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """Duties are limited by max_duty, and expire like other commands."""
+    """In duty mode, commanded duties are limited to ``max_duty`` and expire like other commands."""
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
     probe: Probe = probe_of(driver)
@@ -92,7 +93,10 @@ def test_duties_are_commanded_in_duty_mode_alone(
 def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The first command of its sender, so nothing is known of the sender's clock."""
+    """The driver refuses a duty that was sent during its stall.
+
+    The duty is the first message of its sender, so the driver does not know the sender's clock.
+    """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")
     probe: Probe = probe_of(driver)
@@ -111,9 +115,10 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """Both modes can be set while the driver runs; their topics appear and disappear with them.
+    """The terminal mode and the drive mode change at run time, and their topics with them.
 
-    The public firmware forwards both sensors in either mode; here both send at the same time.
+    In either terminal mode the public firmware forwards the lines of both GPS and compass. Here
+    both sensors send at the same time.
     """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
@@ -134,8 +139,7 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 
 
 def recorded(robot: Any) -> Path:
-    """Return the path of a record; request it again if the robot was stopped because this computer
-    is busy."""
+    """Record while driving, and return the path; repeat it if a busy computer stopped the robot."""
     for _ in range(10):
         try:
             return Path(robot.record("record_rpm", "wheel_cmd", [3.0, 3.0]))
@@ -148,8 +152,10 @@ def recorded(robot: Any) -> Path:
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     start_driver: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The file has the ticks of both wheels from the start of the motion; the driver's refusal is
-    shown unchanged."""
+    """The file has the ticks of both wheels, and the robot is at rest after the record.
+
+    The tool shows a refusal by the driver unchanged.
+    """
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(
         ecu.path,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a simulated MART controller on real UDP sockets of the loopback."""
+"""The driver with a simulated MART controller on real UDP sockets of the loopback interface."""
 
 import math
 import signal
@@ -27,7 +27,7 @@ Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
 SECOND_TICKS: Final = 500
 STANDS_TICKS: Final = 750
-"""A second, and a second and a half, of the simulated controller."""
+"""A time of 1.5 s in ticks of the simulated controller; ``SECOND_TICKS`` are 1 s."""
 MOTIONS: Final = {
     "RM": (0.3, 0.2),
     "B": (-0.2, 0.0),
@@ -36,7 +36,7 @@ MOTIONS: Final = {
 
 
 class Mart:
-    """A simulated controller in real time."""
+    """A simulated MART controller that runs in real time."""
 
     def __init__(self, served: "ServedBoard[SimulatedMart]") -> None:
         self.served = served
@@ -67,7 +67,7 @@ class Mart:
         assert not self.do(lambda board: board.server.hung)
 
     def answer(self, probe: Probe, service: str) -> Any:
-        """Call the service until it is not refused for now; return its answer."""
+        """Call the service, again each second while it is refused; return the last answer."""
         for _ in range(round(PATIENCE_S)):
             done = probe.call(Trigger, service)
             if "refused" not in done.message:
@@ -90,14 +90,17 @@ def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[None]:
-    """Command this motion ten times a second; the context begins when the robot moves."""
+    """Command a velocity at 10 Hz in the context, which begins when the robot moves."""
     with probe.commanding(vx, yaw_rate):
         mart.wait_for(lambda board: board.server.chassis.moving)
         yield
 
 
 def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
-    """The robot drives a metre and stops without commands. Battery and sonars are published."""
+    """After a drive of 1 m odom is within 1 cm, and the robot stops when the commands end.
+
+    The driver publishes battery, ranges and docking state.
+    """
     odometry = probe.listen(Odometry, "odom")
     batteries = probe.listen(BatteryState, "battery_state")
     ranges = probe.listen(Range, "range/front")
@@ -117,7 +120,7 @@ def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
 def test_a_download_that_cannot_be_saved_ends_with_the_reason(
     mart: Mart, start_driver: Start, probe_of: Start
 ) -> None:
-    """The home directory of an unknown user does not exist; the driver continues."""
+    """A download to the home directory of an unknown user fails, but the driver continues."""
     folder = "~nobody_of_this_name/records"
     probe: Probe = probe_of(start_driver(mart.url, board="mart", record_directory=folder))
     probe.wait_for_state("nominal")
@@ -131,7 +134,7 @@ def test_a_download_that_cannot_be_saved_ends_with_the_reason(
 
 
 def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
-    """Each motion is ended by its own stop command, and the server still answers."""
+    """The e-stop ends each kind of motion by its own stop command, and the server still answers."""
     for motion in MOTIONS.values():
         with driven(probe, mart, *motion):
             assert probe.call(SetBool, "estop", data=True).success
@@ -145,7 +148,7 @@ def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
 def test_whatever_ends_the_driver_stops_each_motion(
     mart: Mart, driver: Driver, probe: Probe, motion: str, number: signal.Signals
 ) -> None:
-    """The driver's own exit stops it, or the guard, which has the motion's stop command."""
+    """The driver's exit, or the guard, which knows the motion's stop command, stops the robot."""
     with driven(probe, mart, *MOTIONS[motion]):
         driver.process.send_signal(number)
         mart.stands_for_good()
@@ -155,7 +158,7 @@ def test_whatever_ends_the_driver_stops_each_motion(
 def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
     mart: Mart, driver: Driver, probe: Probe, word: str
 ) -> None:
-    """The driver is killed while a command is on its way, or while a controlled move runs."""
+    """The guard stops the robot if the driver is killed during a command or a controlled move."""
     if word == "TF":
         goal = PoseStamped()
         goal.header.frame_id = "odom"
@@ -174,7 +177,7 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
 
 
 def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe) -> None:
-    """The guard stops the robot after half a second without a heartbeat."""
+    """The guard stops the robot after half a second without a heartbeat of the driver."""
     with driven(probe, mart, 0.3, 0.0):
         driver.process.send_signal(signal.SIGSTOP)
         mart.stands_for_good()
@@ -183,9 +186,9 @@ def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe
 
 
 def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
-    """The services measure the bias, start the log and download files.
+    """The services calibrate the gyro, start the log, and download the last move and the log.
 
-    The last one ends the server.
+    A download of the log ends the MART server.
     """
     with driven(probe, mart, 0.3, 0.0):
         pass
@@ -207,7 +210,10 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """An integer is accepted for a real number; for 0.1 m the driver requests 2 inches."""
+    """New values of ``range_maximum`` and ``dock_distance`` take effect while the driver runs.
+
+    An integer is accepted for a real number. For a distance of 0.1 m the driver requests 2 inches.
+    """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
     real = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.1)
@@ -224,6 +230,6 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 
 
 def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """No server listens at this address."""
+    """The driver reports missing data if no server listens at its address."""
     driver = start_driver("udp://127.0.0.1:9", board="mart")
     driver.wait_for_line("no data from the board")
