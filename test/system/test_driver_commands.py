@@ -33,7 +33,10 @@ def newest(board: SimulatedBoard) -> ReceivedCommand:
 
 
 def test_cmd_vel_reaches_the_board_as_the_manuals_frame(probe: Probe, board: PtyBoard) -> None:
-    """0.3 m/s, -0.2 m/s and 0.5 rad/s are 21, -14 and 250 LSB; Stop follows the timeout."""
+    """The board receives 0.3 m/s, -0.2 m/s and 0.5 rad/s as 21, -14 and 250 LSB.
+
+    After the command timeout the board receives Stop.
+    """
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x, twist.linear.y, twist.angular.z = 0.3, -0.2, 0.5
@@ -59,7 +62,10 @@ omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
 def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path, topic: str
 ) -> None:
-    """The middleware has its send time, whatever the stamp of a goal; the next one is obeyed."""
+    """The driver refuses an old command by its send time, which the middleware provides.
+
+    The stamp of a goal does not matter. The driver obeys the next command.
+    """
     hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
     board: PtyBoard = start_board(control=control, running=True)
     driver: Driver = start_driver(
@@ -104,7 +110,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 def test_a_zero_twist_is_the_stop_frame(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """It ends a motion before its timeout; a velocity frame (mode 1) with zeros is never sent."""
+    """A zero Twist ends a motion at once by the Stop frame, never by a zero velocity frame."""
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")
     commands = probe.publisher(Twist, "cmd_vel")
@@ -119,7 +125,7 @@ def test_a_zero_twist_is_the_stop_frame(
 
 
 def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
-    """10 rad/s of a 29 mm wheel are 20 LSB."""
+    """The driver sends 10 rad/s of a wheel with a radius of 29 mm as 20 LSB."""
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=[10.0, -10.0, 0.0]))
     assert board.wait_for(lambda b: obeyed(b, "wheels", 20, -20, 0), PATIENCE_S)
@@ -137,7 +143,7 @@ def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
 def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     probe: Probe, driver: Driver, board: PtyBoard, data: list[float], reason: str
 ) -> None:
-    """The node keeps running: a correct command is obeyed afterwards."""
+    """The driver rejects a wrong wheel_cmd with a reason, and obeys the next correct one."""
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=data))
     driver.wait_for_line(f"wheel_cmd rejected.*{reason}")
@@ -150,7 +156,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
     probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
 ) -> None:
-    """Axes that the driver ignores are checked too, because their publisher is faulty."""
+    """NaN or infinity is rejected even in axes that the driver ignores: the sender is faulty."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.y = 0.3
@@ -162,7 +168,7 @@ def test_a_twist_that_is_not_finite_anywhere_is_refused(
 
 
 def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBoard) -> None:
-    """1e300 m/s to the front left become 0.5 m/s to the front left."""
+    """A command of 1e300 m/s to the front left is limited to 0.5 m/s in the same direction."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = twist.linear.y = 1e300
@@ -171,7 +177,7 @@ def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBo
 
 
 def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoard) -> None:
-    """A button node may latch the e-stop; only the service releases it."""
+    """A message true on the topic ``estop`` latches the e-stop; only the service releases it."""
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop")
     button.publish(Bool(data=True))
@@ -190,7 +196,7 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
 def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """The type of the topic is geometry_msgs/TwistStamped if the parameter is set."""
+    """With ``enable_stamped_cmd_vel`` the type of cmd_vel is geometry_msgs/TwistStamped."""
     stamps = {"enable_stamped_cmd_vel": True, "cmd_vel_timeout": 10.0}
     probe: Probe = probe_of(start_driver(board.path, **stamps))
     probe.wait_for_state("nominal")
@@ -205,7 +211,7 @@ def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
 def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is_taken(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """A command is stale beyond ``cmd_vel_timeout``; a zero stamp means unstamped."""
+    """The driver refuses a command older than ``cmd_vel_timeout``, unless its stamp is zero."""
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -224,7 +230,10 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 
 
 def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
-    """The middleware would discard these commands silently."""
+    """The driver warns once if a node publishes cmd_vel with the other message type.
+
+    The middleware does not deliver such commands to the driver, and does not report them.
+    """
     reports = probe.listen(DiagnosticArray, "/diagnostics")
     probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
     driver.wait_for_line(
@@ -238,7 +247,7 @@ def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver
 def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
     probe: Probe, driver: Driver
 ) -> None:
-    """Commands are subscribed reliably, so best-effort publishers do not match."""
+    """The driver warns of a best-effort publisher of cmd_vel, whose commands it cannot receive."""
     quality = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     probe.node.create_publisher(Twist, "cmd_vel", quality)
     driver.wait_for_line("incompatible QoS.*RELIABILITY")
@@ -247,7 +256,10 @@ def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
 def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The goal is 0.25 m ahead in odom, whose origin differs from the frame of the board."""
+    """Under positional control the robot drives to a goal 0.25 m ahead in odom.
+
+    Velocity commands are refused. The origin of odom differs from that of the board's frame.
+    """
     board = start_board(
         control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)
     )

@@ -42,8 +42,10 @@ import omnibot_driver.driver as driver, omnibot_driver.link as link
 link.STANDS_WITHIN_S = link.SILENCE_S = link.JOIN_TIMEOUT_S = 10.0
 driver.LONGEST_END_S = 50.0
 """
-"""Longer time limits: on a busy computer the board reports later that the robot is at rest. The
-driver waits for nothing else, so elsewhere they have no effect."""
+"""Code that sets longer time limits, as a busy computer delays the board's report of rest.
+
+On an idle computer the report comes early, and the limits have no effect.
+"""
 
 
 @pytest.mark.parametrize(
@@ -60,7 +62,7 @@ driver waits for nothing else, so elsewhere they have no effect."""
 def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     start_board: Start, start_driver: Start, probe_of: Start, signals: list[signal.Signals]
 ) -> None:
-    """Ctrl-C on ``ros2 launch`` arrives twice, which must not prevent the stop frame."""
+    """Ctrl-C on ``ros2 launch`` sends two signals; the driver still sends Stop and exits with 0."""
     board = start_board()
     driver: Driver = start_driver(board.path, before=PATIENT)
     probe: Probe = probe_of(driver)
@@ -84,14 +86,14 @@ join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 100 * timeout)
 atexit.register(lambda: print("left running:", sum(bool(e._sigint_gc) for e in executors)))
 """
-"""The driver also waits longer for its executor's thread, which a busy computer delays."""
+"""Code that makes the driver print how many executors are still running at its exit.
+
+It also makes the driver wait longer for threads, which a busy computer delays.
+"""
 
 
 def test_the_executor_is_shut_down_before_python_ends(start_driver: Start) -> None:
-    """Python would destroy the node's parts in any order.
-
-    Sometimes rclpy would print a traceback.
-    """
+    """The driver shuts its executor down; if Python did it at exit, rclpy might print an error."""
     driver: Driver = start_driver("sim://", before=PATIENT + REPORTS_EXECUTORS)
     driver.wait_for_line("state: nominal")
     assert driver.end(signal.SIGTERM) == 0
@@ -116,7 +118,7 @@ node.OmniBotDriver._on_estop_topic = lambda self, message: rclpy.shutdown()
 def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
     start_board: Start, start_driver: Start, probe_of: Start, before: str, exit_code: int
 ) -> None:
-    """The exit code distinguishes a defect (1) from a shutdown (0)."""
+    """A defect ends the driver with exit code 1, a shutdown of ROS with 0; both send Stop last."""
     board = start_board()
     driver: Driver = start_driver(board.path, before=before, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
@@ -131,7 +133,7 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
 def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
     start_driver: Start, probe_of: Start, silent_terminal: tuple[int, str]
 ) -> None:
-    """The kernel's buffer is full, so the final Stop does not fit; the guard keeps trying."""
+    """If the kernel's buffer is full, the driver ends, and the guard keeps trying to send Stop."""
     far, path = silent_terminal
     driver: Driver = start_driver(path, auto_start=False)
     probe_of(driver).wait_for_state("connecting")
@@ -146,7 +148,7 @@ def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
 
 
 def fill_terminal(path: str) -> None:
-    """Fill the terminal's buffer towards the board, as a program that has it open."""
+    """Open the terminal, fill its buffer towards the board, and close it again."""
     descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     fill(descriptor)
     os.close(descriptor)
@@ -158,7 +160,7 @@ def fill_terminal(path: str) -> None:
 def test_the_board_can_be_left_paused_or_reset(
     start_board: Start, start_driver: Start, probe_of: Start, on_exit: str, mode: BoardMode
 ) -> None:
-    """With ``on_exit`` the driver sends P or R after the stop frame."""
+    """With ``on_exit`` set to pause or reset, the driver sends P or R after the Stop frame."""
     board = start_board()
     driver: Driver = start_driver(board.path, on_exit=on_exit)
     probe_of(driver).wait_for_state("nominal")
@@ -168,7 +170,10 @@ def test_the_board_can_be_left_paused_or_reset(
 
 
 def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Start) -> None:
-    """With a terminal held by ctrl-S or a hung pipe, watchdog, e-stop and SIGTERM still work."""
+    """If the driver's output is not read, command timeout, e-stop and SIGTERM still work.
+
+    Examples are a terminal stopped by ctrl-S, and a pipe whose reader hangs.
+    """
     board = start_board(running=True)
     reading, writing = os.pipe()
     os.set_blocking(writing, False)

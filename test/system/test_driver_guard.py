@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Loss of the host: the driver is killed, crashes or hangs while the robot moves."""
+"""The robot stops if the driver is killed, crashes or hangs while the robot moves."""
 
 import math
 import os
@@ -34,7 +34,7 @@ def twist(vx_mps: float) -> Twist:
 
 
 def driving(probe: Probe, board: PtyBoard) -> Any:
-    """Drive until the robot moves; return the publisher of its commands."""
+    """Publish commands until the robot moves; return the publisher."""
     commands = probe.publisher(Twist, "cmd_vel")
     for _ in range(20):  # a stall of the computer stops the robot
         commands.publish(twist(0.3))
@@ -49,7 +49,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def hang(driver: Driver, board: PtyBoard) -> int:
-    """Suspend the driver; return how many bytes the board has once all have arrived."""
+    """Suspend the driver; return the number of bytes that the board has received from it."""
     driver.process.send_signal(signal.SIGSTOP)
     stat = Path(f"/proc/{driver.process.pid}/stat")
     wait_until(lambda: stat.read_text().rpartition(")")[2].split()[0] == "T")
@@ -59,7 +59,7 @@ def hang(driver: Driver, board: PtyBoard) -> int:
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
-    """Poll the predicate, for processes and log lines, which do not raise events."""
+    """Poll the predicate until it holds; processes and log lines give no event to wait for."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"
@@ -70,7 +70,7 @@ def wait_until(predicate: Callable[[], object]) -> None:
 def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
     board: PtyBoard, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """A dead driver cannot act; the guard stops the robot, without an emergency stop."""
+    """The guard stops the robot of a dead driver, without sending an emergency stop."""
     driving(probe, board)
     assert driver.end(number) == -number
     assert board.wait_for(still, PATIENCE_S)
@@ -82,7 +82,7 @@ def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
 def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The guard continues to send emergency stop and Stop in turn."""
+    """If the driver dies during the e-stop, the guard sends emergency stop and Stop in turn."""
     driving(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
     mark = len(board.board.received)
@@ -98,7 +98,7 @@ def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
 def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
     board: PtyBoard, driver: Driver, probe: Probe, start_driver: Start, probe_of: Start
 ) -> None:
-    """The guard holds the port for at most a second, and the next driver retries."""
+    """A new driver retries until the guard of a killed driver has released the port."""
     driving(probe, board)
     driver.end(signal.SIGKILL)
     successor: Driver = start_driver(board.path)
@@ -110,7 +110,10 @@ def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
 def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """A command that waited in the middleware during the hang is not a fresh one."""
+    """The guard stops the robot of a hanging driver; then only a fresh command moves the robot.
+
+    A command that waited in the middleware during the hang is not fresh.
+    """
     commands = driving(probe, board)
     mark = hang(driver, board)
     assert board.wait_for(lambda b: LAST_WORDS in bytes(b.received[mark:]), PATIENCE_S)
@@ -143,13 +146,19 @@ time.clock_gettime_ns = lambda clock: real(clock) + (
     60_000_000_000 if clock == time.CLOCK_BOOTTIME and os.path.exists({path!r}) else 0
 )
 """
-"""Advances the clock that continues while a host is suspended by 60 s, once the file exists."""
+"""Code that advances CLOCK_BOOTTIME by 60 s once the file ``path`` exists.
+
+CLOCK_BOOTTIME also counts the time for which a host is suspended.
+"""
 
 
 def test_a_robot_is_stopped_when_its_host_was_suspended(
     board: PtyBoard, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The driver's own clock did not advance; its command is discarded until a fresh one."""
+    """After a suspension of its host the driver discards the old command and stops the robot.
+
+    The clock for the command timeout does not advance during a suspension.
+    """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(
         board.path, cmd_vel_timeout=10.0, before=SUSPENDED.format(path=str(resumed))
@@ -167,7 +176,10 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """The stamp may come from a planner that does not know about the hang."""
+    """The driver refuses a command that was sent while it hung, even if the stamp is recent.
+
+    The stamp may come from a planner that does not know about the hang.
+    """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -191,7 +203,7 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
 def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_again(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The probe sends the command again, as the refusal asks for."""
+    """A command that was refused after a hang is obeyed when its sender repeats it."""
     commands = probe.publisher(Twist, "cmd_vel")
     mark = hang(driver, board)
     commands.publish(twist(0.2))
@@ -204,7 +216,7 @@ def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_a
 def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The log reports the death of the first guard."""
+    """The driver logs the death of a guard and starts another one, which also stops the robot."""
     with probe.commanding(0.3):
         (first,) = driver.guards()
         os.kill(first, signal.SIGKILL)
@@ -239,7 +251,7 @@ def test_every_connection_has_one_guard_and_no_process_stays_behind(
 
 
 def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: Probe) -> None:
-    """After ctrl-C the board is not in emergency stop, because none was sent."""
+    """After ctrl-C the driver stops the robot without an emergency stop."""
     driving(probe, board)
     assert driver.end(signal.SIGINT) == 0
     with board.lock:
@@ -248,7 +260,7 @@ def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: P
 
 
 def test_the_guard_can_be_done_without(board: PtyBoard, start_driver: Start) -> None:
-    """``guard: false`` is needed for a debugger, which suspends the driver."""
+    """With ``guard: false``, which is meant for use with a debugger, the driver has no guard."""
     driver: Driver = start_driver(board.path, guard=False)
     driver.wait_for_line("state: nominal")
     assert driver.guards() == []

@@ -30,7 +30,7 @@ HAS_TF2 = importlib.util.find_spec("tf2_ros") is not None
 
 
 class Robot:
-    """One board and one driver for all tests of this module, which leave the robot at rest."""
+    """A board and a driver that the tests of this module share; each test ends at rest."""
 
     def __init__(self, stack: ExitStack, folder: Path) -> None:
         self.file = folder / "calibration.yaml"
@@ -74,7 +74,10 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
 def test_the_gyro_is_calibrated_saved_and_loaded_again(
     robot: Robot, start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """The planted bias is reported, subtracted, saved in the file and set as the parameter."""
+    """The service reports the planted gyro bias, subtracts it, and saves it in the file.
+
+    Another driver loads the bias from the file.
+    """
     planted = [math.radians(value) for value in PLANTED_DPS]
     answer = robot.probe.call(Trigger, "calibrate_gyro")
     assert answer.success, answer.message
@@ -94,7 +97,7 @@ def test_the_gyro_is_calibrated_saved_and_loaded_again(
 
 
 def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot) -> None:
-    """The file is damaged after the start of the driver, and stays as it is."""
+    """If the calibration file is damaged, the bias is applied, and the file is not changed."""
     robot.file.write_text("gyro_bias: [1, 2")
     answer = robot.probe.call(Trigger, "calibrate_gyro")
     assert not answer.success
@@ -107,7 +110,7 @@ def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot)
 def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     tmp_path: Path, start_driver: Callable[..., Driver]
 ) -> None:
-    """The exit code is 2, and the message says what to do."""
+    """For a damaged calibration file the driver says what to do and exits with code 2."""
     path = tmp_path / "robot.yaml"
     path.write_text("gyro_bias: [1, 2")
     driver = start_driver("/dev/null", calibration_file=path)
@@ -118,13 +121,16 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
 def test_the_bias_is_what_was_set_last(
     start_board: Callable[..., PtyBoard], start_driver: Callable[..., Driver], probe_of: Any
 ) -> None:
-    """Standstills have refined it since; the parameter is set to the value that it shows."""
+    """A ``gyro_bias`` that the user sets replaces the bias that the driver has refined at rest.
+
+    That holds even if the parameter already has the new value.
+    """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
     imu = probe.listen(Imu, "imu/data_raw")
 
     def rate() -> float:
-        """Return the mean of the last 20 rates about z, as a part of the planted one."""
+        """Return the mean of the last 20 rates about z, divided by the planted bias."""
         mean = sum(message.angular_velocity.z for message in imu[-20:]) / 20
         return mean / math.radians(PLANTED_DPS[2])
 
@@ -136,7 +142,7 @@ def test_the_bias_is_what_was_set_last(
 
 
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
-    """Order, signs and units of wheel_cmd and joint_states agree, and angles accumulate."""
+    """Order, signs and units of wheel_cmd and joint_states agree, and wheel angles accumulate."""
     joints = robot.probe.listen(JointState, "joint_states")
     commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
     wanted = [4.0, -2.0, 1.0]
@@ -164,10 +170,10 @@ def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
 
 
 def test_diagnostics_come_with_figures(robot: Robot) -> None:
-    """There are seven statuses; the rates match the manual, and frames are not lost."""
+    """The diagnostics have seven statuses, show the expected IMU rate, and count no faults."""
 
     def keeps_pace() -> bool:
-        """Return whether the rate is right; after a stall it is low for a while, then high."""
+        """Return whether the IMU rate is right; after a stall it is at first low, and then high."""
         if (status := robot.status("Stream")) is None:
             return False
         values = {value.key: value.value for value in status.values}
@@ -185,7 +191,7 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
 
 
 def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
-    """The updater has its own period parameter; names, levels and hardware id are the same."""
+    """Where diagnostic_updater is installed, it publishes the driver's diagnostics."""
     pytest.importorskip("diagnostic_updater", exc_type=ImportError)
     period = ["diagnostic_updater.period"]
     values = robot.probe.call(GetParameters, "get_parameters", names=period).values
@@ -195,7 +201,7 @@ def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
 
 
 def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> None:
-    """A missing tf2_ros is a warning, not an error."""
+    """Frame names in odom have the prefix, and the driver warns only once of a missing tf2_ros."""
     odometry = robot.probe.listen(Odometry, "odom")
     robot.probe.wait_for(lambda: odometry)
     assert odometry[-1].header.frame_id == "robot1/odom"
@@ -210,7 +216,7 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 ) -> None:
     """With ``publish_tf: false`` the driver does not warn that tf2_ros is missing.
 
-    It still warns of simulated time on a real port.
+    The driver still warns of simulated time on a real port.
     """
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but the board on /dev/null runs in real time")
@@ -220,7 +226,10 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 def test_measurements_wait_for_simulated_time_and_it_is_said(
     start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """A simulated board waits too; its time differs from that of /clock."""
+    """With ``use_sim_time`` the driver publishes measurements only once /clock has a time.
+
+    That also holds for a simulated board, whose own time differs from /clock.
+    """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)
     imu = probe.listen(Imu, "imu/data_raw")

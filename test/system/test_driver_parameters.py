@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parameters and arguments of the node: rejected at the start, changed while it runs."""
+"""The driver checks its parameters and arguments, at its start and while it runs."""
 
 import os
 import signal
@@ -42,7 +42,7 @@ Start = Callable[..., Any]
 def test_wrong_parameters_end_the_start_with_a_sentence(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """The exit code is 2, and a traceback is not printed."""
+    """For a wrong parameter the driver prints a reason, without a traceback, and exits with 2."""
     driver: Driver = start_driver("/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2
@@ -60,7 +60,7 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     ],
 )
 def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
-    """With ignored arguments, the driver could open another port than the one that was meant."""
+    """The driver does not start with unknown arguments, as it might open the wrong port."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -73,7 +73,7 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
 )
 @pytest.mark.parametrize("before", [[], ["--ros-args"]])
 def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list[str]) -> None:
-    """The message is the same on both sides of ``--ros-args``."""
+    """If ``-p`` is missing before a parameter, the message shows how to write it."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -90,7 +90,7 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 
 @pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
-    """``--help`` works before any library is loaded, with exit code 0."""
+    """``--help`` explains parameters and works without any library, with exit code 0."""
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
@@ -100,7 +100,7 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
 
 
 def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
-    """A pager that is closed early is one example."""
+    """If the reader of the help is gone, such as a pager that was closed, the exit code is 0."""
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-c", WITHOUT_ROS, "--help"]
@@ -110,7 +110,7 @@ def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
 
 
 OPENS_NOTHING = "import serial; serial.serial_for_url = None"
-"""Code that prevents opening a port: if the file is ignored, the default port may be a robot."""
+"""Code that prevents the driver from opening a port, as the default port may lead to a robot."""
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,10 @@ OPENS_NOTHING = "import serial; serial.serial_for_url = None"
 def test_a_parameter_file_for_another_node_is_told(
     start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
 ) -> None:
-    """ROS ignores the file silently, and the driver would open the default port."""
+    """The driver reports a parameter file for another node.
+
+    ROS ignores such a file silently, and the driver would use its default port.
+    """
     path = tmp_path / "driver.yaml"
     path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
     driver: Driver = start_driver(None, before=OPENS_NOTHING, more=["--params-file", str(path)])
@@ -131,7 +134,7 @@ def test_a_parameter_file_for_another_node_is_told(
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:
-    """``max_linear_speed: 1`` in a YAML file is an integer."""
+    """The driver accepts an integer for a real parameter, as in ``max_linear_speed: 1``."""
     board = start_board()
     driver: Driver = start_driver(board.path, max_linear_speed=1)
     driver.wait_for_line("state: nominal")
@@ -149,7 +152,10 @@ def real(value: float) -> ParameterValue:
 def test_tuning_changes_while_running_and_identity_does_not(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The next command has the new scale; another port and values out of range are rejected."""
+    """A new ``linear_scale`` applies to the next command; ``port`` cannot be changed.
+
+    Values out of range are rejected.
+    """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -173,7 +179,7 @@ def test_tuning_changes_while_running_and_identity_does_not(
 def test_the_command_that_is_repeated_is_said_in_a_new_scale(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A new scale takes effect without a new command."""
+    """A new ``linear_scale`` also applies to the command that the driver is repeating."""
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")
@@ -194,7 +200,7 @@ def test_the_command_that_is_repeated_is_said_in_a_new_scale(
 def test_every_parameter_is_described(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """``ros2 param describe`` and rqt show the description, unit and range."""
+    """Every parameter has a description with its unit, and those with limits have a range."""
     probe: Probe = probe_of(start_driver(start_board().path))
     names = [parameter.name for parameter in PARAMETERS.rows]
     descriptors = probe.call(DescribeParameters, "describe_parameters", names=names).descriptors
@@ -210,9 +216,10 @@ def test_every_parameter_is_described(
 def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Either parameter of the pair can cause the refusal; the old value then stays.
+    """A speed limit of commands may not exceed the fastest speed that odometry accepts.
 
-    Both together may be raised beyond the old limit.
+    The driver refuses a change of either parameter that breaks this rule, and keeps the old value.
+    One request may raise both.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ports that are missing, busy, wrong, late, or deliver garbage."""
+"""Ports that are missing, busy or wrong, that appear late, or that deliver garbage."""
 
 import os
 import signal
@@ -22,14 +22,14 @@ Start = Callable[..., Any]
 
 
 def descriptors(driver: Driver) -> int:
-    """Return how many descriptors the driver has open, those that it soon closes included."""
+    """Return how many file descriptors the driver has open, even if it is about to close them."""
     return len(os.listdir(f"/proc/{driver.process.pid}/fd"))
 
 
 def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """A board that is plugged in later is found and started without further action."""
+    """The driver reports a missing port once, and starts a board that is plugged in later."""
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)
     driver.wait_for_line("does not exist.*by-id")
@@ -43,7 +43,7 @@ def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
 def test_an_unplugged_board_is_found_again(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The node continues with another terminal of the same name, without leaking descriptors."""
+    """The driver opens the port of a replugged board, and does not leak file descriptors."""
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):
         driver: Driver = start_driver(str(link), reconnect_interval=0.05)
@@ -64,7 +64,7 @@ def test_an_unplugged_board_is_found_again(
 def test_a_stop_that_cannot_be_sent_is_said_at_the_end(
     start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The board is unplugged while the robot drives, and the driver ends before it is back."""
+    """If the board is unplugged while driving, the last line says that the stop was not sent."""
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)) as board:
         driver: Driver = start_driver(str(link), cmd_vel_timeout=10.0)
@@ -82,7 +82,10 @@ def test_a_stop_that_cannot_be_sent_is_said_at_the_end(
 def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
     start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The reply says that the port is not open; the log says what latched the e-stop."""
+    """With the port closed, ``~/estop`` answers that the stop will be sent once it opens.
+
+    The log says that the service latched the e-stop.
+    """
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):
         driver: Driver = start_driver(str(link), reconnect_interval=0.05)
@@ -97,7 +100,7 @@ def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
 def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
     start_board: Start, start_driver: Start
 ) -> None:
-    """Two drivers would send the robot contradictory commands."""
+    """The second driver says that the port is in use; two drivers would contradict each other."""
     board = start_board()
     first: Driver = start_driver(board.path)
     first.wait_for_line("is open")
@@ -122,7 +125,7 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     start_driver: Start, port: str, reason: str
 ) -> None:
-    """The node keeps trying, and ends normally at SIGINT."""
+    """For an impossible port the driver logs the reason and keeps trying until SIGINT ends it."""
     driver: Driver = start_driver(port)
     driver.wait_for_line(reason)
     assert driver.process.poll() is None
@@ -133,7 +136,7 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
     start_driver: Start, probe_of: Start, silent_port: str, write_to_silent_port: Start
 ) -> None:
-    """A wrong baud rate causes garbage; valid frames after it are published."""
+    """Garbage, such as after a wrong baud rate, is not published; valid frames after it are."""
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     imu = probe.listen(Imu, "imu/data_raw")
@@ -147,7 +150,7 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
 
 
 def test_a_port_that_flaps_is_told_once(start_driver: Start) -> None:
-    """The port is a server that closes each connection at once."""
+    """If a server closes each connection at once, the driver reports the open port only once."""
     server = socket.create_server(("127.0.0.1", 0))
     port = f"socket://127.0.0.1:{server.getsockname()[1]}"
     driver: Driver = start_driver(port, reconnect_interval=0.05)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each service, called by another process, with the board's bytes and modes checked."""
+"""Tests that call each service from another process and check the board's commands and modes."""
 
 import math
 import signal
@@ -31,7 +31,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def drive(probe: Probe, board: PtyBoard) -> None:
-    """Drive forward until the robot moves."""
+    """Publish forward commands until the robot moves."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = 0.3
@@ -43,9 +43,9 @@ def drive(probe: Probe, board: PtyBoard) -> None:
 
 
 def drive_away(probe: Probe, board: PtyBoard) -> None:
-    """Drive, and stop at least 0.1 m away.
+    """Drive forward and stop, again if necessary, until the robot is more than 0.1 m away.
 
-    On a busy computer the robot may stop earlier, so it tries again.
+    On a busy computer the robot may stop earlier.
     """
     for _ in range(20):
         drive(probe, board)
@@ -57,7 +57,7 @@ def drive_away(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
-    """Each one is answered, in the order of the calls; the last one decides."""
+    """A hundred simultaneous calls of ``~/estop`` are all answered, and the last one decides."""
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     answers = [probe.call_async(SetBool, "estop", data=bool(n % 2)) for n in range(100)]
     assert all(answer.wait().success for answer in answers)
@@ -67,7 +67,10 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
 def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     probe: Probe, driver: Driver
 ) -> None:
-    """The driver is stopped meanwhile; a button that is released again publishes false."""
+    """A message true on ``estop`` latches the e-stop even if false follows it at once.
+
+    All messages wait while the driver is suspended. A button publishes false when it is released.
+    """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
     driver.process.send_signal(signal.SIGSTOP)
@@ -79,7 +82,7 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
-    """Each is called twice; P is sent only once, and the board is in the requested mode."""
+    """Repeated calls of ``~/pause`` keep the requested mode; P, which toggles, is sent once."""
     for data, mode in [
         (True, BoardMode.PAUSED),
         (True, BoardMode.PAUSED),
@@ -96,7 +99,7 @@ def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board
 def test_pausing_a_driving_robot_stops_it_first_and_unpausing_does_not_move_it(
     probe: Probe, board: PtyBoard
 ) -> None:
-    """Stop precedes P; after S the robot is at rest until a new command."""
+    """The driver sends Stop before P; after the pause the robot rests until a new command."""
     drive(probe, board)
     assert probe.call(SetBool, "pause", data=True).success
     probe.wait_for_state("paused")
@@ -111,7 +114,7 @@ def test_pausing_a_driving_robot_stops_it_first_and_unpausing_does_not_move_it(
 def test_start_starts_a_board_that_was_left_paused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """With ``auto_start: false`` the driver sends nothing until the service is called."""
+    """With ``auto_start: false`` the driver sends nothing until ``~/start`` is called."""
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, auto_start=False))
     probe.wait_for_state("paused")
@@ -123,7 +126,7 @@ def test_start_starts_a_board_that_was_left_paused(
 
 
 def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: PtyBoard) -> None:
-    """The board's odometry restarts at zero after Stop, R and S; odom continues."""
+    """``~/reset`` sends Stop, R and S; the board's odometry restarts at 0, but odom continues."""
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
     with board.lock:
@@ -142,7 +145,7 @@ def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: P
 
 
 def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBoard) -> None:
-    """A release does not move the robot; only a new command does."""
+    """Releasing the e-stop does not move the robot; only a new command does."""
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     drive(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
@@ -161,7 +164,10 @@ def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBo
 def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """After the release this board ignores commands; the driver names the service that helps."""
+    """If the board ignores commands after an e-stop, the driver recommends ``~/reset``.
+
+    After a reset the robot drives again.
+    """
     board = start_board(estop_latches=True, running=True)
     driver: Driver = start_driver(board.path)
     probe: Probe = probe_of(driver)
@@ -199,7 +205,7 @@ def test_commands_under_estop_are_refused_and_told_what_to_do(
 def test_estop_answers_while_a_reset_waits(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The board takes seconds to restart, and the e-stop must not wait for it."""
+    """``~/estop`` answers at once while ``~/reset`` waits seconds for the board's restart."""
     board = start_board(boot_time_s=4.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -214,7 +220,7 @@ def test_estop_answers_while_a_reset_waits(
 def test_a_second_request_is_refused_while_one_is_under_way(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The message names the request in progress."""
+    """During a reset the driver refuses ``~/pause`` with a message that names the reset."""
     board = start_board(boot_time_s=3.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -228,7 +234,7 @@ def test_a_second_request_is_refused_while_one_is_under_way(
 
 
 def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
-    """The present pose of the robot becomes the origin."""
+    """``~/reset_odometry`` makes the robot's present pose the origin of odom."""
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
     probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.1)
@@ -240,7 +246,7 @@ def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
 def test_services_answer_with_a_reason_when_the_board_is_silent(
     start_driver: Start, probe_of: Start, silent_port: str, kind: type, service: str
 ) -> None:
-    """``success`` is false, and the message says what to check."""
+    """If the board is silent, start and pause fail with a message that says what to check."""
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("connecting")
@@ -250,7 +256,7 @@ def test_services_answer_with_a_reason_when_the_board_is_silent(
 
 
 def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:
-    """Start, pause and reset fail without a board; the e-stop still latches."""
+    """Without a port, start, pause and reset fail at once, but the e-stop still latches."""
     probe: Probe = probe_of(start_driver("/dev/there_is_no_such_port"))
     for kind, service in [(Trigger, "start"), (SetBool, "pause"), (Trigger, "reset")]:
         answer = probe.call(kind, service)
@@ -262,7 +268,7 @@ def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: S
 
 
 def test_the_twist_after_a_pause_is_that_of_the_robot(probe: Probe) -> None:
-    """The twist of a robot at rest is zero after an un-pause, however long the pause was."""
+    """After a pause of any length, the twist of a robot at rest is zero."""
     odometry = probe.listen(Odometry, "odom")
     probe.call(SetBool, "pause", data=True)
     probe.call(SetBool, "pause", data=False)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver publishes, as another process receives it over real DDS."""
+"""Topics of the driver, as another process receives them over real DDS."""
 
 import math
 import struct
@@ -28,7 +28,7 @@ def stamp_s(message: Any) -> float:
 
 
 def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: PtyBoard) -> None:
-    """Three hundred messages have the values that the board sent."""
+    """300 IMU messages have the values of 300 consecutive frames of the board."""
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 300)
     with board.lock:
@@ -56,7 +56,7 @@ def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: Pty
 
 
 def test_imu_messages_follow_rep_145(probe: Probe) -> None:
-    """Messages have covariances, the frame of the sensor and increasing stamps, no orientation."""
+    """IMU messages have covariances, the sensor's frame and rising stamps, but no orientation."""
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 50)
     message = received[0]
@@ -73,7 +73,10 @@ def test_imu_messages_follow_rep_145(probe: Probe) -> None:
 
 
 def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
-    """The rates 100 Hz and 25 Hz are counted by stamps, so a slow computer does not matter."""
+    """Four IMU messages arrive for each odometry message.
+
+    The test counts by timestamps, so a slow computer has no effect.
+    """
     imu, odometry = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
     probe.wait_for(lambda: imu and len(odometry) >= 10)
     first = len(odometry)
@@ -88,7 +91,7 @@ def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
 def test_a_board_at_10_hz_needs_its_delta_period(
     start_board: Start, start_driver: Start, probe_of: Start, told_s: float
 ) -> None:
-    """With the right value the twist is right; with another the driver names the right value."""
+    """With the right ``delta_period`` the twist is right; else the driver names the right value."""
     board: PtyBoard = start_board(running=True, delta_period_s=0.1)
     driver: Driver = start_driver(board.path, delta_period=told_s)
     probe: Probe = probe_of(driver)
@@ -115,7 +118,7 @@ def test_a_board_at_10_hz_needs_its_delta_period(
 
 
 def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
-    """Half a metre to the left shows in pose and twist, with valid covariances."""
+    """A drive of 0.5 m to the left shows in the pose and the twist of odom."""
     odometry = probe.listen(Odometry, "odom")
     commands = probe.publisher(Twist, "cmd_vel")
     probe.wait_for(lambda: odometry)
@@ -146,7 +149,7 @@ def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Start) -> None:
-    """A late subscriber receives the current value."""
+    """A late subscriber to the state topic receives the current state."""
     late: Probe = probe_of(driver)
     states = late.listen(String, "omnibot_driver/state", latched=True)
     late.wait_for(lambda: states)
@@ -156,7 +159,7 @@ def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Star
 def test_an_imu_only_board_is_shown_as_such(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """IMU messages are published, odometry is not."""
+    """For a board that sends only IMU frames, the state is ``imu_only``, and odom is silent."""
     board = start_board(imu_only=True)
     probe: Probe = probe_of(start_driver(board.path))
     imu, odometry = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
@@ -169,7 +172,10 @@ def test_an_imu_only_board_is_shown_as_such(
 def test_frames_of_a_board_that_has_driven_before_begin_at_the_identity(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The board's heading is a quarter turn; driving forward is still along x in odom."""
+    """The driver's odom begins at the identity even if the board's pose begins elsewhere.
+
+    The board's heading begins at 90°; driving forward is still along x in odom.
+    """
     board = start_board(initial_pose=BoardPose(1000.0, 2000.0, 1570.8), running=True)
     probe: Probe = probe_of(start_driver(board.path))
     odometry = probe.listen(Odometry, "odom")

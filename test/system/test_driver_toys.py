@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The interface for boards: two toy boards with the complete driver, on real terminals and sockets.
+"""Two toy boards with the complete driver, on real terminals and sockets.
 
-The driver knows them only by the profile that is registered under a name.
+The toys test the interface for boards: the driver knows them only by profiles that are registered
+under their names.
 """
 
 import os
@@ -36,7 +37,7 @@ ROBOTS: Final = {"line_board": line_robot.LineRobot, "request_board": request_ro
 
 
 class Toy:
-    """A toy board in real time, with the arguments of the driver for it."""
+    """A simulated toy board in real time, and the driver's port parameters for it."""
 
     def __init__(self, name: str, served: "ServedBoard[Any]") -> None:
         self.name, self.served = name, served
@@ -51,7 +52,7 @@ class Toy:
         assert self.served.wait_for(predicate, PATIENCE_S), self.served.board.heard[-20:]
 
     def comes_to_a_stand(self) -> None:
-        """Wait until the robot is at rest for 1.5 s, longer than between two blocking moves."""
+        """Wait until the robot has been at rest for 1.5 s, longer than between blocking moves."""
         ways: deque[float] = deque(maxlen=150)
 
         def stood(robot: Any) -> bool:
@@ -76,14 +77,14 @@ def start_toy(start_driver: Start, toy: Toy, **parameters: object) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, toy: Toy) -> Iterator[None]:
-    """Command the robot at 10 Hz inside the context, which begins when it moves."""
+    """Command the robot at 10 Hz in the context, which begins when the robot moves."""
     with probe.commanding(0.2):
         toy.wait_for(lambda robot: not robot.stands)
         yield
 
 
 def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: Toy) -> None:
-    """The toy obeys cmd_vel, its lines appear in odom, and it stops when commands end."""
+    """A toy robot obeys cmd_vel, its motion shows in odom, and it stops when commands end."""
     probe: Probe = probe_of(start_toy(start_driver, toy))
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for_state("nominal")
@@ -98,7 +99,7 @@ def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: To
 def test_the_estop_stops_a_toy_until_it_is_released(
     start_driver: Start, probe_of: Start, toy: Toy
 ) -> None:
-    """Commands continue to arrive during the e-stop."""
+    """During the e-stop a toy robot stays at rest, although commands continue to arrive."""
     probe: Probe = probe_of(start_toy(start_driver, toy))
     probe.wait_for_state("nominal")
     with driven(probe, toy):
@@ -112,7 +113,7 @@ def test_the_estop_stops_a_toy_until_it_is_released(
 def test_whatever_ends_the_driver_stops_a_toy(
     start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
 ) -> None:
-    """Either the exit of the driver stops it, or the guard on all its lines."""
+    """The driver's exit, or the guard on all lines of the board, stops a toy robot."""
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -125,7 +126,7 @@ def test_whatever_ends_the_driver_stops_a_toy(
 
 
 def test_each_toy_runs_inside_the_driver_too(start_driver: Start, probe_of: Start) -> None:
-    """The port ``sim://`` selects the board's own simulator."""
+    """With the port ``sim://`` the driver runs the simulator of each toy board."""
     for name in ROBOTS:
         driver = start_driver("sim://", before=TOYS, board=name)
         probe: Probe = probe_of(driver)
@@ -151,7 +152,7 @@ def test_wheels_have_the_boards_number_and_names(
 def test_the_raw_bytes_of_each_line_have_a_topic(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The topics are named after the lines."""
+    """With ``publish_raw`` each line of a board has raw topics of its own, named after the line."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     probe: Probe = probe_of(start_toy(start_driver, toy, publish_raw=True))
     told = probe.listen(UInt8MultiArray, "omnibot_driver/raw_rx/sense")
@@ -168,7 +169,7 @@ def test_the_raw_bytes_of_each_line_have_a_topic(
 def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The driver is killed, and the guard stops the half that is connected."""
+    """The driver names the missing line; when the driver dies, its guard stops the other half."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"
     driver = start_toy(start_driver, toy)
@@ -185,7 +186,7 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
 
 
 def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """A server does not exist at that UDP address."""
+    """The driver reports missing data if no server exists at its UDP address."""
     driver = start_driver("udp://127.0.0.1:9", before=TOYS, board="request_board")
     driver.wait_for_line("no data from the board for 1.5 s")
 
@@ -193,7 +194,7 @@ def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
 def test_a_line_that_is_lost_leaves_the_robot_standing(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The stop is repeated on the line that remains."""
+    """If a line is lost while driving, the driver repeats the stop on the line that remains."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     far, near = os.openpty()
     stack.callback(os.close, near)

@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool
 
 @dataclass
 class Robot:
-    """A driver on a simulated board of its own, with what its probe has received."""
+    """A driver on its own simulated board, with the messages that its probe has received."""
 
     name: str
     probe: Probe
@@ -28,7 +28,7 @@ class Robot:
     estop_active: list[Any]
 
     def heard(self) -> bool:
-        """Return whether each topic has had a message."""
+        """Return whether the probe has received a message on each topic."""
         return bool(self.imu and self.odom and self.estop_active)
 
     @property
@@ -65,7 +65,7 @@ def fleet() -> Iterator[list[Robot]]:
 
 
 def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
-    """Frames are not shared, so one transform tree can hold all robots."""
+    """Each robot has frames of its own, so one transform tree can hold all robots."""
     for seed, robot in enumerate(fleet):
         assert robot.imu[-1].header.frame_id == f"r{seed}/imu_frame"
         assert robot.odom[-1].header.frame_id == f"r{seed}/odom_frame"
@@ -73,7 +73,7 @@ def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
 
 
 def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
-    """The first robot drives forward, the second backward, the third stays at rest."""
+    """One robot drives forward, another one backward, and the third one stays at rest."""
     forward, still, backward = fleet
     speeds = {forward.name: 0.3, backward.name: -0.3}
     publishers = {
@@ -106,7 +106,7 @@ def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
 
 
 def test_two_drivers_of_one_name_report_each_other() -> None:
-    """Both drivers report it, whichever started first."""
+    """Of two drivers with the same name, each reports the other, whichever started first."""
     with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
         for driver in (first, second):
             driver.wait_for_line(f"another node has the name /{first.namespace}/omnibot_driver,")

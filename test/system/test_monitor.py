@@ -37,10 +37,10 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
-    """Press a key until the robot drives and ``said`` has the motion of this press.
+    """Press the key w, again if necessary, until the robot drives and ``said`` has its command.
 
-    After a stall of the computer a key may be taken for one that waited, and the monitor may
-    discover other subscribers later than the driver.
+    After a stall of the computer the monitor may discard a key press as outdated. It may also
+    discover the driver earlier than the subscription of the test.
     """
     for _ in range(20):
         said.clear()
@@ -52,7 +52,7 @@ def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
 
 
 def wait_for_ticks(board: PtyBoard, ticks: int) -> None:
-    """Wait for this many ticks of the board's own time, 10 ms each."""
+    """Wait for this number of the board's ticks, which are 10 ms of the board's time each."""
     until = board.board.tick + ticks
     assert board.wait_for(lambda b: b.tick >= until, PATIENCE_S)
 
@@ -70,7 +70,7 @@ def monitor_of(stack: ExitStack) -> Callable[..., PseudoTerminal]:
 def test_a_snapshot_in_a_pipe_tells_what_is_so(
     probe: Probe, driver: Driver, board: PtyBoard, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """After half a metre to the left, the JSON has the true pose, the rates and the state."""
+    """After a drive of 0.5 m to the left, the monitor's JSON has the true pose, rates and state."""
     odometry = probe.listen(Odometry, "odom")
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -102,7 +102,7 @@ def test_a_snapshot_in_a_pipe_tells_what_is_so(
 def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The board receives the e-stop and the screen shows it; R and y release it."""
+    """The space bar sends the e-stop, and the screen shows it; the keys R and y release it."""
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     terminal.type(" ")
@@ -120,7 +120,10 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """A single press sends a motion, a few zeros, then nothing. Quitting sends zero again."""
+    """A single key press sends a motion, then a few zero commands, then nothing.
+
+    Quitting the monitor sends another zero command.
+    """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
     terminal.wait_for("0.15 m/s")
@@ -145,9 +148,9 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """The monitor is killed, or its window is closed, while the key of a motion is held.
+    """A monitor that ends by SIGTERM, or whose window is closed, stops the robot.
 
-    The commands are stamped.
+    Until then a key is held and moves the robot. The commands are stamped.
     """
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
@@ -168,7 +171,10 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 def test_keys_pressed_while_it_was_suspended_move_nothing(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The driver stops the robot, which stays at rest when the monitor continues."""
+    """Keys that are pressed while the monitor is suspended do not move the robot later.
+
+    The driver stops the robot during the suspension.
+    """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
     terminal.wait_for("0.15 m/s")
@@ -190,9 +196,9 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """After SIGSTOP the monitor cannot restore the terminal.
+    """After SIGSTOP and SIGCONT the monitor still ends with q and restores the terminal.
 
-    After SIGCONT, q still ends the monitor.
+    At SIGSTOP the monitor has no chance to restore the terminal.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the monitor reports as missing or wrong: one sentence, and an exit code."""
+"""The monitor reports what is missing or wrong by a sentence and an exit code."""
 
 import json
 import math
@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def fake(stack: ExitStack) -> Probe:
-    """A fake driver, which repeats that it is nominal and publishes nothing else."""
+    """A fake driver that repeats the state nominal and publishes no measurements."""
     probe = stack.enter_context(Probe("fake"))
     estop = probe.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
     estop.publish(Bool(data=False))
@@ -39,16 +39,16 @@ def fake(stack: ExitStack) -> Probe:
 
 
 def measure(fake: Probe, odometry: Odometry) -> None:
-    """Publish this odometry and IMU readings at 50 Hz, as a driver does."""
+    """Let the fake driver publish this odometry and empty IMU messages at 50 Hz."""
     for topic, message in (("odom", odometry), ("imu/data_raw", Imu())):
         publisher = fake.node.create_publisher(type(message), topic, 10)
         fake.node.create_timer(0.02, partial(publisher.publish, message))
 
 
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
-    """The e-stop is repeated on the topic until the driver shows the latch.
+    """Without the service ``~/estop`` the monitor repeats the e-stop on the topic ``estop``.
 
-    The service is missing.
+    It repeats the message until the driver reports a latched e-stop.
     """
     said = fake.listen(Bool, "estop")
     feed = Feed([], "fake", "omnibot_driver")
@@ -75,7 +75,7 @@ def sentence(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_without_a_driver_one_sentence_says_how_to_start_one(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The message names the domain that was searched."""
+    """If no driver runs, the message names the ROS domain and says how to start a driver."""
     monkeypatch.setenv("ROS_DOMAIN_ID", "100")
     said = sentence(capsys, "--once", "--timeout", "1")
     assert "no driver is running in ROS domain 100: start one" in said
@@ -84,14 +84,14 @@ def test_without_a_driver_one_sentence_says_how_to_start_one(
 def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
     fake: Probe, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The message has the option for the first of them; a trailing slash is ignored."""
+    """For a wrong namespace the message names the running drivers, and the option for the first."""
     said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
     assert "no driver /elsewhere/omnibot_driver here, but /fake/omnibot_driver" in said
     assert said.endswith("try --namespace /fake")
 
 
 def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """All other data is still printed."""
+    """The monitor names topics without messages, and prints all other data."""
     assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
     output = capsys.readouterr()
     assert output.out.startswith("/fake/omnibot_driver  nominal")
@@ -99,7 +99,7 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
 
 
 def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """The output would mix both drivers, and both would obey commands."""
+    """The monitor reports two drivers of one name, because its output would mix both."""
     fake.node.create_publisher(String, "omnibot_driver/state", LATCHED)
     measure(fake, Odometry())
     assert main(["--once", "--namespace", "fake"]) == 1
@@ -107,7 +107,7 @@ def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFix
 
 
 def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """The value is printed as nan, and one sentence names its fields."""
+    """The monitor prints NaN as nan, and one sentence names the fields with NaN."""
     bad = Odometry()
     bad.pose.pose.position.x = bad.twist.twist.linear.y = float("nan")
     measure(fake, bad)
@@ -118,7 +118,7 @@ def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str])
 
 
 def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """Both quaternions of a rotation give 145° to the left, not 215° to the right."""
+    """A turn of 145° to the left is shown as such even if its quaternion has a negative w."""
     odometry = Odometry()
     turn = odometry.pose.pose.orientation
     turn.z, turn.w = -math.sin(math.radians(72.5)), -math.cos(math.radians(72.5))
@@ -129,12 +129,12 @@ def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixt
 
 
 def test_a_pipe_cannot_steer(capsys: pytest.CaptureFixture[str]) -> None:
-    """A pipe does not deliver key presses."""
+    """Without a terminal ``--teleop`` is refused, as a pipe does not deliver key presses."""
     assert "--teleop needs a terminal" in sentence(capsys, "--teleop")
 
 
 def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """The output is that of --once, and one sentence says so."""
+    """Without a terminal the monitor prints one snapshot, as with ``--once``, and says so."""
     measure(fake, Odometry())
     assert main(["--namespace", "fake"]) == 0
     output = capsys.readouterr()
@@ -152,13 +152,13 @@ def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str])
 def test_names_that_are_none_are_refused(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The message is a sentence, not a traceback."""
+    """An invalid name or ROS argument gives a message and exit code 1, not a traceback."""
     assert main(arguments) == 1
     assert said in capsys.readouterr().err
 
 
 def test_without_ros_one_sentence_says_so() -> None:
-    """A Python without site-packages lacks rclpy: exit code 1, without a traceback."""
+    """In a Python without rclpy the monitor prints one line and exits with code 1."""
     command = [sys.executable, "-ES", "-m", "omnibot_driver.tools.monitor", "--once"]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=20.0)
     assert ended.returncode == 1
@@ -168,7 +168,7 @@ def test_without_ros_one_sentence_says_so() -> None:
 
 @pytest.mark.parametrize("wrong", [["--timeout", "0"], ["--teleop", "--once"], ["--nonsense"]])
 def test_wrong_usage_has_exit_code_2(wrong: list[str], capsys: Any) -> None:
-    """The message shows the usage."""
+    """After wrong arguments the monitor shows its usage and exits with code 2."""
     with pytest.raises(SystemExit) as ended:
         main(wrong)
     assert ended.value.code == 2

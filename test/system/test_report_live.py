@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The report of a running driver, and its message if a driver is missing."""
+"""The report on a running driver, and its message if no driver runs."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ def test_a_running_robot_is_listened_to(
     start_driver: Callable[..., Driver],
     probe_of: Callable[[Driver], Probe],
 ) -> None:
-    """The driver is found without options; verdict and pictures are those of a bag."""
+    """``report --live`` finds the driver, and gives the same findings and pictures as for a bag."""
     driver = start_driver("sim://?seed=1")
     probe_of(driver).wait_for_state("nominal")
     done = report(tmp_path / "out", "--live", "2")
@@ -40,7 +40,7 @@ def test_a_running_robot_is_listened_to(
 
 
 def test_without_a_driver_it_says_so(tmp_path: Path) -> None:
-    """The report prints one sentence and writes no files."""
+    """Without a driver ``report --live`` prints one sentence and writes no files."""
     done = report(tmp_path / "out", "--live", "3", "--namespace", "absent")
     assert done.returncode == 1
     assert done.stderr.startswith("report: no driver was heard")

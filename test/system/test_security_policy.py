@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""config/omnibot.policy.xml against SROS2's schema 0.2.0, and against the running node."""
+"""Compare config/omnibot.policy.xml with SROS2's schema 0.2.0 and with the running driver."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -36,7 +36,7 @@ QUALIFIERS: Final = {
 MOVES_OR_STOPS: Final = ("/cmd_vel", "/wheel_cmd", "/cmd_pose", "/estop")
 
 Rules = dict[str, set[str]]
-"""The names that a profile allows, by qualifier."""
+"""Names that a profile allows, by qualifier, such as ``publish``."""
 
 
 def profiles() -> dict[str, Element]:
@@ -46,9 +46,9 @@ def profiles() -> dict[str, Element]:
 
 
 def allowed(profile: Element) -> Rules:
-    """Return the names that a profile allows, expanded as SROS2 does it.
+    """Return the full names that a profile allows, as SROS2 expands them.
 
-    ``~`` is the node, and a relative name is in the namespace.
+    ``~`` stands for the node, and a relative name is in the namespace of the profile.
     """
     namespace = profile.attrib["ns"].rstrip("/")
     found: Rules = {"publish": set(), "subscribe": set(), "reply": set(), "request": set()}
@@ -64,7 +64,7 @@ def allowed(profile: Element) -> Rules:
 
 
 def test_the_policy_keeps_to_the_schema() -> None:
-    """Elements are at allowed places, with exactly the required attributes and qualifiers."""
+    """Elements and attributes of the policy are those that the schema of SROS2 allows."""
     root = ElementTree.parse(POLICY).getroot()
     assert root.tag == "policy"
     assert root.attrib == {"version": "0.2.0"}
@@ -86,7 +86,7 @@ def test_the_policy_keeps_to_the_schema() -> None:
 def test_the_driver_may_do_what_it_does_and_nothing_else(
     probe_of: Callable[[Driver], Probe], driver: Driver
 ) -> None:
-    """The rules equal the topics and services of the node in the ROS graph."""
+    """The policy allows exactly the topics and services that the driver has in the ROS graph."""
     probe = probe_of(driver)
     probe.listen(Imu, "imu/data_raw")  # each message is an occasion to look at the graph again
     expected = allowed(profiles()["/omnibot/driver"])
@@ -103,7 +103,7 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def seen(graph: Node, home: str) -> Rules:
-    """Return what the driver does, according to the ROS graph."""
+    """Return the names that the driver uses according to the ROS graph, by qualifier."""
 
     def names(found: list[tuple[str, list[str]]]) -> set[str]:
         return {name.removeprefix(home) for name, _ in found}
@@ -120,7 +120,7 @@ def seen(graph: Node, home: str) -> Rules:
 
 @pytest.mark.parametrize("enclave", sorted(set(profiles()) - {"/omnibot/driver"}))
 def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: str) -> None:
-    """A name that is removed from the driver must be removed from the policy."""
+    """Other enclaves may use only the topics and services that the driver has."""
     driver, other = allowed(profiles()["/omnibot/driver"]), allowed(profiles()[enclave])
     everywhere = {"/rosout", "/parameter_events", "/clock"}
     assert other["publish"] <= driver["subscribe"] | everywhere
@@ -130,7 +130,7 @@ def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: s
 
 
 def test_only_named_enclaves_may_move_stop_or_release_the_robot() -> None:
-    """The expected table lists the enclaves for each command topic."""
+    """Only the expected enclaves may publish commands, and only the operator may call services."""
     rules = {path: allowed(profile) for path, profile in profiles().items()}
     who = {
         name: {path for path, rule in rules.items() if name in rule["publish"]}

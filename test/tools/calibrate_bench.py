@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot in simulated time for calibrations: session and board on a bench, without a node."""
+"""A robot for calibrations in simulated time: a session and a board, without a ROS node."""
 
 from collections.abc import Callable
 from typing import Any

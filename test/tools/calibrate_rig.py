@@ -34,7 +34,7 @@ def yes(_question: str) -> str:
 
 @dataclass
 class Rig:
-    """A simulated board and its driver; calibrations of them write their files to ``folder``."""
+    """A simulated board with a driver; calibrations write their files to ``folder``."""
 
     port: PtyBoard
     driver: Driver
@@ -56,7 +56,7 @@ class Rig:
         return main([*words, *files, "--namespace", self.driver.namespace], read)
 
     def written(self) -> dict[str, Any]:
-        """Return the content of the written file."""
+        """Return the content of the calibration file that was written."""
         content: dict[str, Any] = yaml.safe_load(self.output.read_text())
         return content
 
@@ -79,7 +79,7 @@ def rig(
 
 @contextmanager
 def robot_of(driver: Driver) -> Iterator[Robot]:
-    """Yield the robot as a calibration sees it through this driver."""
+    """Connect to the driver as a calibration does; yield the ``Robot`` of the calibration."""
     with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
         yield robot
 
@@ -91,7 +91,7 @@ def parameters_of(driver: Driver) -> dict[str, Any]:
 
 
 def row(table: str, name: str) -> tuple[float, float]:
-    """Return value and uncertainty (NaN if it is empty) from a row of a printed table."""
+    """Return value and uncertainty, NaN if empty, from the row ``name`` of a printed table."""
     found = re.search(rf"^[│ ]*{re.escape(name)} *│ *(\S+) *│ *(\S*) *│", table, re.MULTILINE)
     assert found, f"no row {name!r} in:\n{table}"
     return float(found[1]), float(found[2] or math.nan)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fixtures: one robot for all tests of a module, and a calibration's connection to it."""
+"""Fixtures: a simulated robot for each test module, and a calibration's connection to it."""
 
 from collections.abc import Iterator
 

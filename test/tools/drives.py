@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 def message(kind: str, *values: Any) -> Any:
-    """Return a ROS message made of its fields in order; nested messages are tuples."""
+    """Return a ROS message with these field values in order; tuples stand for nested messages."""
     fields = TYPES.fielddefs[kind][1]
     filled = []
     for (_, (node, detail)), value in zip(fields, values, strict=True):
@@ -50,7 +50,7 @@ class Topic:
         return Series(arrived_s[order], self.stamp_s[order], self.values[order])
 
     def drop(self, begin_s: float, end_s: float) -> None:
-        """Remove the messages sampled between these times, in s, as if they were lost."""
+        """Remove messages with timestamps between these times, in s, as if they had been lost."""
         kept = (self.stamp_s < begin_s) | (self.stamp_s >= end_s)
         self.stamp_s, self.late_s = self.stamp_s[kept], self.late_s[kept]
         self.values = self.values[kept]

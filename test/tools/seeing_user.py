@@ -5,11 +5,11 @@
 from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
-"""Number of control ticks that an answer is based on: the end of a jog and the halt after it."""
+"""Number of control ticks that the user looks at: the end of a motion and the halt after it."""
 
 
 class User:
-    """A user who answers by the true motion of the wheels, after giving the ``wrong`` answers."""
+    """A user who first gives the ``wrong`` answers, then answers by the wheels' true motion."""
 
     def __init__(self, port: PtyBoard, *wrong: str) -> None:
         self._port, self._wrong = port, list(wrong)

@@ -24,7 +24,7 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The tool ends with exit code 1; a trailing slash in the namespace is ignored."""
+    """In a wrong namespace the tool names the drivers that run, and returns exit code 1."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
     said = capsys.readouterr().err
@@ -33,7 +33,7 @@ def test_a_wrong_namespace_names_the_drivers_there_are(
 
 
 def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) -> None:
-    """Two drivers may have the same name and would both obey, so not one command is sent."""
+    """If two drivers have the same name, the tool sends no command, as both would obey."""
     before = len(rigged.port.board.commands)
     twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
     assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
@@ -46,7 +46,7 @@ def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) ->
 def test_a_driver_of_another_version_is_told(
     rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The driver does not know one of this tool's parameters."""
+    """If the driver lacks one of the tool's parameters, the message says that versions differ."""
     newer = Parameter("of_tomorrow", 1, "", "")
     table = replace(PARAMETERS, sections={**PARAMETERS.sections, "New": (newer,)})
     monkeypatch.setattr(omnibot, "PARAMETERS", table)

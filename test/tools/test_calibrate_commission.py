@@ -38,9 +38,10 @@ def told(capsys: pytest.CaptureFixture[str]) -> str:
 def test_the_whole_walk_finds_what_was_planted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The axis signs, the frame of the deltas and the IMU's mounting are found.
+    """``calibrate commission`` finds the planted axis signs, delta frame and IMU mounting.
 
-    An impossible answer is explained and the question repeated; the driver loads the written file.
+    The tool explains an impossible answer and repeats the question. A driver loads the written
+    file.
     """
     with rig(
         tmp_path,
@@ -80,7 +81,7 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_switch_and_deltas_are_told_by_the_data(
     planted: dict[str, Any], found: dict[str, str], tmp_path: Path
 ) -> None:
-    """The robot's odometry shows the directions, so the user is not asked."""
+    """The tool finds the control method and the meaning of the deltas from odometry alone."""
     with rig(tmp_path, **planted) as robot:
         assert robot.calibrate("commission", "--only", "board") == 0
         assert robot.written().items() >= found.items()
@@ -96,7 +97,7 @@ class Deaf:
 
 
 def walk(*answers: str) -> Found:
-    """Run the part on wheels and axes with these answers; return what it finds."""
+    """Run the part of the walk on wheels and axes with these answers; return its findings."""
     left = list(answers)
     found = Found(before=Deaf.parameters)
     commission.Walk(Deaf(), Console(read=lambda _question: left.pop(0))).wheels(found)
@@ -107,7 +108,10 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The answer r repeats the motion; an invalid answer repeats the question."""
+    """The tool finds that one axis is reversed, and notes that the signs mirror the robot.
+
+    The answer r repeats the motion, and an invalid answer repeats the question.
+    """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)
     assert "Please answer with three of + - 0" in told(capsys)
@@ -115,14 +119,17 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
 
 
 def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
-    """The axis signs correct cmd_vel and odom; a note names the topics that stay reversed."""
+    """If all wheels are reversed, the axis signs correct cmd_vel and odom.
+
+    A note names wheel_cmd and joint_states, which stay reversed.
+    """
     found = walk("-00", "0-0", "00-", "+-0", "++-", "+++")
     assert found.axis_signs == (-1, -1, -1)
     assert any("wheel_cmd and joint_states stay" in note for note in result_of(found).notes)
 
 
 def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
-    """The error names the wheel, as its wiring has to be corrected."""
+    """If a single wheel is reversed, the error names the wheel, whose wiring must be corrected."""
     with pytest.raises(ToolError, match="wheel B turns in the opposite direction to the other two"):
         walk("+00", "0-0", "00+")
 
@@ -134,7 +141,7 @@ def test_repeated_contradictory_answers_refer_to_the_documentation() -> None:
 
 
 def test_a_board_on_positional_control_leaves_the_axes_out() -> None:
-    """Positional control prevents a look at the axes, but the wheels are still checked."""
+    """Under positional control the tool checks the wheels, but it cannot check the axes."""
     found = Found(before=Deaf.parameters, control_method="position")
     answers = ["+00", "0+0", "00+"]
     commission.Walk(Deaf(), Console(read=lambda _question: answers.pop(0))).wheels(found)

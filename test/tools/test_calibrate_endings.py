@@ -74,7 +74,7 @@ def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
     draw: Callable[[Any], None], ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The result is saved nevertheless, and the error message says so."""
+    """If the picture cannot be drawn, the result is still saved, and the error says so."""
     assert ending(draw=draw) == 1
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     said = capsys.readouterr()
@@ -85,7 +85,7 @@ def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
 def test_a_file_that_cannot_be_written_costs_the_file_alone(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The table is printed nevertheless, so that the user can copy the values."""
+    """If the file cannot be written, the table is still printed, so the user can copy values."""
     assert ending(found={"linear_scale": 1e9}) == 1
     assert not (tmp_path / "robot.yaml").exists()
     said = capsys.readouterr()
@@ -108,7 +108,7 @@ def test_a_broken_pipe_loses_nothing(
 def test_what_is_to_be_copied_stands_on_one_line(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A shell reads a long path that is broken over two lines as two arguments."""
+    """Text for copying is not wrapped, since a shell would read a wrapped path as two arguments."""
     folder = tmp_path / ("a_long_name_" * 12)
     assert ending(folder=folder) == 0
     assert f"  -p calibration_file:={folder}/robot.yaml" in capsys.readouterr().out.splitlines()

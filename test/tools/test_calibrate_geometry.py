@@ -38,9 +38,9 @@ def arguments(*words: str) -> argparse.Namespace:
 
 
 def paths() -> list[tuple[str, Column, bool]]:
-    """Return name and path of each drive, and whether its heading is what is measured.
+    """Return for each drive its name, its odometry path, and whether the heading is measured.
 
-    The odometry goes exactly through the places of every drive.
+    The odometry goes exactly through the places of the drive.
     """
     found = []
     for drive in geometry.plan(1.0, 3, squares=True):
@@ -56,7 +56,7 @@ def paths() -> list[tuple[str, Column, bool]]:
 
 
 def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
-    """Return noisy tape readings of a slipping robot; its true sizes are these factors."""
+    """Return noisy tape readings of a slipping robot whose sizes are ``factors`` and ``base``."""
     made = []
     for name, path, heading in paths():
         rims = np.abs(rims_of(path, BASE_M))
@@ -78,7 +78,7 @@ unlike = st.floats(-0.01, 0.01)
 def test_any_geometry_is_found_within_what_is_claimed(
     wheels: float, base: float, a: float, b: float, seed: int
 ) -> None:
-    """Wheel size, base size and wheel differences are within five claimed standard deviations."""
+    """The fit finds wheel size, base size and wheel differences within five claimed sigmas."""
     factors = wheels * (1 + np.array([a, b, -a - b]))
     found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M, DRIFT)
     wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
@@ -89,7 +89,10 @@ def test_any_geometry_is_found_within_what_is_claimed(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """For 60 slipping robots the errors over the claims have a standard deviation near 1."""
+    """Errors divided by claimed uncertainties have a standard deviation near 1.
+
+    The test fits 60 slipping robots.
+    """
     scores = []
     for seed in range(60):
         random = np.random.default_rng(seed)
@@ -101,20 +104,20 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 @given(st.integers(0, 3))
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
-    """The path is the same wherever the odometry starts."""
+    """``rolled`` with the believed sizes returns the path itself, relative to its start."""
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)
 
 
 def test_a_square_comes_back() -> None:
-    """The square ends where it began, one full turn further to the left or to the right."""
+    """A square path ends where it began, with one full turn to the left or to the right."""
     for sign in (1, -1):
         last = square(1.0, sign)[-1]
         assert (last.x_m, last.y_m, last.yaw_rad) == pytest.approx((0, 0, sign * math.tau))
 
 
 def test_readings_with_a_wrong_sign_are_turned_away() -> None:
-    """Without this check the readings would give an impossible robot."""
+    """Readings with a wrong sign are rejected, as they would give an impossible robot."""
     wrong = readings(PERFECT, 1.0, np.random.default_rng(0))
     for one in wrong[2:4]:
         one.end[:2] *= -1
@@ -129,10 +132,10 @@ def test_readings_with_a_wrong_sign_are_turned_away() -> None:
 def test_planted_sizes_are_found_on_the_simulated_robot(
     factors: tuple[float, float, float], base: float, slip: float
 ) -> None:
-    """The complete calibration runs in simulated time.
+    """``calibrate geometry`` finds the planted sizes of a robot in simulated time.
 
-    Slip shortens every distance as a smaller wheel does. The driver's own sizes have no effect, as
-    the board computes the odometry with its own.
+    Slip shortens every distance as a smaller wheel does. The sizes in the driver's parameters have
+    no effect, because the board computes its odometry with sizes of its own.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}
@@ -169,7 +172,7 @@ def test_sizes_that_were_found_are_those_believed_next_time() -> None:
 def test_planted_sizes_are_found_through_a_driver_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A real driver makes the drives in real time, and ``--apply`` sets its parameters."""
+    """``calibrate geometry`` finds planted sizes through a real driver; ``--apply`` sets them."""
     quick = {"max_angular_speed": 1.5}
     planted: dict[str, Any] = {"wheel_radius_scale": (1.04,) * 3, "base_radius_scale": 0.97}
     with rig(tmp_path, quick, **planted) as robot:

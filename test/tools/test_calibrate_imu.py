@@ -27,7 +27,7 @@ UPSIDE_DOWN = np.array([0.0, 0.0, -9.80665])
 
 
 def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost: int = 0) -> Imu:
-    """Return readings with white noise about a bias and a force; ``lost`` of them are missing."""
+    """Return IMU readings with bias, force and white noise, of which ``lost`` are missing."""
     random = np.random.default_rng(seed)
     count = round(seconds / PERIOD_S)
     rates = BIAS + NOISE * random.standard_normal((count, 3))
@@ -38,7 +38,7 @@ def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost:
 
 
 def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
-    """Return a log of these readings, with an odometry that moves by ``moved_m`` in all."""
+    """Return a log of these IMU readings, with an odometry that moves by ``moved_m`` in total."""
     rows = np.column_stack((imu.stamp_s, imu.force_mps2, imu.rate_radps))
     way = np.linspace(0.0, moved_m, len(rows) // 4)
     odometry = [(4 * n * PERIOD_S, x, 0.0, 0.0, 0.0, 0.0, 0.0) for n, x in enumerate(way)]
@@ -46,7 +46,10 @@ def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """For 200 rests the bias errors over the claims have a standard deviation near 1."""
+    """Errors of the bias divided by claimed uncertainties have a standard deviation near 1.
+
+    The test uses 200 simulated rests.
+    """
     rests = [rest(sensor(20.0, seed)) for seed in range(200)]
     biases = np.array([(one.bias_radps - BIAS) / one.bias_sigma for one in rests])
     assert 0.7 < biases.std() < 1.1
@@ -62,7 +65,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 def test_level_is_the_turn_that_makes_gravity_point_up(
     roll: float, pitch: float, mounting: float
 ) -> None:
-    """The result is compared with a rotation matrix of fixed-axis angles, written out here."""
+    """Roll and pitch found at rest agree with the rotation matrix that is written out here."""
     roll += mounting
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     to_body = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
@@ -74,7 +77,7 @@ def test_level_is_the_turn_that_makes_gravity_point_up(
 
 
 def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
-    """The data are an hour at 10 Hz: a random walk plus white noise."""
+    """The Allan deviation gives the noise density and the random walk of an hour of readings."""
     random = np.random.default_rng(3)
     walk, density = 2e-5, 5e-4
     count, period_s = 36_000, 0.1
@@ -86,7 +89,7 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
 
 
 def test_a_bias_that_walks_is_known_less_well() -> None:
-    """The claimed uncertainty covers the bias at the end of a rest of ten minutes."""
+    """The claimed uncertainty of a drifting bias covers its value after a rest of ten minutes."""
     scores = []
     for seed in range(12):
         imu = sensor(600.0, seed)
@@ -99,7 +102,10 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 
 
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
-    """Noise does not compress, so fewer points are drawn to keep the file below 170 kB."""
+    """The picture of a long rest is smaller than 170 kB.
+
+    Noise does not compress, so the picture shows fewer points than were measured.
+    """
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"
     now = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
@@ -124,7 +130,7 @@ def test_readings_that_say_nothing_are_turned_away() -> None:
 
 
 def test_a_robot_that_moves_is_not_at_rest() -> None:
-    """Motion shows in the odometry, or as a gyro rate that is larger than any bias."""
+    """The tool rejects a rest in which odometry moves or the gyro rate exceeds any bias."""
     still(np.zeros(3))(log_of(sensor(3.0)))
     with pytest.raises(ToolError, match="its wheels turn"):
         still(np.zeros(3))(log_of(sensor(3.0), moved_m=0.02))
@@ -135,7 +141,10 @@ def test_a_robot_that_moves_is_not_at_rest() -> None:
 def test_planted_errors_are_found_and_the_driver_loads_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Bias, noise, tilt and gravity are found through serial line and driver in four seconds."""
+    """In 4 s ``calibrate imu`` finds bias, noise, tilt and gravity through a real driver.
+
+    Another driver loads the written file.
+    """
     planted = (1.2, -0.8, 0.4)
     sensor = {
         "gyro_bias_dps": planted,

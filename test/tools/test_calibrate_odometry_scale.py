@@ -63,7 +63,7 @@ def arguments(subcommand: str, *words: str) -> argparse.Namespace:
 
 
 def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
-    """Return a user with an exact tape who misreads the last line by ``misread_mm``."""
+    """Return a console whose user measures exactly, but adds ``misread_mm`` to the last line."""
     marks = [drive.wanted for drive in plan(1.0, 3)]
     asked = 0
 
@@ -82,7 +82,7 @@ def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
 @pytest.mark.parametrize("subcommand", [geometry, scale])
 @pytest.mark.parametrize("before", [1.0, 1.2])
 def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
-    """The driver's present scale has no effect, and both subcommands do the same."""
+    """Both subcommands find the true scales, whatever ``odom_linear_scale`` was before."""
     robot = TwoWheels(odom_linear_scale=before)
     name = subcommand.__name__.rpartition(".")[2]
     found = subcommand.run(robot, answers(robot), arguments(name))
@@ -107,7 +107,10 @@ class Encoder(TwoWheels):
 
 
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
-    """Two measured lines are enough: this driver does not have factors for its odometry."""
+    """For a driver with ``metres_per_count`` the tool finds this value and ``linear_scale``.
+
+    The user measures only two lines, as this driver has no scales for its odometry.
+    """
     robot = Encoder()
     console = Console(
         yes=False,
@@ -128,7 +131,10 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
 def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
     shown: str, found: dict[str, float]
 ) -> None:
-    """Before a drive forward has shown it, the parameter keeps its value."""
+    """The tool writes the motor balance that the driver has measured, unless it is unknown.
+
+    The balance is unknown before a drive forward.
+    """
     robot = Encoder(motor_balance=1.0)
     robot.diagnosed = {"Motor balance": shown}.__getitem__
     console = Console(
@@ -140,7 +146,7 @@ def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
 
 
 def test_a_line_that_was_misread_is_told() -> None:
-    """A note says that two equal lines differ by more than the tape's uncertainty."""
+    """After a misread line a note says that two lines of equal length differ too much."""
     robot = TwoWheels()
     found = geometry.run(robot, answers(robot, misread_mm=100.0), arguments("geometry"))
     (note,) = found.notes
@@ -148,7 +154,7 @@ def test_a_line_that_was_misread_is_told() -> None:
 
 
 def test_a_robot_that_may_not_move_is_not_driven() -> None:
-    """The driver's own limit of the yaw rate is zero, which the error names."""
+    """If the driver's ``max_angular_speed`` is 0, the tool ends with an error that names it."""
     robot = TwoWheels(max_angular_speed=0.0)
     with pytest.raises(ToolError, match="max_angular_speed is 0"):
         geometry.run(robot, answers(robot), arguments("geometry"))

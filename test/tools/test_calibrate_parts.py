@@ -30,16 +30,16 @@ commands = st.tuples(speeds, speeds, speeds)
 
 
 def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
-    """Check for two seconds that constant measurements obey a constant command."""
+    """Watch for two simulated seconds whether a constant velocity obeys a constant command."""
     obedience = Obedience(topic, PARAMETERS.by_name)
     for tick in range(200):
         obedience.look(tick / 100, 0.01, command, measured)
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """The first data come late, so the robot has 3 s.
+    """A robot with slow odometry has 3 s to obey before the tool reports an error.
 
-    The message omits the scales that it lacks.
+    The error does not mention scales, because this robot has no parameter for them.
     """
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
@@ -59,7 +59,10 @@ def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
 def test_a_command_changes_no_faster_than_allowed(
     now: tuple[float, float, float], wanted: tuple[float, float, float], seconds: float
 ) -> None:
-    """The linear velocity is limited as a vector, the yaw rate by itself; the target is reached."""
+    """Commands change no faster than the acceleration limits, and reach the target.
+
+    The linear velocity is limited as a vector, the yaw rate separately.
+    """
     then = BOUNDS.approach("cmd_vel", now, wanted, seconds)
     assert math.dist(then[:2], now[:2]) <= 0.3 * seconds + 1e-12
     assert abs(then[2] - now[2]) <= 0.8 * seconds + 1e-12
@@ -72,7 +75,7 @@ def test_a_command_changes_no_faster_than_allowed(
     "command", [(0.31, 0.0, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, -0.6), (math.nan, 0.0, 0.0)]
 )
 def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
-    """The linear velocity is limited as a vector; NaN is refused too."""
+    """A command above a bound or with NaN is refused; x and y count together as a vector."""
     with pytest.raises(ToolError, match="exceeds the limits of this calibration"):
         BOUNDS.require_allowed("cmd_vel", command)
     wheels = Bounds(speed=5.0, way=1.0, seconds=1.0)
@@ -82,7 +85,10 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """The cases are too far, turned too much, too long, and a position that is not finite."""
+    """The error says by how far, how much or how long the robot exceeded the bounds.
+
+    A pose that is not finite is an error, too.
+    """
     BOUNDS.require_within(9.0, Pose(0.6, 0.6, -1.9))
     for seconds, pose, sentence in (
         (1.0, Pose(0.8, 0.8, 0.0), "1.13 m"),
@@ -96,7 +102,10 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 
 
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
-    """A fifth of the command is enough, slow commands are not judged, and NaN is not motion."""
+    """A robot obeys if it reaches a fifth of the command.
+
+    Slow commands are not judged, and NaN does not count as motion.
+    """
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
     with pytest.raises(ToolError, match=r"does not move when commanded \(wheel_cmd\)"):
@@ -107,7 +116,7 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
-    """After the last command the law returns None, which ends the motion."""
+    """``stairs`` gives each command for its time, then None, which ends the motion."""
     law = stairs([(1.0, (1.0, 0.0, 0.0)), (2.0, HALT), (1.0, (0.0, 1.0, 0.0))])
     assert [law(t, Pose()) for t in (0.0, 0.99, 1.0, 2.9, 3.5)] == [
         (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), HALT, HALT, (0.0, 1.0, 0.0),
@@ -116,7 +125,7 @@ def test_stairs_are_climbed_one_by_one() -> None:
 
 
 def test_an_empty_log_has_empty_columns() -> None:
-    """The columns keep their shapes, so that calculations need no special case."""
+    """The columns of an empty log have zero rows, so calculations need no special case."""
     log = Log()
     assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
     assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
@@ -124,14 +133,17 @@ def test_an_empty_log_has_empty_columns() -> None:
 
 
 def test_wheels_are_as_many_as_the_robot_has() -> None:
-    """A row has the angles of all wheels first, then their rates."""
+    """A log splits each wheel row into the angles of all wheels and their rates."""
     log = Log(wheel_rows=[(0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 5.0, 6.0, 7.0, 8.0)])
     assert log.wheels.angle_rad.tolist() == [[1.0, 2.0], [5.0, 6.0]]
     assert log.wheels.rate_radps.tolist() == [[3.0, 4.0], [7.0, 8.0]]
 
 
 def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
-    """A decimal comma is accepted, and an empty answer means no."""
+    """The console repeats a question after an invalid answer.
+
+    A decimal comma is accepted, and an empty answer means no.
+    """
     asks, shown = console("ten", "nan", "-5", "0,25", "", "yes", "n")
     assert asks.number("How far", "m", 0.0, 1.0) == 0.25
     assert shown.getvalue().count("Please type a number of m from 0 to 1.") == 3
@@ -142,7 +154,7 @@ def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
 
 
 def test_a_table_in_a_pipe_is_plain_text() -> None:
-    """The table is without colours, and has as many digits as the uncertainty allows."""
+    """A table in a pipe has no colours, and as many digits as the uncertainty allows."""
     asks, shown = console()
     findings = [
         Finding(name="linear_scale", value=80.12345, sigma=0.0234, unit="LSB/(m/s)", before=70.0),
@@ -164,7 +176,7 @@ def result(**parameters: object) -> Result:
 
 
 def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
-    """All other entries of the file are kept."""
+    """The driver loads the saved values, and other entries of the file are kept."""
     path = tmp_path / "robot.yaml"
     path.write_text("name: number 7\ngyro_bias: [0.0, 0.0, 0.1]\nlinear_scale: 71.0\n")
     save(result(linear_scale=80.5, axis_signs=[1, -1, 1]), path, PARAMETERS)
@@ -175,7 +187,7 @@ def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
 
 
 def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
-    """With a value that is not finite in the file, the driver's next start would fail."""
+    """A value out of range is not written, because the driver would refuse to start with it."""
     path = tmp_path / "robot.yaml"
     with pytest.raises(ToolError, match="parameter 'linear_scale' must be"):
         save(result(linear_scale=1e9), path, PARAMETERS)
@@ -183,7 +195,7 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
 
 
 def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
-    """The check before the drive accepts missing folders; saving and drawing create them."""
+    """The check before a drive accepts paths in missing folders; saving creates the folders."""
     path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
     assert output_file(str(path), "", PARAMETERS) == path
     assert picture_file(str(picture), "imu") == picture
@@ -194,12 +206,16 @@ def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
 
 
 def test_everything_that_may_be_written_is_a_parameter() -> None:
-    """The driver would refuse to start with an unknown name in its calibration file."""
+    """Calibrations may write the parameters axis_signs, gyro_bias and linear_scale."""
     assert {"axis_signs", "gyro_bias", "linear_scale"} < set(PARAMETERS.calibrated)
 
 
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
-    """ROS parameter files, invalid values, files in place of folders and other image types fail."""
+    """Before any motion the tool rejects unsuitable files for the calibration and the picture.
+
+    Examples are ROS parameter files, invalid values, files in place of folders, and unknown types
+    of images.
+    """
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")
     with pytest.raises(ToolError, match="is a file of ROS parameters"):
@@ -219,14 +235,17 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
     "words", [[], ["nonsense"], ["imu", "--minutes", "0"], ["scale", "--levels", "x"]]
 )
 def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """A message on stderr gives the reason."""
+    """After wrong arguments the tool prints a message on stderr and returns exit code 2."""
     assert main(words) == 2
     assert "calibrate" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a wheel controller")])
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
-    """A board's parameters show what it can do; the OmniBot supports every calibration."""
+    """A calibration that a board does not support, by its parameters, is refused.
+
+    The OmniBot supports every calibration.
+    """
     for subcommand in SUBCOMMANDS:
         require_able(subcommand, PARAMETERS.by_name)
     with pytest.raises(
@@ -236,6 +255,6 @@ def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: s
 
 
 def test_step_is_refused_where_the_control_of_a_wheel_is_not_known() -> None:
-    """MART has a ``linear_scale`` as the OmniBot has, but no commands for single wheels."""
+    """``calibrate step`` is refused for MART, which has no commands for single wheels."""
     with pytest.raises(ToolError, match=r"the board mart does not have$"):
         require_able("step", boards.check_all({"board": "mart"}))

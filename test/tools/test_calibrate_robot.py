@@ -35,7 +35,7 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def once(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that does this once, ``AFTER_S`` after the motion began."""
+    """Return a callback that calls ``action`` once, ``AFTER_S`` after the motion began."""
     left = [action]
 
     def show(seconds: float) -> None:
@@ -46,12 +46,12 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that does this again and again from ``AFTER_S`` after the motion began."""
+    """Return a callback that calls ``action`` each time from ``AFTER_S`` after the motion began."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
 def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: Rig) -> None:
-    """The log contains commands, measurements, and the standstill at the end."""
+    """A motion follows its commands and ends at rest; the log has commands and measurements."""
     before = rigged.port.board.truth
     log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
     after = rigged.port.board.truth
@@ -80,7 +80,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
 def test_what_happens_on_the_way_ends_it_at_rest(
     robot: Robot, rigged: Rig, what: str, sentence: str
 ) -> None:
-    """The cases are an e-stop, a reboot, another commander on either topic, and an interruption."""
+    """An e-stop, a reboot, commands of another node or ctrl-C end the motion at rest."""
     node = robot._node
     estop = node.create_publisher(Bool, "estop", 10)
     other = node.create_publisher(Twist, "cmd_vel", 1)
@@ -114,12 +114,12 @@ def test_what_happens_on_the_way_ends_it_at_rest(
 
 
 def test_a_value_of_the_diagnostics_is_found_by_its_name(robot: Robot, rigged: Rig) -> None:
-    """The first message after the question is enough."""
+    """``diagnosed`` returns the value of this name from the driver's diagnostics."""
     assert robot.diagnosed("Port") == rigged.port.path
 
 
 def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
-    """The odometry shows the distance; commands beyond the bounds are never sent."""
+    """A robot that goes too far by its odometry is stopped; too fast commands are not sent."""
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
     with pytest.raises(ToolError, match=r"it went too far \(0\.\d\d m from its start, 0\.05"):
         robot.drive(steady(SLOWLY, 10.0), near)
@@ -130,7 +130,10 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
 
 
 def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> None:
-    """With a scale of one count per m/s every command is rounded to zero."""
+    """The tool reports a robot that does not move.
+
+    With a ``linear_scale`` of one count per m/s the driver rounds every command to zero.
+    """
     robot.set_parameters({"linear_scale": 1.0})
     with pytest.raises(ToolError, match="does not move when commanded"):
         robot.drive(steady(SLOWLY, 10.0), BOUNDS)
@@ -138,7 +141,10 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
 
 
 def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """The monitor is switched off only during a motion that it would stop."""
+    """After an interruption the driver's motion monitor is on again.
+
+    The tool switches the monitor off only during a motion that the monitor would stop.
+    """
     seen = []
 
     def interrupt() -> None:
@@ -153,7 +159,10 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 
 
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """Any exception switches the monitor on again; it would stay off until the driver restarts."""
+    """After any exception the tool switches the driver's motion monitor on again.
+
+    Otherwise the monitor would stay off until the driver restarts.
+    """
 
     def fail() -> None:
         raise RuntimeError("a defect")
@@ -167,7 +176,7 @@ def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> Non
 def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
     robot: Robot, rigged: Rig
 ) -> None:
-    """After ctrl-Z and fg only zeros are sent: the driver has stopped the robot before."""
+    """After ctrl-Z and fg the tool sends only zeros, as the driver has stopped the robot."""
     clock = SimpleNamespace(monotonic=time.monotonic)
 
     def suspend() -> None:
@@ -186,7 +195,10 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The advice to cut the power is added to the original error, if one occurred."""
+    """If the robot does not come to rest, the error says to cut its power.
+
+    This advice is added to the original error, if there is one.
+    """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
     with pytest.raises(
@@ -215,7 +227,7 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The limit of 0.3 s without data applies to each wanted topic."""
+    """A topic counts as silent after 0.3 s without data; only the wanted topics are judged."""
     monkeypatch.setattr(listener, "LOST_S", LOST_S)
     heard_s = {listener.IMU: 10.0, listener.ODOMETRY: 9.9}
     assert listener.silent(heard_s, listener.TOPICS, 10.19) == []
@@ -225,7 +237,7 @@ def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.Mo
 
 
 def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    """The same holds if the input ends without an answer."""
+    """If the user answers no or the input ends, the tool moves nothing and writes nothing."""
     commands = len(rigged.port.board.commands)
     assert rigged.calibrate("scale", answer=lambda _question: "n") == 1
     assert "you said no" in capsys.readouterr().err
@@ -242,7 +254,7 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
 def test_ctrl_c_at_an_open_question_ends_it(
     rigged: Rig, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The exit code is 130, as for any interruption, and the robot does not move."""
+    """Ctrl-C at a question ends the tool with exit code 130, and the robot does not move."""
 
     def interrupt(_question: str) -> str:
         os.kill(os.getpid(), signal.SIGINT)
@@ -255,7 +267,7 @@ def test_ctrl_c_at_an_open_question_ends_it(
 
 
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
-    """The killed driver's guard stops the robot, and the tool reports missing data.
+    """If the driver is killed, its guard stops the robot, and the tool reports missing data.
 
     This is the last test of the module, as it ends the shared driver.
     """

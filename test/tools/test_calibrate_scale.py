@@ -25,7 +25,7 @@ ASSUMED = (70.0, 70.0, 500.0)
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
     """Return the log of a robot with ``true`` scales that gets commands computed with ``ASSUMED``.
 
-    ``gyro`` is the factor of its gyro's rate.
+    ``gyro`` is a factor on the rate that the robot's gyro measures.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
@@ -56,7 +56,7 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """Commands are whole counts, so odometry and gyro give the scale whatever was assumed."""
+    """Odometry and gyro give the true scale within five sigmas, whatever scale was assumed."""
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
     assert abs(by.value - linear) < max(5 * by.sigma, 1e-4 * linear)
@@ -72,7 +72,7 @@ def test_any_scale_is_found_within_what_is_claimed(
 def test_what_is_commanded_is_a_whole_count_of_the_board(
     units: float, top: float, levels: int
 ) -> None:
-    """The requested maximum is kept, unless a single count is already faster."""
+    """Planned commands are whole counts, and at most the requested maximum or one count."""
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
         assert counts == pytest.approx([round(count) for count in counts], abs=1e-9)
@@ -80,7 +80,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """A pause in the commands may have stopped the robot, so the speed before it is left out."""
+    """A speed whose commands paused is not used, as the driver may have stopped the robot."""
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
     middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]
@@ -89,7 +89,10 @@ def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
 
 
 def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
-    """At 5 % a note suggests a wrong geometry; 2 % is within the gyro's tolerance."""
+    """If gyro and odometry differ by 5 %, a note recommends ``calibrate geometry``.
+
+    A difference of 2 % is within the gyro's tolerance.
+    """
     found = speeds(drive((70.0, 70.0, 500.0), gyro=1.05), ASSUMED, UP, NO_BIAS)
     assert any("calibrate geometry`, load" in note for note in result(found, NOW).notes)
     found = speeds(drive((70.0, 70.0, 500.0), gyro=1.02), ASSUMED, UP, NO_BIAS)
@@ -97,13 +100,13 @@ def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
 
 
 def test_axes_that_disagree_are_told() -> None:
-    """x and y share one scale, so a note says that it does not fit both."""
+    """If the scales of x and y differ, a note says so, as both axes share one parameter."""
     found = speeds(drive((70.0, 72.0, 500.0)), ASSUMED, UP, NO_BIAS)
     assert "x and y differ by 2.8%" in result(found, NOW).notes[0]
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """The cases are a log without a steady speed, and a robot that drives against its commands."""
+    """A log without a steady speed, or a robot that drives against its commands, is an error."""
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):
@@ -113,7 +116,10 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 def test_planted_scales_are_found_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The complete calibration takes 20 s with a real driver and stamped commands."""
+    """``calibrate scale`` finds planted scales through a real driver; ``--apply`` sets them.
+
+    The driver takes stamped commands.
+    """
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:
         words = ("--levels", "1", "--seconds", "0.7", "--speed", "0.2", "--turning", "0.4")

@@ -23,7 +23,10 @@ SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ti
 def test_a_planted_motor_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Only wheel B has this motor; the tolerance is 5 %, as the test machine may be busy."""
+    """``calibrate step`` finds the motor that is planted in wheel B, within 5 %.
+
+    The tolerance allows for a busy test machine.
+    """
     monkeypatch.setattr(step, "RUN_UP_S", 1.3)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:
         code = robot.calibrate("step", "--wheels", "B", "--hold", "0.7", "--steps", "4")
@@ -52,7 +55,7 @@ def test_a_planted_motor_is_found(
 
 
 def still(answer: str, *words: str) -> None:
-    """Run the calibration with a robot that has parameters but cannot move."""
+    """Run ``calibrate step`` on a robot that cannot move, with a user who gives ``answer``."""
     parameters = {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     robot = SimpleNamespace(parameters=parameters)
     arguments = command_line().parse_args(["step", *words])
@@ -72,12 +75,12 @@ def still(answer: str, *words: str) -> None:
 def test_what_cannot_be_done_is_said_before_anything_moves(
     words: list[str], complaint: str
 ) -> None:
-    """The message names the condition that an option does not meet."""
+    """An invalid option of ``calibrate step`` is refused before any motion, with a reason."""
     with pytest.raises(ToolError, match=complaint):
         still("y", *words)
 
 
 def test_a_no_moves_nothing() -> None:
-    """The user's refusal ends the tool with an error message."""
+    """If the user answers no, ``calibrate step`` ends with an error before any motion."""
     with pytest.raises(ToolError, match="you said no"):
         still("n")

@@ -48,7 +48,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
-    """Return the direction of up in the sensor's axes for level, nose up and left side up."""
+    """Return where up is, in the sensor's axes, for a level, nose-up and left-side-up robot."""
     bodies = (
         (0.0, 0.0, 1.0),
         (math.sin(nose_rad), 0.0, math.cos(nose_rad)),
@@ -61,19 +61,19 @@ def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.n
 
 
 def test_the_table_of_the_commissioning_guide_is_what_is_wanted() -> None:
-    """The expected signs are copied by hand from the three rows of cmd_vel."""
+    """The wanted signs are those in the table of the commissioning guide, copied by hand."""
     assert [wanted(axis) for axis in range(3)] == [(-1, 1, 0), (-1, -1, 1), (-1, -1, -1)]
 
 
 @pytest.mark.parametrize("answer", ["+0-", "+ 0 -", "+,0,-", " +, 0, - "])
 def test_three_signs_are_understood(answer: str) -> None:
-    """Spaces and commas around the signs are ignored."""
+    """Three signs are understood with or without spaces and commas."""
     assert understand(answer) == (1, 0, -1)
 
 
 @pytest.mark.parametrize("answer", ["", "+", "++", "+0-+", "abc", "1 0 -1", "yes"])
 def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
-    """None makes the tool repeat the question."""
+    """For an answer without exactly three signs ``understand`` returns None."""
     assert understand(answer) is None
 
 
@@ -82,7 +82,10 @@ def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
 def test_a_wheel_is_itself_or_it_is_a_contradiction(
     wheel: int, pattern: tuple[int, int, int]
 ) -> None:
-    """Two of the 27 patterns are possible: this wheel alone, in either direction."""
+    """If one wheel is commanded, the user sees that wheel alone turn, in either direction.
+
+    All other patterns of the 27 are contradictions.
+    """
     alone = tuple(int(n == wheel) for n in range(3))
     if pattern in (alone, tuple(-n for n in alone)):
         assert wheel_sign(wheel, pattern) == sum(pattern)
@@ -96,7 +99,10 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """Two of the 27 patterns are possible: the expected one and its reverse."""
+    """If one axis is commanded, the user sees the expected pattern or its reverse.
+
+    All other patterns of the 27 are contradictions.
+    """
     expected = wanted(axis)
     if pattern == expected:
         assert axis_sign(axis, pattern) == 1
@@ -108,7 +114,7 @@ def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
 
 
 def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
-    """A robot with x and y reversed is one seen from behind, so it can be a real mounting."""
+    """Signs that reverse one axis mirror the robot; those that reverse x and y turn it by 180°."""
     assert not mirrored((1, 1, 1))
     assert not mirrored((-1, -1, 1))
     assert mirrored((-1, 1, 1))
@@ -121,7 +127,7 @@ def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
 def test_any_mounting_is_found_from_three_postures(
     roll: float, pitch: float, yaw: float, nose_rad: float, left_rad: float
 ) -> None:
-    """The result is exact, whatever the angles of the two tilts are."""
+    """Any mounting of the sensor is found exactly, whatever the angles of the two tilts are."""
     planted = rotation(roll, pitch, yaw)
     found = mounting(*postures(planted, nose_rad, left_rad))
     assert found.rotation == pytest.approx(planted, abs=1e-6)
@@ -130,7 +136,7 @@ def test_any_mounting_is_found_from_three_postures(
 
 @given(angles, st.floats(-1.5, 1.5), angles)
 def test_angles_are_those_of_a_description(roll: float, pitch: float, yaw: float) -> None:
-    """Roll, pitch and yaw give the rotation back from which they were computed."""
+    """Roll, pitch and yaw of a rotation give the same rotation again."""
     made = rotation(roll, pitch, yaw)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
@@ -169,7 +175,7 @@ def test_a_sensor_mounted_askew_stays_so() -> None:
 def test_a_side_lowered_instead_of_raised_is_a_contradiction(
     nose_rad: float, left_rad: float
 ) -> None:
-    """One lowered side would make the measured axes left-handed."""
+    """A lowered nose or left side is a contradiction: the measured axes would be left-handed."""
     level, nose_up, left_up = postures(rotation(math.pi, 0, 0), nose_rad, left_rad)
     with pytest.raises(Contradiction, match="repeat both"):
         mounting(level, nose_up, left_up)
@@ -177,7 +183,7 @@ def test_a_side_lowered_instead_of_raised_is_a_contradiction(
 
 @pytest.mark.parametrize("tilt_rad", [0.05, 1.5])
 def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
-    """Tilts of 3° and 86° are outside the accepted range: one is too flat, one like a fall."""
+    """A tilt of 3° is too small to be accepted, and a tilt of 86° is too large."""
     with pytest.raises(Contradiction, match="front raised"):
         mounting(*postures(np.eye(3), tilt_rad, 0.5))
 
@@ -185,13 +191,16 @@ def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
 def resting(
     force: tuple[float, float, float], rate: tuple[float, float, float], seconds: float
 ) -> Imu:
-    """Return constant readings for this time."""
+    """Return IMU readings with a constant force and a constant rate for ``seconds``."""
     stamps = np.arange(0.0, seconds, 0.01)
     return Imu(stamps, np.tile(force, (len(stamps), 1)), np.tile(rate, (len(stamps), 1)))
 
 
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
-    """The turn is about the measured vertical, after the gyro's bias is subtracted."""
+    """The angle of a turn is measured about the vertical, without the gyro's bias.
+
+    A turn to the right or by too little is a contradiction.
+    """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
     def turned(rate: float) -> float:
@@ -254,7 +263,7 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     ],
 )
 def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
-    """A robot that becomes faster under one command is not taken for one that drives to a pose."""
+    """If a robot becomes faster under one command, the control method stays unknown."""
     assert control_method(slow, fast, 0.06) is None
 
 
@@ -262,7 +271,7 @@ def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """In the right frame a command leads in the same body direction after a turn."""
+    """In the right frame a command has the same direction in the body after a turn."""
 
     def heading(rad: float) -> Drift:
         return steady(0.1 * math.cos(rad), 0.1 * math.sin(rad))
@@ -276,7 +285,10 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """Calculated by hand: 0.5 rad/s is 20 mrad, or 24 counts of each wheel, in 40 ms."""
+    """The drift of a turn on the spot shows whether the deltas are understood as what they are.
+
+    Calculated by hand: 0.5 rad/s is 20 mrad, or 24 counts of each wheel, in 40 ms.
+    """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
     as_counts = steady(0.0, 2 / 3 * 200 * rim / 0.04, -200 * rim / 0.04 / (3 * 0.143))
@@ -286,7 +298,7 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """Data of another time do not count; missing data or a robot at rest are an error."""
+    """A drift uses only data from its own time; missing data or a robot at rest is an error."""
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))
     twist[50:, 0] = 0.2

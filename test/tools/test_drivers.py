@@ -10,7 +10,7 @@ STRING, BOOL = "std_msgs/msg/String", "std_msgs/msg/Bool"
 
 
 def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
-    """Both topics must have the right types and one common name, in any namespace."""
+    """A driver is a node with the topics ``state`` and ``estop_active`` of the right types."""
     topics = [
         ("/omnibot_driver/state", STRING), ("/omnibot_driver/estop_active", BOOL),
         ("/robot1/base/estop_active", BOOL), ("/robot1/base/state", STRING),
@@ -22,7 +22,10 @@ def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
 
 
 def test_one_that_is_only_listened_to_does_not_run() -> None:
-    """A tool that waits for a driver creates its topics too, so publishers are counted."""
+    """A driver runs only if its topics have publishers.
+
+    A tool that waits for a driver subscribes to the topics, and so creates them.
+    """
     counts = {"/a/state": 1, "/a/estop_active": 1, "/b/state": 0, "/b/estop_active": 0}
     node = SimpleNamespace(
         get_topic_names_and_types=lambda: [

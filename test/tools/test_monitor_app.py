@@ -25,7 +25,7 @@ ALL_WRONG = tuple(
 
 
 def on_screen(robot: FakeRobot, steps: Callable[[Pilot[Any], Monitor], Awaitable[None]]) -> None:
-    """Run the dashboard at 80x24 without a terminal, and do these steps."""
+    """Run the dashboard at 80x24 characters without a terminal, and perform ``steps`` on it."""
 
     async def run() -> None:
         app = Monitor(robot)
@@ -82,7 +82,7 @@ def test_everything_fits_80_by_24(statuses: tuple[Status, ...]) -> None:
 
 
 def test_a_latched_estop_is_red() -> None:
-    """The complete line is red and names the key that releases the e-stop."""
+    """While the e-stop is latched, a red line names the key that releases it."""
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
@@ -101,7 +101,7 @@ def test_a_latched_estop_is_red() -> None:
     [("space", "estop"), ("g", "start"), ("p", "pause"), ("z", "reset_odometry")],
 )
 def test_a_key_asks_for_what_the_last_line_says(key: str, asked: str) -> None:
-    """Each press sends exactly one request."""
+    """Each key in the last line of the screen sends exactly one request."""
     assert press(key).asked == [asked]
 
 
@@ -132,7 +132,7 @@ def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> N
 
 @pytest.mark.parametrize("key", ["w", "up", "j"])
 def test_keys_steer_with_teleop_alone(key: str) -> None:
-    """Without ``--teleop`` the same keys do nothing."""
+    """Keys of motion steer only with ``--teleop``."""
     robot = press(key, teleop=True)
     assert robot.dead_man
     assert robot.dead_man.command(0.0) not in (None, HALT)
@@ -140,7 +140,7 @@ def test_keys_steer_with_teleop_alone(key: str) -> None:
 
 
 def test_plus_and_minus_change_the_speed() -> None:
-    """Each press changes the level by one of ten; it begins at 3."""
+    """Plus and minus change the speed by one of ten levels; the monitor begins at level 3."""
     robot = press("plus", "plus", "minus", teleop=True)
     assert robot.dead_man
     assert robot.dead_man.level == 4
@@ -174,7 +174,7 @@ def test_nothing_in_a_message_is_markup() -> None:
 
 
 def test_a_key_for_what_the_board_cannot_do_is_not_there() -> None:
-    """The key is hidden and sends no request; the other keys still work."""
+    """A key for a function that the board lacks is hidden and sends no request."""
     robot = FakeRobot()
     robot.shown = view(lacks=frozenset({"pause"}))
 

@@ -22,7 +22,7 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 
 @given(st.floats(0.5, 120.0), st.floats(2.0, 30.0), st.floats(0.0, 1e6))
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
-    """The rate is exact to one message in the window, wherever the window lies."""
+    """The rate of a steady stream is exact to one message per window, at any time."""
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):
         rate.arrived(began_s + number / hz)
@@ -78,7 +78,7 @@ def test_the_way_is_bounded() -> None:
 
 
 def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
-    """A jump that the robot cannot make is not drawn as a line."""
+    """A jump that the robot cannot make, such as a reset of odometry, begins a new path."""
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(2.0, 0.0), HALT, 1.0)
     model.odom(Pose(0.0, 0.0), HALT, 1.04)
@@ -86,7 +86,7 @@ def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
 
 
 def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
-    """NaN and infinity are kept and named; the path continues with the next finite pose."""
+    """NaN and infinity in a pose are shown and named, but the path omits such a pose."""
     model = Model("/omnibot_driver", 0.0)
     for number, x_m in enumerate((0.0, math.nan, math.inf, 0.1)):
         model.odom(Pose(x_m, 0.0), BodyTwist(x_m, 0.0, 0.0), 0.1 * number)
@@ -104,7 +104,7 @@ def test_a_command_that_nobody_repeats_is_none() -> None:
 
 
 def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
-    """Only messages from the driver itself end its silence."""
+    """Commands do not end the silence of a driver; only messages from the driver itself do."""
     model = Model("/omnibot_driver", 0.0)
     model.state("nominal", 1.0)
     model.commanded(HALT, 9.0)
@@ -135,18 +135,18 @@ def test_what_was_measured_once_is_not_what_is_measured() -> None:
     ],
 )
 def test_a_topic_is_missing_where_the_state_promises_it(state: str, missing: list[str]) -> None:
-    """A paused board sends nothing, so nothing is missing."""
+    """A topic is missing only in a state in which the board should send its data."""
     assert view(state=state, imu=NOTHING, odom=NOTHING).missing(diagnostics=True) == missing
 
 
 def test_diagnostics_are_missing_where_somebody_publishes_them() -> None:
-    """A driver that replays a recording does not publish any."""
+    """Missing diagnostics are reported only if a driver publishes any; one in a replay does not."""
     assert view(statuses=()).missing(diagnostics=True) == ["/diagnostics"]
     assert view(statuses=()).missing(diagnostics=False) == []
 
 
 def test_a_level_that_is_none_counts_as_an_error() -> None:
-    """Unknown levels occur, as any node may publish anything on /diagnostics."""
+    """An unknown level counts as an error; any node may publish one on /diagnostics."""
     assert [level(byte) for byte in (0, 1, 2, 3, 4, 255)] == [
         *(Level.OK, Level.WARN, Level.ERROR, Level.STALE),
         *(Level.ERROR, Level.ERROR),

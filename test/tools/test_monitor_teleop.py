@@ -28,7 +28,7 @@ def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | 
 
 @given(st.lists(st.tuples(keys, st.floats(0.0, ASLEEP_S - 0.01)), min_size=1, max_size=20))
 def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
-    """``FIRST_S`` after the last key at the latest, ``ZEROS`` zero commands follow, then none."""
+    """At the latest ``FIRST_S`` after the last key, ``ZEROS`` zero commands end the motion."""
     dead_man, now_s = DeadMan(), 0.0
     for key, wait_s in presses:
         now_s += wait_s
@@ -40,7 +40,7 @@ def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, f
 
 @given(keys, st.floats(0.02, FIRST_S - 0.01), st.floats(0.02, REPEAT_S - 0.01))
 def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: float) -> None:
-    """The motion lasts through the keyboard's delay before repeating, and between repetitions."""
+    """A held key moves the robot without a break, even before the keyboard begins to repeat."""
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
     assert dead_man.command(delay_s - 0.001) not in (None, HALT)
@@ -62,7 +62,10 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 
 @pytest.mark.parametrize("key_first", [True, False])
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
-    """Pending keys are discarded whichever thread wakes up first; later keys steer again."""
+    """Keys pressed while the program was suspended are discarded; later keys steer again.
+
+    The order in which key presses and commands are processed does not matter.
+    """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.0) not in (None, HALT)
@@ -76,7 +79,7 @@ def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) ->
 
 
 def test_stop_is_at_once() -> None:
-    """The very next command is zero, although the key's time has not ended."""
+    """After ``stop`` the next command is zero, although the last key would still be valid."""
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.01) != HALT
@@ -85,7 +88,7 @@ def test_stop_is_at_once() -> None:
 
 
 def test_who_has_not_steered_commands_nothing() -> None:
-    """Zero commands are not sent either, since another source may be driving."""
+    """A user who has not steered sends nothing, not even zeros, as another source may drive."""
     dead_man = DeadMan()
     assert not dead_man.press("x", 0.0)
     assert commands(dead_man, 0.0, 100) == [None] * 100

@@ -38,7 +38,7 @@ def test_no_value_breaks_the_screen(
 
 
 def test_json_holds_the_values() -> None:
-    """Values are in SI units under the topics' names; values that are not finite are null."""
+    """The JSON has all values in SI units; values that are not finite are null."""
     told = json.loads(text.as_json(view(force_mps2=(math.nan, 1.0, math.inf)), ["trouble"]))
     assert told["driver"] == "/robot1/omnibot_driver"
     assert (told["state"], told["estop"]) == ("nominal", False)
@@ -51,7 +51,7 @@ def test_json_holds_the_values() -> None:
 
 
 def test_what_is_not_known_is_a_dash_and_null() -> None:
-    """A value is unknown before the first message of its topic."""
+    """Before the first message of its topic, a value is a dash on the screen and null in JSON."""
     shown = view(pose=None, measured=None, commanded=None, force_mps2=None, rate_radps=None)
     assert "–" in text.figures(shown)[3]
     told = json.loads(text.as_json(shown, []))
@@ -60,7 +60,7 @@ def test_what_is_not_known_is_a_dash_and_null() -> None:
 
 
 def test_what_needs_somebody_stands_first() -> None:
-    """Errors come before warnings, and all that is OK shares one line."""
+    """Errors come before warnings, and all statuses that are OK share one line."""
     statuses = (
         *FINE,
         Status("Time", Level.STALE, "not known", {}),
@@ -76,7 +76,7 @@ def test_what_needs_somebody_stands_first() -> None:
 
 
 def test_what_has_happened_is_counted() -> None:
-    """Counts of zero are not shown."""
+    """The monitor shows only those counts of faults that are above zero."""
     stream = Status("Stream", Level.OK, "complete", {"Framing faults": "3", "Sequence gaps": "0"})
     assert text.counts(view(statuses=(stream,))) == "since its start: framing faults 3"
     assert text.counts(view()) == "since its start: nothing lost, nothing refused"
@@ -91,13 +91,13 @@ def test_a_message_cannot_move_the_cursor() -> None:
 
 
 def test_a_silent_driver_is_said_to_be_silent() -> None:
-    """The title reports the silence instead of the last link, which is outdated."""
+    """The title says how long the driver has been silent, and omits the outdated link."""
     assert text.title(view(silent_s=7.2)).endswith("nothing heard for 7 s (was nominal)")
     assert text.title(view()) == "/robot1/omnibot_driver  nominal  connected, /dev/omnibot"
 
 
 def test_an_estop_is_latched_asked_for_or_not() -> None:
-    """An unconfirmed request does not show as latched."""
+    """The e-stop line distinguishes latched, requested, not latched and unknown."""
     assert text.estop(view()) == "e-stop not latched"
     assert text.estop(view(estop=True)) == "E-STOP LATCHED"
     assert text.estop(view(estop_asked=True)) == "E-STOP REQUESTED, NOT YET CONFIRMED"
@@ -107,7 +107,7 @@ def test_an_estop_is_latched_asked_for_or_not() -> None:
 
 
 def test_the_picture_of_a_square_is_a_square() -> None:
-    """Only the outline is drawn, and its sides are as wide as high."""
+    """A square path is drawn as its outline, which is as wide as high."""
     corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
     picture = draw_path(corners, 24, 12)
     assert {len(row) for row in picture.rows} == {24}
@@ -122,7 +122,7 @@ def test_the_picture_of_a_square_is_a_square() -> None:
     [(0.0, "→"), (math.pi / 2, "↑"), (math.pi, "←"), (-math.pi / 4, "↘"), (20 * math.pi, "→")],
 )
 def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
-    """In the plot x points to the right and y up."""
+    """An arrow shows the robot's heading in the plot, in which x is to the right and y up."""
     assert any(arrow in row for row in draw_path([], 10, 5, Pose(1.0, 1.0, yaw_rad)).rows)
 
 
@@ -134,7 +134,7 @@ def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
 def test_any_way_fits_any_picture(
     points: list[tuple[float, float]], columns: int, rows: int
 ) -> None:
-    """The plot has the requested size even in a terminal without room for it."""
+    """The plot has exactly the requested size, but at least one row and one column."""
     picture = draw_path(points, columns, rows, Pose(*(points[-1] if points else (0.0, 0.0))))
     assert len(picture.rows) == max(1, rows)
     assert {len(row) for row in picture.rows} == {max(1, columns)}
@@ -151,7 +151,7 @@ def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
 
 
 def test_a_board_without_an_imu_has_no_rows_of_it() -> None:
-    """Neither text nor JSON shows the IMU, and it is not reported as missing."""
+    """For a board without an IMU, text and JSON omit the IMU and do not report it as missing."""
     shown = view(lacks=frozenset({"imu"}), imu=Flow(0.0, None, ()), force_mps2=None)
     words = "\n".join(text.figures(shown))
     assert "odom" in words

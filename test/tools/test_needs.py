@@ -21,7 +21,7 @@ def test_a_library_that_is_there_is_imported() -> None:
 
 
 def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
-    """The message has the library's own name, not the submodule's."""
+    """The message names the missing library, not the submodule, and how to install the library."""
     with pytest.raises(ToolError) as refusal:
         need("no_such_library.part")
     assert str(refusal.value) == (
@@ -36,7 +36,7 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
     ["tools.calibrate", "tools.calibrate step", "tools.report", "tools.monitor", "demo"],
 )
 def test_help_needs_no_library(words: str) -> None:
-    """Python without site-packages, so also without ROS, still prints the help."""
+    """The help of each tool works in a Python without site-packages, and so without ROS."""
     module, *subcommand = words.split()
     done = subprocess.run(
         [sys.executable, "-ES", "-m", f"omnibot_driver.{module}", *subcommand, "--help"],

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bags of every storage format are read without ROS; unreadable ones end with a clear message."""
+"""Bags of every storage format are read without ROS; unreadable bags give a clear message."""
 
 import os
 import subprocess
@@ -28,7 +28,7 @@ def drive() -> Drive:
 
 @pytest.fixture(autouse=True)
 def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw no pictures here: they are slow and have tests of their own."""
+    """Switch off the pictures of the report, which are slow and have tests of their own."""
     monkeypatch.setattr(page, "PICTURES", ())
 
 
@@ -69,7 +69,7 @@ def test_a_bag_of_any_kind_tells_the_same(
 def test_a_single_file_of_a_bag_is_enough(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """A recorder that was killed leaves such a file, without metadata.yaml."""
+    """A single file of a bag is read without metadata.yaml, as a killed recorder leaves it."""
     (file,) = (
         file
         for file in write(tmp_path / "bag", [drive], plugin).iterdir()
@@ -87,7 +87,7 @@ def test_stamped_commands_are_commands(drive: Drive, tmp_path: Path) -> None:
 
 
 def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) -> None:
-    """With ``--namespace`` only the topics of the chosen robot are read."""
+    """If a bag has several robots, ``--namespace`` selects the robot whose topics are read."""
     one, other = Drive(SECONDS, "/robot1"), Drive(SECONDS, "/fleet/robot2", seed=2)
     bag = write(tmp_path / "bag", [one, other])
     with pytest.raises(ToolError, match=r"--namespace: /fleet/robot2, /robot1"):
@@ -101,7 +101,7 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
 
 
 def test_the_only_robot_needs_no_name(tmp_path: Path) -> None:
-    """The robot is found in any namespace."""
+    """The only robot in a bag is found in any namespace."""
     log = log_of(write(tmp_path / "bag", [Drive(SECONDS, "/robot1")]))
     assert log.robot == "/robot1"
 
@@ -122,7 +122,7 @@ def test_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_what_is_not_a_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The cases are a folder without a bag, a text file, and broken MCAP and SQLite files."""
+    """A folder without a bag, a text file, and broken MCAP and SQLite files are each rejected."""
     (tmp_path / "folder").mkdir()
     assert "neither metadata.yaml nor" in refused(tmp_path / "folder", capsys)
     for name, says in (("a.txt", "is not a bag"), ("a.mcap", "reindex"), ("a.db3", "reindex")):
@@ -131,7 +131,7 @@ def test_what_is_not_a_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The bag has a topic, but not a single message."""
+    """A bag with a topic, but without a single message, is reported as empty."""
     with Writer(tmp_path / "bag", version=9) as writer:
         writer.add_connection("/imu/data_raw", "sensor_msgs/msg/Imu", typestore=TYPES)
     assert "is empty" in refused(tmp_path / "bag", capsys)
@@ -140,7 +140,7 @@ def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_a_bag_of_something_else_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A topic /odom of another type does not make it a robot's bag."""
+    """A bag without a driver's topics is rejected, even if it has a topic /odom of another type."""
     with Writer(tmp_path / "bag", version=9) as writer:
         kind = "std_msgs/msg/String"
         data = TYPES.serialize_cdr(TYPES.types[kind]("hello"), kind)
@@ -152,7 +152,7 @@ def test_a_bag_of_something_else_is_told(
 def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The report names the missing topic, and the exit code is 3."""
+    """For a robot without odometry the report names the missing topic; the exit code is 3."""
     drive.odom.drop(0.0, SECONDS)
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
     assert "No message of odom" in capsys.readouterr().out
@@ -161,7 +161,7 @@ def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
 def test_nothing_but_nan_is_reported_on(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The report counts the messages with NaN, and the exit code is 3."""
+    """If all values are NaN, the report counts such messages, and the exit code is 3."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
@@ -171,7 +171,7 @@ def test_nothing_but_nan_is_reported_on(
 def test_a_place_that_cannot_be_written_is_told(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The folder cannot be created, as a file has its name."""
+    """If the folder cannot be created, as a file has its name, the report says so."""
     (tmp_path / "out").write_text("taken")
     assert "cannot be written" in refused(write(tmp_path / "bag", [drive]), capsys)
 
@@ -186,7 +186,7 @@ def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str
 
 
 def test_a_bag_is_reported_on_where_there_is_no_ros(drive: Drive, tmp_path: Path) -> None:
-    """The process cannot import ROS modules; a closed stdout does not disturb it."""
+    """A report on a bag needs no ROS modules, and a closed stdout does not disturb it."""
     bag = write(tmp_path / "bag", [drive])
     program = (
         "import sys\n"

@@ -48,7 +48,7 @@ def test_an_unfinished_bag_is_read_and_called_so(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The report is written and names the repair, and the exit code is 3."""
+    """The report on an unfinished bag names the command that repairs it; the exit code is 3."""
     monkeypatch.setattr(page, "PICTURES", ())
     bag = write(tmp_path / "bag", [drive], plugin)
     (bag / "metadata.yaml").unlink()
@@ -59,7 +59,7 @@ def test_an_unfinished_bag_is_read_and_called_so(
 
 
 def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Path) -> None:
-    """By name the tenth file would come before the second."""
+    """Files of an unfinished bag are sorted by time; by name bag_10 would precede bag_2."""
     bag = tmp_path / "bag"
     bag.mkdir()
     for name, first in (("bag_2", 0), ("bag_10", 10)):
@@ -81,7 +81,7 @@ def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Pa
 def test_metadata_that_make_no_sense_are_not_needed(
     drive: Drive, tmp_path: Path, text: str
 ) -> None:
-    """The bag's other files contain the same information."""
+    """A bag with invalid metadata is read from its other files, and the damage is named."""
     bag = write(tmp_path / "bag", [drive])
     (bag / "metadata.yaml").write_text(text)
     log = log_of(bag)
@@ -95,7 +95,7 @@ def test_metadata_that_make_no_sense_are_not_needed(
 def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     tmp_path: Path, mode: CompressionMode
 ) -> None:
-    """The damaged chunk is discarded, and all chunks before it are read."""
+    """Of an MCAP file that breaks off, all complete chunks are read."""
     drive = Drive(40.0)  # long enough for several chunks
     bag = write(tmp_path / "bag", [drive], compression=mode)
     size = (bag / "bag.mcap").stat().st_size
@@ -109,7 +109,7 @@ def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
 
 
 def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> None:
-    """A file system leaves such a file after a power failure."""
+    """An MCAP file that ends in zeros, as after a power failure, is read up to the zeros."""
     bag = write(tmp_path / "bag", [Drive(40.0)])
     size = (bag / "bag.mcap").stat().st_size
     file = cut(bag, size * 9 // 10)
@@ -120,7 +120,10 @@ def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> No
 
 
 def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
-    """Records are read up to the first incomplete one, and sorted by arrival."""
+    """An MCAP file without chunks is read up to its first incomplete record.
+
+    The messages are sorted by arrival.
+    """
     kind = "std_msgs/msg/Bool"
     bag = tmp_path / "bag"
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -149,7 +152,7 @@ def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("size", [0, 8, 20])
 def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path, size: int) -> None:
-    """The message names ``ros2 bag reindex``, which may recover more."""
+    """For an MCAP file without any complete part, the error names ``ros2 bag reindex``."""
     bag = write(tmp_path / "bag", [drive])
     file = cut(bag, size)
     with pytest.raises(ToolError, match=f"{file.name} cannot be read: .*ros2 bag reindex {bag}"):
@@ -157,7 +160,7 @@ def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path,
 
 
 def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_path: Path) -> None:
-    """A recorder that is killed leaves a write-ahead log beside the database."""
+    """The write-ahead log, which a killed recorder leaves beside the database, is read, too."""
     bag = write(tmp_path / "bag", [drive], StoragePlugin.SQLITE3)
     killed = tmp_path / "killed"
     killed.mkdir()
@@ -174,7 +177,7 @@ def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_p
 
 
 def test_damaged_messages_are_counted_and_passed_over(drive: Drive, tmp_path: Path) -> None:
-    """One message in the middle is too short; all others are read."""
+    """A damaged message is counted and skipped; all other messages are read."""
     with Writer(tmp_path / "bag", version=9) as writer:
         connections = {}
         for number, (topic, kind, at_ns, told) in enumerate(drive.messages()):

@@ -17,7 +17,7 @@ ROWS = dict(re.findall(r"^\| (\S+) \| [^|]+ \| ([^|]+) \|$", DOCUMENT, re.MULTIL
 
 
 def test_every_subject_has_a_row() -> None:
-    """The table lists exactly the subjects of the findings in the code."""
+    """The table in docs/tools/report.md lists exactly the subjects of the findings in the code."""
     subjects = {
         node.args[1].value
         for file in (ROOT / "omnibot_driver/tools/report").glob("*.py")
@@ -51,5 +51,5 @@ def test_every_subject_has_a_row() -> None:
     ],
 )
 def test_the_limits_are_those_of_the_code(subject: str, limit: str) -> None:
-    """Each limit of the code is in the row of its subject."""
+    """In docs/tools/report.md each limit of the code is in the row of its subject."""
     assert limit in ROWS[subject]

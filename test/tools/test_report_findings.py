@@ -19,7 +19,7 @@ def drive() -> Drive:
 
 
 def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
-    """The findings give figures, and none gives advice."""
+    """For a healthy drive the findings give figures, but no advice."""
     findings = judge(drive.log())
     assert not troubles(drive)
     assert headline(findings) == "Healthy."
@@ -30,7 +30,7 @@ def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
 
 
 def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
-    """15 readings are missing from 6 s on."""
+    """A gap is reported with its time and the number of messages missing."""
     drive.imu.drop(6.0, 6.15)
     (gap,) = troubles(drive)
     assert gap.level is Level.WARN
@@ -40,7 +40,7 @@ def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
 
 
 def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None:
-    """The driver's count in /diagnostics grows by 10 during the gap."""
+    """If the driver's count of lost frames grows during a gap, the report blames the line."""
     drive.imu.drop(6.0, 6.1)
     for at_s, *_, values in drive.statuses:
         values["IMU frames lost"] = "7" if at_s < 7.0 else "17"
@@ -54,7 +54,7 @@ def test_a_long_gap_is_worse(drive: Drive) -> None:
 
 
 def test_a_pause_is_not_a_gap(drive: Drive) -> None:
-    """The driver's state explains the missing messages."""
+    """Messages that are missing while the driver is paused are not reported as a gap."""
     drive.states += [(16.9, "paused"), (18.0, "nominal")]
     drive.imu.drop(17.0, 18.0)
     drive.odom.drop(17.0, 18.0)
@@ -63,7 +63,7 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """State and streams show the same event, so it is reported once."""
+    """A lost board shows in the state and in gaps, but is reported once, by the state."""
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
     drive.odom.drop(16.9, 18.0)
@@ -71,14 +71,17 @@ def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) 
 
 
 def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
-    """A driver that ends publishes ``disconnected`` last, and then nothing more."""
+    """A final state ``disconnected`` is reported as the end of the driver, not as a lost board."""
     drive.states.append((19.5, "disconnected"))
     assert not troubles(drive)
     assert "ended at 19.5 s" in said(drive, "State", "driver").text
 
 
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
-    """A driver that was kept from reading gives timestamps 20 ms ahead, which slowly return."""
+    """Timestamps that jump ahead by 20 ms and slowly return are reported as a jump, not a gap.
+
+    A driver that was kept from reading gives such timestamps.
+    """
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
     (leap,) = troubles(drive)
@@ -87,7 +90,7 @@ def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
 
 
 def test_uneven_stamps_are_noticed(drive: Drive) -> None:
-    """The stamps are uneven, for example, if they are arrival times."""
+    """Uneven timestamps, for example arrival times, are reported."""
     drive.imu.stamp_s = drive.imu.stamp_s + np.random.default_rng(2).uniform(0, 4e-3, 2000)
     (jitter,) = troubles(drive)
     assert jitter.subject == "Timing"
@@ -95,7 +98,7 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
 
 
 def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) -> None:
-    """``disconnected`` and ``connecting`` in a row have one cause, such as the cable."""
+    """The states ``disconnected`` and ``connecting`` in a row are reported as one loss."""
     drive.states += [(8.0, "disconnected"), (8.5, "connecting"), (9.0, "nominal")]
     for topic in (drive.imu, drive.odom, drive.joints):
         topic.drop(8.0, 9.0)
@@ -103,7 +106,7 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 
 
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
-    """The gap lasts to the end of the log, unless the driver's state explains it."""
+    """The gap of a stream that ends early lasts to the end, unless the state explains it."""
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
     assert gap.level is Level.BAD
@@ -115,7 +118,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
-    """In the complete log every second reading is missing."""
+    """If every second reading of a log is missing, the report names the rate, not the gaps."""
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.imu, name, getattr(drive.imu, name)[::2])
     found = [finding.text for finding in troubles(drive) if finding.subject in ("Timing", "Gaps")]
@@ -133,7 +136,7 @@ def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None
 def test_the_rate_that_a_stream_should_have_is_the_one_that_its_driver_says(
     values: dict[str, str], wanted: str
 ) -> None:
-    """The diagnostics give the rate, as boards and their settings differ."""
+    """The expected rate of a stream comes from the driver's diagnostics, as boards differ."""
     drive = Drive()
     drive.statuses.append((1.5, "omnibot_driver: Stream", 0, "complete", values))
     (found,) = [one for one in judge(drive.log()) if one.text.startswith("odom comes at")]
@@ -149,7 +152,7 @@ def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
 
 
 def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
-    """The delays are those of a USB adapter with a latency timer of 16 ms."""
+    """For delays like those of a USB adapter with a latency timer of 16 ms, the advice names it."""
     drive.imu.late_s = drive.imu.late_s + np.remainder(-drive.imu.stamp_s, 0.016)
     late = said(drive, "Timing", "The delay of imu/data_raw")
     assert late.level is Level.WARN
@@ -157,14 +160,14 @@ def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
 
 
 def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
-    """The messages of the IMU arrive 30 s after their timestamps."""
+    """If all IMU messages arrive 30 s after their timestamps, one finding says so."""
     drive.imu.late_s = drive.imu.late_s + 30.0
     (clock,) = troubles(drive)
     assert "30 s after its stamp" in clock.text
 
 
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
-    """Messages with NaN or infinity are left out, and the others are judged as usual."""
+    """Messages with NaN or infinity are counted and left out; all others are judged as usual."""
     drive.imu.values[100:103, 4] = np.nan
     drive.odom.values[50, 0] = np.inf
     found = troubles(drive)
@@ -181,7 +184,7 @@ def test_nothing_but_nan_is_told(drive: Drive) -> None:
 
 
 def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
-    """The driver warns of each refused command; only other refusals are reported."""
+    """Warnings of commands that an e-stop refuses are not reported; other refusals are."""
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
     assert not troubles(drive)
@@ -190,7 +193,7 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
 
 
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
-    """Each status is reported by its worst level, with message and number."""
+    """Each status is reported by its worst level, with its message and the number of reports."""
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.6, "omnibot_driver: IMU", 2, "the gyro is stuck", {}))
@@ -204,7 +207,10 @@ def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
 
 
 def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
-    """The robots share /diagnostics, which does not show which robot a count belongs to."""
+    """With several robots in a bag, counts in /diagnostics are not assigned to one robot.
+
+    A count in /diagnostics does not show to which robot it belongs.
+    """
     drive.imu.drop(6.0, 6.1)
     findings = judge(replace(drive.log(), alone=False))
     (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
@@ -221,7 +227,7 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 
 
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
-    """The driver stamps all its messages, so another node published these."""
+    """Messages without a timestamp are reported; the driver stamps all its messages."""
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan
     assert any("3 messages of imu/data_raw without a stamp" in item.text for item in judge(log))

@@ -27,7 +27,7 @@ def drive() -> Drive:
 def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
     drive: Drive, factor: float, advice: str
 ) -> None:
-    """An accelerometer that is set to another range reads a half or a quarter of gravity."""
+    """For half or a quarter of gravity the report recommends another accelerometer range."""
     drive.imu.values[:, 3:] *= factor
     gravity = said(drive, "IMU", "Gravity")
     assert gravity.level is Level.BAD
@@ -35,7 +35,7 @@ def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
 
 
 def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
-    """The sensor is tilted by 10° about y."""
+    """A sensor that is tilted by 10° about y at rest is reported."""
     tilt = np.radians(10.0)
     force = drive.imu.values[:, 3:].copy()
     drive.imu.values[:, 3] = force[:, 0] * np.cos(tilt) + force[:, 2] * np.sin(tilt)
@@ -44,7 +44,7 @@ def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
 
 
 def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> None:
-    """A bias of 0.05 rad/s about y can be removed by ``~/calibrate_gyro``."""
+    """For a gyro bias of 0.05 rad/s the report recommends the service ``~/calibrate_gyro``."""
     drive.imu.values[:, 1] += 0.05
     (bias,) = troubles(drive)
     assert "+0.05" in bias.text
@@ -53,7 +53,7 @@ def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> N
 
 
 def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
-    """200 readings are identical; the accelerometer varies, so it is not named."""
+    """200 identical gyro readings are BAD; the accelerometer varies, so it is not named."""
     drive.imu.values[500:700, :3] = drive.imu.values[500, :3]
     stuck = said(drive, "IMU", "identical readings")
     assert stuck.level is Level.BAD
@@ -62,7 +62,7 @@ def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
 
 
 def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
-    """The cause is a wrong ``base_radius``, or slip."""
+    """If gyro and wheels differ by 20 %, the advice mentions ``base_radius``."""
     drive.imu.values[:, 2] *= 1.2
     assert "base_radius" in said(drive, "IMU", "gyro measured 1.2").advice
 
@@ -71,32 +71,35 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """Two seconds of a turn are lost, so the next pose contains them in a single step."""
+    """A turn during lost messages is not taken for a difference between gyro and wheels.
+
+    The next pose contains the lost two seconds of the turn in a single step.
+    """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
     assert said(drive, "IMU", "gyro measured 1.000 times").level is Level.GOOD
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
-    """The robot turns during the gap, so those gyro readings are not a bias."""
+    """A gap in the odometry is not taken for rest, as the robot may turn during the gap."""
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
 def test_without_odometry_an_even_turn_is_not_taken_for_rest(drive: Drive) -> None:
-    """Rest is detected from the IMU alone, where a steady turn looks like a bias."""
+    """Without odometry a steady turn is not taken for the bias of a gyro at rest."""
     drive.odom.drop(0.0, 99.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
 def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
-    """The gyro turns in the same sense as the wheels, unlike one that is upside down."""
+    """If the gyro's sign shows that the sensor stands upright, the advice names ``imu_rpy``."""
     drive.imu.values[:, 2] *= -1.0
     assert "imu_rpy" in said(drive, "IMU", "upright").advice
 
 
 def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
-    """The robot shakes at 20 Hz while it drives."""
+    """The report gives the frequency of a vibration of 20 Hz while the robot drives."""
     times_s = drive.imu.stamp_s
     on = (times_s > 5.0) & (times_s < 15.0)
     drive.imu.values[:, 3] += 6.0 * np.sin(2 * np.pi * 20.0 * times_s) * on
@@ -106,14 +109,14 @@ def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
 
 
 def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
-    """The lag is exact to a step of the search plus half a step of the odometry."""
+    """The lag of the robot is found within a step of the search and half a step of odometry."""
     text = said(drive, "Commands", "followed").text
     lag_s = float(text.split("lag of ")[1].split(" ms")[0]) / 1e3
     assert lag_s == pytest.approx(DELAY_S, abs=0.041)
 
 
 def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) -> None:
-    """The robot reaches 70 % of the command in x and y, and 100 % of the yaw rate."""
+    """If the robot reaches only 70 % of a linear command, the advice names ``linear_scale``."""
     drive.odom.values[:, :2] *= 0.7
     drive.odom.values[:, 3:5] *= 0.7
     (slow,) = troubles(drive)
@@ -122,14 +125,14 @@ def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) ->
 
 
 def test_a_robot_that_goes_the_wrong_way_is_told_with_the_signs(drive: Drive) -> None:
-    """The measured yaw rate has the opposite sign of the command."""
+    """If the robot turns in the wrong direction, the advice names ``axis_signs``."""
     drive.odom.values[:, 2] *= -1.0
     drive.odom.values[:, 5] *= -1.0
     assert "axis_signs" in said(drive, "Commands", "followed").advice
 
 
 def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
-    """The robot stands still during the last four seconds of commands."""
+    """A robot that stands still during four seconds of commands is BAD."""
     rows = drive.odom.stamp_s > 12.0
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
     drive.odom.values[rows, 3:] = 0.0
@@ -139,19 +142,19 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 
 
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
-    """The driver stops a robot without commands, so the note explains why it stood still."""
+    """A pause in the commands is noted, since it explains why the robot stood still."""
     drive.cmd_vel.drop(10.0, 10.8)
     assert "1 time for more" in said(drive, "Commands", "paused").text
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
-    """Commands are missing for four seconds, and the robot keeps moving."""
+    """A robot that keeps moving for four seconds without commands is reported."""
     drive.cmd_vel.drop(10.0, 14.0)
     assert said(drive, "Commands", "without a command").level is Level.WARN
 
 
 def test_an_estop_is_noted_and_what_it_stops_is_not_trouble(drive: Drive) -> None:
-    """Commands continue while the e-stop keeps the robot at rest."""
+    """If the e-stop keeps the robot at rest, unfollowed commands are not reported."""
     drive.estops += [(10.0, True), (19.0, False)]
     rows = drive.odom.stamp_s > 10.1
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
@@ -162,7 +165,7 @@ def test_an_estop_is_noted_and_what_it_stops_is_not_trouble(drive: Drive) -> Non
 
 
 def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
-    """The finding has the worst level, BAD."""
+    """Motion while the e-stop is latched is BAD, the worst level."""
     drive.estops += [(10.0, True)]
     moved = said(drive, "E-stop", "moved while")
     assert moved.level is Level.BAD
@@ -170,7 +173,7 @@ def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
 
 
 def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
-    """The pose jumps by 0.5 m, which the twist does not explain."""
+    """A jump of the pose by 0.5 m that the twist does not explain is BAD."""
     drive.odom.values[300:, 0] += 0.5
     (leap,) = troubles(drive)
     assert leap.level is Level.BAD
@@ -179,7 +182,7 @@ def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
 
 
 def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None:
-    """The pose begins again at zero; the jump is not added to the distance."""
+    """A pose that begins again at zero is noted, and the jump does not count as distance."""
     way = said(drive, "Odometry", "Driven").text.split(",")[0]
     drive.odom.values[450:, :3] = 0.0
     assert not troubles(drive)
@@ -188,7 +191,7 @@ def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None
 
 
 def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
-    """Wheel B turns at half of its commanded rate."""
+    """The report finds that wheel B turns at half of its commanded rate."""
     drive.odom.values[:, :] = 0.0
     drive.imu.values[:, 2] = 0.001
     told = 5.0 * drive.told(drive.joints.stamp_s)[:, [2, 2, 2]]
@@ -220,7 +223,7 @@ def two_wheels() -> Recorder:
 
 
 def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
-    """A steering joint is not a wheel; a command of another length is read as NaN."""
+    """A steering joint is not a wheel; a wheel command of a wrong length is read as NaN."""
     log = two_wheels().log()
     assert log.wheels == JOINTS[:2]
     assert log.joint_states.values[20].tolist() == [0.5, 1.0]
@@ -232,7 +235,7 @@ def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
 
 
 def test_an_imu_that_the_board_has_not_is_not_missed(drive: Drive) -> None:
-    """The diagnostics of that board's driver have no count of IMU frames."""
+    """An absent IMU is not reported if the diagnostics show that the board has none."""
     drive.imu.drop(0.0, 99.0)
     said_of_it = [finding.text for finding in judge(drive.log())]
     assert "No message of imu/data_raw: the IMU cannot be judged." in said_of_it

@@ -40,7 +40,7 @@ def test_the_page_has_everything_inside(folder: Path) -> None:
 
 
 def test_every_picture_lies_beside_the_page(folder: Path) -> None:
-    """Each is a PNG of less than 200 kB."""
+    """Each picture is also a PNG file of less than 200 kB beside the page."""
     assert sorted(file.stem for file in folder.glob("*.png")) == PICTURES
     for file in folder.glob("*.png"):
         assert file.read_bytes().startswith(b"\x89PNG")
@@ -48,14 +48,14 @@ def test_every_picture_lies_beside_the_page(folder: Path) -> None:
 
 
 def test_a_name_cannot_become_markup(folder: Path) -> None:
-    """A bag may have any name, so the page escapes it."""
+    """The page escapes the name of the bag, which may contain markup."""
     text = (folder / "report.html").read_text()
     assert "&lt;a &amp; b&gt;" in text
     assert "<a & b>" not in text
 
 
 def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
-    """Page and terminal are made from the same findings."""
+    """The page and the terminal show the same findings."""
     drive = Drive(10.0)
     drive.estops += [(5.0, True), (6.0, False)]
     findings = judge(drive.log())
@@ -67,7 +67,7 @@ def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
 
 
 def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
-    """A topic of NaN only has no picture, and a picture of an earlier report is removed."""
+    """Values that are all NaN give no picture, and the picture of an earlier report is removed."""
     drive = Drive(10.0)
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
@@ -81,7 +81,7 @@ def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
 
 @given(st.integers(0, 40_000), st.integers(0, 2**32 - 1))
 def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) -> None:
-    """A long series is reduced to ``POINTS`` points at most."""
+    """``envelope`` reduces a long series to ``POINTS`` points at most, and keeps its extremes."""
     values = np.random.default_rng(seed).normal(size=length)
     times_s = np.arange(length, dtype=float)
     shown_s, shown = envelope(times_s, values)
@@ -98,5 +98,5 @@ def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) ->
     [(0.02, "0.02 s"), (9.0, "9 s"), (99.6, "100 s"), (150.4, "2 min 30 s"), (7384, "2 h 03 min")],
 )
 def test_lengths_of_time_are_told_as_people_do(seconds: float, told: str) -> None:
-    """At most three significant digits are shown, in the usual units."""
+    """Lengths of time are shown briefly: in s, in min and s, or in h and min."""
     assert span(seconds) == told

@@ -18,13 +18,13 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 NOISE_RADPS = 0.05
-"""Noise of a rate, in rad/s, as from the resolution of encoder and serial protocol."""
+"""Noise of a wheel rate, in rad/s, as the resolution of encoder and protocol causes it."""
 TOLERANCE = 0.01
-"""Relative tolerance of a motor's constants; that of its delay is 1 ms."""
+"""Relative tolerance of a motor's constants, except its delay, whose tolerance is 1 ms."""
 
 
 def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
-    """Return eight steps of a wheel that follows this model exactly, measured with noise."""
+    """Return eight steps of a wheel that follows the model exactly, with measuring noise."""
     random = np.random.default_rng(seed)
     steps = []
     for number in range(8):
@@ -43,7 +43,7 @@ def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
 @settings(max_examples=20)
 @given(st.floats(0.8, 1.2), st.floats(0.03, 0.2), st.floats(0.0, 0.06), st.integers(0, 2**32 - 1))
 def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed: int) -> None:
-    """The parameters are within five of their claimed standard deviations."""
+    """The parameters of a first-order wheel are found within five claimed sigmas."""
     planted = (gain, lag_s, delay_s)
     found = fit(FIRST_ORDER, made_up(FIRST_ORDER, planted, seed))
     assert (np.abs(found.values - planted) < 5 * found.sigmas + 1e-6).all()
@@ -57,7 +57,10 @@ def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed:
 def test_a_motor_is_found_in_the_manuals_loop(
     pwm_per_count: float, lag_s: float, delay_s: float, seed: int
 ) -> None:
-    """The parameters are within five sigma, and a first order does not fit better."""
+    """The parameters of a motor in the manual's loop are found within five claimed sigmas.
+
+    A model of first order does not fit better.
+    """
     planted = (1.0, pwm_per_count, lag_s, delay_s)
     steps = made_up(motor_model(MANUAL), planted, seed)
     found = fit(motor_model(MANUAL), steps)
@@ -66,7 +69,10 @@ def test_a_motor_is_found_in_the_manuals_loop(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """For 40 recordings the errors over the claims have a standard deviation near 1."""
+    """Errors divided by claimed uncertainties have a standard deviation near 1.
+
+    The test fits 40 recordings.
+    """
     planted = (1.0, 46.0, 0.06, 0.013)
     fits = [fit(motor_model(MANUAL), made_up(motor_model(MANUAL), planted, n)) for n in range(40)]
     errors = np.array([(one.values - planted) / one.sigmas for one in fits])
@@ -74,7 +80,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 
 def test_a_command_seen_a_tick_off_is_put_right() -> None:
-    """Two of eight steps have an onset that is one tick too late or too early."""
+    """The fit corrects steps whose beginning is one tick too late or too early."""
     planted = (1.0, 0.05, 0.02)
     steps = made_up(FIRST_ORDER, planted, 1)
     steps[2], steps[5] = steps[2].sooner(1), steps[5].sooner(-1)
@@ -83,7 +89,7 @@ def test_a_command_seen_a_tick_off_is_put_right() -> None:
 
 
 def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
-    """Three commands were up to 0.15 s late; in one step the wheel was blocked for a while."""
+    """Commands up to 0.15 s late are corrected; a step with a blocked wheel is left out."""
     planted = (1.0, 46.0, 0.06, 0.01)
     steps = made_up(motor_model(MANUAL), planted, 2) + made_up(motor_model(MANUAL), planted, 3)
     for number, ticks in ((1, 3), (4, 15), (9, 7)):
@@ -96,7 +102,7 @@ def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
 
 
 def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
-    """A note warns of differing answers, as one model cannot fit all steps."""
+    """If a wheel responds differently from step to step, a note says so."""
     random = np.random.default_rng(5)
     steps = made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 1) + made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 2)
     for step in steps:
@@ -116,7 +122,10 @@ def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
     ],
 )
 def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
-    """Despite encoder, friction and firmware loop the errors are below 1 %, the delay's 1 ms."""
+    """The constants of the simulated motor are found within 1 %, its delay within 1 ms.
+
+    The simulation includes encoder, friction and the control loop of the firmware.
+    """
     steps = steps_of(*steps_to_and_fro(planted), 0, LEVELS)
     motor = fit_wheel("A", steps, MANUAL).motor
     assert motor.pwm_per_count == pytest.approx(planted.pwm_per_count, rel=TOLERANCE)
@@ -125,7 +134,7 @@ def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
 
 
 def test_other_gains_must_be_told() -> None:
-    """With the true gains the motor is found; with the manual's the misfit shows the mistake."""
+    """If a firmware has gains other than the manual's, only a fit with these gains is good."""
     gains = WheelGains(feed_forward=15.0, proportional=40.0, integral=5.0)
     steps = steps_of(*steps_to_and_fro(MotorConstants(), gains), 0, LEVELS)
     told = fit_wheel("A", steps, Gains(15.0, 40.0, 5.0))
@@ -136,7 +145,7 @@ def test_other_gains_must_be_told() -> None:
 
 
 def test_rise_and_overshoot_are_those_of_the_answer() -> None:
-    """A first order rises in 2.2 time constants and does not overshoot."""
+    """A first-order response rises in 2.2 time constants and does not overshoot."""
     traits = fit(FIRST_ORDER, made_up(FIRST_ORDER, (1.0, 0.1, 0.0), 3)).traits()
     rise_s, sigma_s = traits["rise time"]
     assert rise_s == pytest.approx(0.22, abs=5 * sigma_s + 2e-3)
@@ -151,7 +160,7 @@ def test_a_damped_swing_overshoots_as_the_books_say() -> None:
 
 
 def test_lost_deltas_are_left_out() -> None:
-    """A fifth of the deltas is lost, and the others still determine the motor."""
+    """The motor is still found if a fifth of the deltas is lost."""
     commands, wheels = steps_to_and_fro(MotorConstants())
     kept = np.random.default_rng(1).random(len(wheels.stamp_s)) > 0.2
     thinned = replace(
@@ -165,7 +174,7 @@ def test_lost_deltas_are_left_out() -> None:
 
 
 def test_odometry_that_was_lost_is_said() -> None:
-    """Five deltas do not make a complete step."""
+    """Odometry that ends after five deltas has no complete step, which is an error."""
     commands, wheels = steps_to_and_fro(MotorConstants(), steps=2)
     silent = replace(
         wheels,

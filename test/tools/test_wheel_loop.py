@@ -55,7 +55,7 @@ def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_the_loop_is_the_simulated_boards(delay: int) -> None:
-    """Two independent programs give the same step response."""
+    """The calculated loop has the step response of the simulated board, a separate program."""
     motor = Motor(46.0, 6.0, float(delay))
     assert answer(motor, MANUAL, 100).speed == pytest.approx(
         simulated_answer(motor, MANUAL, 100), abs=1e-6
@@ -63,8 +63,7 @@ def test_the_loop_is_the_simulated_boards(delay: int) -> None:
 
 
 def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
-    """The response with a delay of 1.4 ticks lies between those with 1 and 2 ticks, at every tick
-    of the rise."""
+    """During the rise, a delay of 1.4 ticks gives a response between those of 1 and 2 ticks."""
     sooner, between, later = (
         answer(Motor(46.0, 6.0, delay), MANUAL, 8).speed for delay in (1.0, 1.4, 2.0)
     )
@@ -75,7 +74,7 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
 @settings(max_examples=25)
 @given(wheel_motors, st.floats(0.02, 3.0))
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
-    """The sensitivity at any frequency, from the impulse response, does not exceed Ms."""
+    """At no frequency does the sensitivity, computed from the impulse response, exceed Ms."""
     ticks = 4000
     pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks).speed, prepend=0.0)
     z = np.exp(1j * frequency)
@@ -88,7 +87,7 @@ def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: floa
 @settings(max_examples=15)
 @given(st.floats(0.01, 0.3), st.floats(0.0, 0.08))
 def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: float) -> None:
-    """The deltas agree with a numerical integral of scipy's step response."""
+    """Deltas of a first-order wheel agree with the numerical integral of scipy's response."""
     times_s = np.linspace(0.0, 0.6, 6001)
     _, response = signal.step(([1.0], [time_constant_s, 1.0]), T=times_s)
     _check(first_order, np.array([time_constant_s, delay_s]), times_s, response, delay_s)
@@ -104,7 +103,10 @@ def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: flo
 def test_second_order_deltas_are_mean_values(
     omega: float, damping: float, zero_s: float, delay_s: float
 ) -> None:
-    """The deltas agree with scipy's response for any damping, with a zero in either half-plane."""
+    """Deltas of a second-order wheel agree with scipy's response.
+
+    The damping is arbitrary, and the zero is in either half-plane.
+    """
     times_s = np.linspace(0.0, 0.6, 6001)
     system = ([zero_s, 1.0], [1 / omega**2, 2 * damping / omega, 1.0])
     _, response = signal.step(system, T=times_s)
@@ -132,7 +134,7 @@ def test_two_equal_poles_are_no_exception() -> None:
 
 
 def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
-    """At the end of a tick the angle is the sum of the speeds of all ticks."""
+    """The angle at the end of a tick is the sum of all speeds so far, times the tick."""
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))
     speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5).speed
@@ -142,7 +144,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @settings(max_examples=5)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
-    """The gains keep the limits of Ms and overshoot, and lower errors after command and load."""
+    """Better gains keep the limits of Ms and overshoot, and reduce the control errors."""
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)
     assert after.ms <= LARGEST_MS
@@ -156,7 +158,7 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
 
 
 def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
-    """The limits hold even for the motor that these gains suit least."""
+    """Gains for three motors keep within the limits with each of the motors."""
     motors = [Motor(46.0, 6.0, 0.0), Motor(35.0, 10.0, 1.0), Motor(60.0, 4.0, 3.0)]
     gains = better_gains(motors)
     for motor in motors:
@@ -166,7 +168,7 @@ def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
 
 
 def test_what_is_predicted_comes_about() -> None:
-    """The simulated board's controller with the proposed gains has the predicted response."""
+    """With the proposed gains the simulated board has the predicted overshoot and error."""
     motor = Motor(46.0, 6.0, 2.0)
     gains = better_gains([motor])
     speeds = np.array(simulated_answer(motor, gains, 200))

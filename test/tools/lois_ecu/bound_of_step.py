@@ -6,11 +6,16 @@ Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-The robots are the random ones of ``judge_step.py``, with 24 starts of 120 ticks each. The noise of
-the times between marks is of three kinds. With "each time" it is 10 % and independent; with "other
-marks" it is 10 %, from misplaced marks that differ in each turn. With "same marks" the marks are
-the same in each turn, so that they can be found, and only the board's steps of 0.1 ms remain. In
-addition the load changes by 0.5 % from record to record, which is taken for a change of the rate.
+The robots are the random ones of ``judge_step.py``, with 24 starts of 120 ticks each. The program
+prints the bound for three kinds of noise in the times between marks:
+
+- "each time": every time has an independent error of 10 %.
+- "other marks": the marks are misplaced differently in each turn, which changes the times by 10 %.
+- "same marks": the marks have the same places in each turn, so a fit can find the places. Only the
+  rounding of the times to 0.1 ms remains.
+
+In all three cases the load, and with it the rate of the wheel, also changes by 0.5 % from record to
+record.
 """
 
 from random import Random
@@ -29,7 +34,7 @@ Column = NDArray[np.float64]
 
 
 def times_s(values: Column) -> Column:
-    """Return the times in s at which the marks are passed.
+    """Return the times in s at which the marks of a starting wheel are passed.
 
     ``values`` are the rate in marks per s, the slow and the fast time constant in s, then the
     places of the marks.
@@ -40,7 +45,7 @@ def times_s(values: Column) -> Column:
 
 
 def bound(rate: float, slow_s: float, fast_s: float, kind: str) -> float:
-    """Return the least relative standard deviation of the fast time constant."""
+    """Return the lower bound of the relative standard deviation of the fast time constant."""
     information = np.zeros((3, 3))
     for record in range(RECORDS):
         places = (record + 0.5) / RECORDS + np.arange(SAMPLES + 1)
@@ -65,7 +70,7 @@ def _slope(values: Column, place: int | slice) -> Column:
 
 
 def _covariance(kind: str, ways_s: Column) -> Column:
-    """Return the covariance of the relative errors of the times."""
+    """Return the covariance of the relative errors of the times ``ways_s`` between marks."""
     count = len(ways_s)
     if kind == "each time":
         return NOISE**2 * np.eye(count)

@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge fit and tuning on random robots whose plants the fit does not know.
+"""Judge the fit and the tuning of wheels on random robots with unknown motors.
 
 Run this by hand, with the number of robots and optionally the seed of the first one:
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_fit.py 20
 
-Unlike ``judge_step.py`` it needs no driver, and takes ten seconds for each wheel. Motors and
-encoders are those of the simulated board; the steps are made by the complete board with the public
-firmware.
+Unlike ``judge_step.py``, this program needs no driver; it takes ten seconds for each wheel. The
+records come from the simulated motors and encoders alone. The steps come from the complete
+simulated board with the public firmware.
 """
 
 import sys
@@ -36,7 +36,7 @@ FREQUENCY_HZ = 11.0
 
 
 def starts(motor: MotorSettings, wheel: int, random: Random) -> list[Column]:
-    """Return records of starts at full duty; after each the wheel rolls to a random place."""
+    """Return records of starts at full duty, each from a random position of the wheel."""
     short, long = CORRECTIONS[wheel]
     encoder = Encoder(TICKS, long / (short + long), noise=MARK_NOISE, random=random)
     found = []
@@ -58,7 +58,7 @@ def starts(motor: MotorSettings, wheel: int, random: Random) -> list[Column]:
 
 
 def stepped(motor: MotorSettings, gains: PiGains, target_rpm: float) -> Column:
-    """Return the true speed after a step, in RPM, every 10 ms."""
+    """Return the wheel's true speed in RPM, every 10 ms after a step to ``target_rpm``."""
     board = SimulatedLois(LoisSettings(quirks=FIRMWARE, running=True, motors=(motor, motor)))
     for setting, value in (
         (Setting.RPM_LOW_PASS, 1.0),
@@ -80,14 +80,14 @@ def stepped(motor: MotorSettings, gains: PiGains, target_rpm: float) -> Column:
 
 
 def recorded(rpm: Column) -> Column:
-    """Return the times between ticks, in s, of a wheel with even marks at these speeds."""
+    """Return the times between ticks, in s, of a wheel with evenly spaced marks at these speeds."""
     ticks = np.cumsum(rpm) * 0.01 * TICKS / 60
     at_s = np.interp(np.arange(0.4, ticks[-1]), ticks, 0.01 * np.arange(1, len(ticks) + 1))
     return np.diff(at_s, prepend=0.0)[:SAMPLES]
 
 
 def judge(motor: MotorSettings, wheel: int, random: Random) -> str:
-    """Return a row: errors of the time constants, overshoot, error of a step."""
+    """Return a row of text: errors of the time constants, overshoot, and error of a step."""
     found = fit(starts(motor, wheel, random), TICKS)
     half_rpm = motor.rpm_per_percent * (50.0 - motor.dead_zone_percent)
     slope = (found.final_rpm - half_rpm) / 50.0
@@ -113,7 +113,7 @@ def judge(motor: MotorSettings, wheel: int, random: Random) -> str:
 
 
 def main(robots: int, first: int = 0) -> None:
-    """Print a row for each wheel of ``robots`` robots, from the seed ``first`` on."""
+    """Print a row for each wheel of ``robots`` random robots, whose seeds begin at ``first``."""
     for seed in range(first, first + robots):
         for wheel, motor in enumerate(random_motors(seed)):
             row = judge(motor, wheel, Random(f"judge {seed} {wheel}"))

@@ -1,13 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge ``calibrate step`` on random robots with a LOIS ECU whose plants it does not know.
+"""Judge ``calibrate step`` on random robots with a LOIS ECU and unknown motors.
 
 Run this by hand, with the number of robots and optionally the seed of the first one:
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-It takes about two minutes for each robot. The overshoot is that of the true speed, on a robot with
-the gains found and with evenly spaced marks.
+The program takes about two minutes for each robot. The overshoot that it prints is that of the
+true wheel speed, on a robot with the gains found and with evenly spaced marks.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ Motors = tuple[MotorSettings, MotorSettings]
 
 
 def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
-    """Return what the tool finds for both wheels."""
+    """Run ``calibrate step`` on a simulated robot; return what it finds for both wheels."""
     robot = SimulatedRobot(folder, motors, seed=seed)
     arguments = command_line().parse_args(["step", "--yes"])
     with (
@@ -48,9 +48,9 @@ def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
 
 
 def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) -> list[float]:
-    """Return each wheel's true overshoot of a step with these gains.
+    """Return the true overshoot of each wheel in a step with the gains found.
 
-    It is a part of the final speed, or of the target if that is higher.
+    The overshoot is relative to the final speed or to the target, whichever is higher.
     """
     robot = SimulatedRobot(folder, motors, mark_noise=0.0)
     found = pi_step._gains({wheel.name: wheel.tuned for wheel in wheels})
@@ -71,7 +71,7 @@ def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) 
 
 
 def main(robots: int, first: int = 0) -> None:
-    """Print a row for each wheel of ``robots`` robots, from the seed ``first`` on."""
+    """Print a row for each wheel of ``robots`` random robots, whose seeds begin at ``first``."""
     for seed in range(first, first + robots):
         motors = random_motors(seed)
         with tempfile.TemporaryDirectory() as name:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot with a LOIS ECU in simulated time, in place of a running driver."""
+"""A simulated robot with a LOIS ECU, in simulated time, that replaces a running driver."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -36,9 +36,9 @@ SETTINGS = SessionSettings(
 
 
 def random_motors(seed: int, *, unequal: float = 0.05) -> tuple[MotorSettings, MotorSettings]:
-    """Return random motors of second order, with dead time and backlash.
+    """Return two random motors of second order, with dead time and backlash.
 
-    The two wheels differ by ``unequal`` (relative standard deviation).
+    The constants of the two motors vary by ``unequal`` (relative standard deviation).
     """
     random = Random(f"plant {seed}")
     slow_s = random.uniform(0.15, 0.5)

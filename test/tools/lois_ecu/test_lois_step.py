@@ -45,7 +45,7 @@ PLANT = Plant(0.66, 0.3, 0.1, 6.0)
 
 
 def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Column]:
-    """Return times between ticks, in s, of starts at full duty over misplaced encoder marks."""
+    """Return simulated records of starts at full duty: times in s between misplaced marks."""
     random = np.random.default_rng(seed)
     times_s = np.arange(0.0, 6.0, 1e-4)
     way = plant.final_rpm(100.0) * TICKS / 60 * turned(times_s, plant.slow_s, plant.fast_s)
@@ -61,7 +61,10 @@ def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Co
 
 @pytest.mark.parametrize("fast_s", [0.0, 0.1, 0.3])
 def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
-    """A first order and two equal time constants are tested too."""
+    """The function ``speed`` of a plant is the derivative of ``turned``.
+
+    A first order (``fast_s`` of 0) and two equal time constants are tested, too.
+    """
     times_s = np.linspace(0.0, 3.0, 3001)
     slope = np.gradient(turned(times_s, 0.3, fast_s), times_s)
     assert slope[1:-1] == pytest.approx(speed(times_s, 0.3, fast_s)[1:-1], abs=2e-3)
@@ -70,7 +73,7 @@ def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
 
 @pytest.mark.parametrize("slow_s", [0.2, 0.45])
 def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
-    """The plant is of second order; misplaced marks change the times between ticks by 10 %."""
+    """The fit finds a second-order plant although misplaced marks change the times by 10 %."""
     planted = Plant(0.62, slow_s, 0.4 * slow_s, 5.0)
     found = fit(starts(planted, 8), TICKS)
     assert found.order == 2
@@ -81,7 +84,10 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """Of 10 % noise only the rounding of the clock remains, less than 1 %."""
+    """The fit finds the places of marks, which reduces a noise of 10 % to less than 1 %.
+
+    The rest is the rounding of the clock.
+    """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
     assert np.std(found.marks.steps) == pytest.approx(0.1, abs=0.02)
@@ -90,14 +96,17 @@ def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant(
 
 
 def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
-    """By chance any noise shows some pattern, which must not be accepted."""
+    """Noise that differs from turn to turn shows a pattern by chance, which is not accepted."""
     random = np.random.default_rng(4)
     assert marks_in([0.1 * random.standard_normal(120) for _ in range(24)], TICKS) is None
     assert marks_in([np.zeros(120)] * 24, TICKS) is None
 
 
 def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
-    """The public firmware misses ticks or times them late while it sends."""
+    """Missed and late ticks hardly change the fit.
+
+    The public firmware misses ticks or times them late while it sends.
+    """
     records = starts(PLANT, 8)
     for number, record in enumerate(records):
         late, missed = 30 + 5 * number, 60 + 7 * number
@@ -114,14 +123,14 @@ def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
 
 
 def test_records_that_are_too_short_are_refused() -> None:
-    """The error names ``record_samples``, which makes records longer."""
+    """For short records the error names ``record_samples``, which sets the length of records."""
     with pytest.raises(ToolError, match="record_samples"):
         fit([one[:20] for one in starts(PLANT, 3)], TICKS)
 
 
 @pytest.mark.parametrize("begins", [0, 1])
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
-    """Missed edges do not confuse the two levels."""
+    """The corrections of short and long ticks are found in either order, despite missed edges."""
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
     ticks_s[[40, 41, 120]] *= 2.0
@@ -134,7 +143,10 @@ def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -
 @pytest.mark.parametrize("margin", [None, 60.0])
 @pytest.mark.parametrize("overshoot", [0.02, 0.1])
 def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> None:
-    """Tn compensates the slow pole; Td is 0 where a phase margin is not wanted."""
+    """Tuned gains meet the goals for overshoot and phase margin.
+
+    Tn compensates the slow pole, and Td is 0 without a goal for the phase margin.
+    """
     goals = Goals(overshoot=overshoot, phase_margin_deg=margin)
     found = tune(PLANT, LOOP, goals)
     assert found.gains.tn_s == pytest.approx(PLANT.slow_s * 0.2 / 0.091)
@@ -148,7 +160,7 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [PLANT, Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """The goal is 5 %; with ticks delayed by sending, 95 % of the steps stay below 8 %."""
+    """With a goal of 5 %, 95 % of the overshoots are below 8 % on a board that sends meanwhile."""
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
     begun, sent_s = np.meshgrid(np.arange(0.0, 1.0, 0.1), np.arange(0.0, 0.2, 0.02))
@@ -159,7 +171,7 @@ def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plan
 
 
 def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
-    """The response is identical, whereas sending during the step changes it."""
+    """A board that sends after a step does not change the response; one that sends earlier does."""
     loop, gains = replace(LOOP, sends_each_s=100.0), PiGains(0.8, 0.6, 0.1)
     calm = answer(PLANT, gains, loop, 31.0, 3.0)
     late = answer(PLANT, gains, loop, 31.0, 3.0, sent_s=np.arange(50.0, 49.9, -0.01))
@@ -169,14 +181,17 @@ def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
 
 
 def test_goals_that_nothing_meets_are_told() -> None:
-    """The plant is much faster than its controller."""
+    """An error says that no gains meet the goals, here for a plant faster than its controller."""
     slow = Loop(1.0, TICKS, 0.5)
     with pytest.raises(ToolError, match="allow more"):
         tune(Plant(0.66, 0.02, 0.0), slow, Goals(overshoot=0.0, band=0.001, phase_margin_deg=89.9))
 
 
 def test_a_phase_margin_is_that_of_the_open_loop() -> None:
-    """By hand: with small lags the open loop is Kp K / (s Tn), and its gain is 1 at Kp K / Tn."""
+    """The phase margin is compared with that of a simple open loop, calculated by hand.
+
+    With small lags the open loop is Kp K / (s Tn), and its gain is 1 at Kp K / Tn.
+    """
     loop = Loop(1e-6, 10**9, nominal_s=1e-6)
     plant = Plant(1.0, 0.5, 0.0)
     margin = phase_margin_deg(plant, PiGains(1.0, 0.5, 0.0), loop, 1000.0)
@@ -188,7 +203,7 @@ def test_a_phase_margin_is_that_of_the_open_loop() -> None:
 
 
 def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
-    """A dead time of 40 ms is found within 11 ms."""
+    """A dead time of 40 ms is found within 11 ms from the response to a step."""
     gains = tune(PLANT, LOOP, Goals()).gains
     dead_s = 0.04
     rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0, begun=0.6)
@@ -203,7 +218,10 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
 def test_a_step_is_predicted_as_the_simulated_board_makes_it(
     firmware: Firmware, gains: PiGains
 ) -> None:
-    """Two independent programs for one controller, which runs 11 or 5 times a second, agree."""
+    """The predicted step agrees with that of the simulated board, which is a separate program.
+
+    The controller runs 11 or 5 times a second, depending on the firmware.
+    """
     motor = MotorSettings(
         rpm_per_percent=0.66,
         dead_zone_percent=6.0,
@@ -237,7 +255,7 @@ def test_a_step_is_predicted_as_the_simulated_board_makes_it(
 
 
 def test_traits_of_an_answer_are_read_off_it() -> None:
-    """The response is a decaying oscillation with a known overshoot."""
+    """The overshoot and the settling time of a decaying oscillation are found."""
     times_s = np.arange(0.0, 4.0, 1e-3)
     rpm = 40.0 * (1 - np.exp(-3 * times_s) * np.cos(6 * times_s))
     found = traits(rpm, 40.0, 0.05)
@@ -247,7 +265,10 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 
 
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
-    """By the manual the unit is 100 ns, in which a tick of a usual wheel overflows the record."""
+    """A record of times that have overflowed is refused.
+
+    In the unit of 100 ns, which the manual gives, the time of a tick of a usual wheel overflows.
+    """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
     save(RecordReading(record, 1e-7, TICKS), path)
@@ -256,7 +277,7 @@ def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> No
 
 
 def test_whoever_has_gains_as_parameters_can_do_it() -> None:
-    """The driver's parameters decide, not the name of its board."""
+    """``calibrate step`` accepts a driver by its parameters for gains, not by its board's name."""
     values = PARAMETERS.check_all({})
     require_able("step", values)
     with pytest.raises(ToolError, match="the OmniBot's wheels"):
@@ -266,10 +287,10 @@ def test_whoever_has_gains_as_parameters_can_do_it() -> None:
 def test_a_robot_is_calibrated_from_its_records(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Corrections, plant and gains are found, and set in the driver.
+    """``calibrate step`` finds corrections, plants and gains, and sets them in the driver.
 
-    The robot has marks that are 10 % off, wheels that differ, dead time and backlash. All found
-    parameters may be saved in the driver's calibration file.
+    The robot has marks that are 10 % off, unequal wheels, dead time and backlash. The driver's
+    calibration file may contain every parameter that is set.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
@@ -300,7 +321,7 @@ def test_a_robot_is_calibrated_from_its_records(
 
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
-    """With slow gains the predicted error of a step is larger than with tuned ones."""
+    """With slow gains the predicted control error of a step is larger than with tuned gains."""
     good = tune(PLANT, LOOP, Goals()).gains
     slow = PiGains(0.05, 2.0, 1.0)
     assert told(PLANT, slow, LOOP, Goals()).error_s > told(PLANT, good, LOOP, Goals()).error_s
