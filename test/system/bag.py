@@ -63,7 +63,7 @@ def _time(duration: Duration) -> QosTime:
 
 
 class Recorder:
-    """Records all topics that a driver publishes, found at run time.
+    """Records all topics that a driver publishes; the topics are found at run time.
 
     The keys of ``messages``, ``types`` and ``offered`` (qualities of service) are topics.
     """

@@ -68,7 +68,10 @@ class Outcome:
 
 
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
-    """Drive for ``seconds``, rest for 2 s, and compare the messages with the board's frames."""
+    """Drive for ``seconds``, rest for 2 s, and compare the messages with the board's frames.
+
+    The caller must have initialised rclpy.
+    """
     from driver_process import Driver
     from geometry_msgs.msg import Twist
     from nav_msgs.msg import Odometry

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import NoReturn
 
 LARGEST_REQUEST = 1 << 17
-"""Largest size in bytes of a request, which has the arguments and environment of a driver."""
+"""Largest size in bytes of a request: the arguments and the environment of a driver."""
 
 
 class Forked:

@@ -107,7 +107,7 @@ class Driver:
     def end(self, *signals: signal.Signals) -> int:
         """Send the signals in order, wait until the driver has ended, and return its exit code.
 
-        ``lines`` then has all output of the driver.
+        After the call, ``lines`` has all output of the driver.
         """
         for number in signals:
             self.process.send_signal(number)

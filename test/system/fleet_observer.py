@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Program that, as super client of a discovery server, waits for all drivers of a fleet.
+"""Program that waits, as a super client of a discovery server, for all drivers of a fleet.
 
 Run ``python fleet_observer.py COUNT PREFIX``. The program is a separate process, because with Fast
 DDS a process that has been a client of a server finds nothing without a server afterwards.

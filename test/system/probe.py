@@ -117,7 +117,7 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the probe's newest message again, after the end of a stall of the driver.
+        """Publish the probe's newest message again, after a delay that is longer than a stall.
 
         After the delay the driver logs a refusal again, so the probe notices a second stall.
         """
@@ -187,7 +187,7 @@ class Probe:
     def call(self, kind: type, service: str, **request: object) -> Any:
         """Call a service and return its answer.
 
-        The call is repeated if a stall has ended the driver's task.
+        The call is repeated if a stall of the driver has ended the requested task.
         """
         for _ in range(20):
             answer = self.call_async(kind, service, **request).wait()

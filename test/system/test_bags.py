@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bags keep the topics of a driver, and a driver can replay its recorded bytes."""
+"""A bag keeps all messages of a driver, and a driver can replay its recorded bytes."""
 
 import signal
 from contextlib import ExitStack
@@ -108,7 +108,7 @@ def wire(drive: Drive, topic: str) -> list[bytes]:
 
 
 def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
-    """Each read or write of the port is one message: frames, a command, the pause, last a Stop."""
+    """The raw topics have one message for each read and each write of the port."""
     received, sent = (wire(drive, topic) for topic in RAW)
     assert b"\xff\xfa" in b"".join(received)
     assert b"Paused: 0 \n" in b"".join(received)

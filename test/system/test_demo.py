@@ -138,7 +138,10 @@ def _python_path() -> str:
 
 
 def marked(mark: str, name: str = "") -> list[int]:
-    """Return the ids of processes with ``mark`` in the environment and ``name`` in the command."""
+    """Return the ids of the processes that have ``mark`` in their environment.
+
+    Only processes with ``name`` in their command line count.
+    """
     found = []
     for directory in Path("/proc").glob("[0-9]*"):
         try:
@@ -222,9 +225,10 @@ def test_laps_are_told_in_english(
 def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The demo's text for such a robot omits the IMU, and says that the robot turns at corners.
+    """The demo of a robot without an IMU shows no IMU data.
 
-    The command for the real robot names the board.
+    If the robot cannot drive sideways, the demo says that the robot turns at the corners. The
+    command for the real robot names the board.
     """
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     page = "docs/boards/cart.md"
@@ -324,7 +328,7 @@ def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
 
 
 def test_a_killed_demo_leaves_nobody_behind() -> None:
-    """After SIGKILL of the demo, which cannot act on it, the simulator and the driver still end."""
+    """If the demo is killed by SIGKILL, the simulator and the driver still end."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.kill()

@@ -64,7 +64,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 ) -> None:
     """The driver refuses an old command by its send time, which the middleware provides.
 
-    The stamp of a goal does not matter. The driver obeys the next command.
+    The refusal does not depend on the stamp of a goal. The driver obeys the next command.
     """
     hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
     board: PtyBoard = start_board(control=control, running=True)
@@ -177,7 +177,7 @@ def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBo
 
 
 def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoard) -> None:
-    """A message true on the topic ``estop`` latches the e-stop; only the service releases it."""
+    """The value true on the topic ``estop`` latches the e-stop; only the service releases it."""
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop")
     button.publish(Bool(data=True))

@@ -110,7 +110,7 @@ def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
 def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The guard stops the robot of a hanging driver; then only a fresh command moves the robot.
+    """The guard stops the robot of a hanging driver; later only a fresh command moves the robot.
 
     A command that waited in the middleware during the hang is not fresh.
     """

@@ -74,7 +74,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
 def test_the_gyro_is_calibrated_saved_and_loaded_again(
     robot: Robot, start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """The service reports the planted gyro bias, subtracts it, and saves it in the file.
+    """``~/calibrate_gyro`` reports the planted bias, subtracts it, and saves it in the file.
 
     Another driver loads the bias from the file.
     """
@@ -97,7 +97,7 @@ def test_the_gyro_is_calibrated_saved_and_loaded_again(
 
 
 def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot) -> None:
-    """If the calibration file is damaged, the bias is applied, and the file is not changed."""
+    """If the calibration file is damaged, a new gyro bias is applied, but not saved."""
     robot.file.write_text("gyro_bias: [1, 2")
     answer = robot.probe.call(Trigger, "calibrate_gyro")
     assert not answer.success
@@ -201,7 +201,7 @@ def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
 
 
 def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> None:
-    """Frame names in odom have the prefix, and the driver warns only once of a missing tf2_ros."""
+    """Frame names in odom begin with ``frame_prefix``; a missing tf2_ros is reported once."""
     odometry = robot.probe.listen(Odometry, "odom")
     robot.probe.wait_for(lambda: odometry)
     assert odometry[-1].header.frame_id == "robot1/odom"

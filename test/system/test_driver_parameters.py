@@ -216,10 +216,10 @@ def test_every_parameter_is_described(
 def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A speed limit of commands may not exceed the fastest speed that odometry accepts.
+    """``max_linear_speed`` must not exceed ``fastest_linear_speed``, the limit of odometry.
 
     The driver refuses a change of either parameter that breaks this rule, and keeps the old value.
-    One request may raise both.
+    One request may raise both parameters. The same holds for the angular speeds.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))

@@ -22,7 +22,7 @@ Start = Callable[..., Any]
 
 
 def descriptors(driver: Driver) -> int:
-    """Return how many file descriptors the driver has open, even if it is about to close them."""
+    """Return how many file descriptors the driver has open, including those it closes soon."""
     return len(os.listdir(f"/proc/{driver.process.pid}/fd"))
 
 
@@ -64,7 +64,7 @@ def test_an_unplugged_board_is_found_again(
 def test_a_stop_that_cannot_be_sent_is_said_at_the_end(
     start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """If the board is unplugged while driving, the last line says that the stop was not sent."""
+    """If the board is unplugged while driving, the driver logs at its end that no stop was sent."""
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)) as board:
         driver: Driver = start_driver(str(link), cmd_vel_timeout=10.0)

@@ -67,7 +67,7 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
 def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     probe: Probe, driver: Driver
 ) -> None:
-    """A message true on ``estop`` latches the e-stop even if false follows it at once.
+    """The value true on ``estop`` latches the e-stop, even if false follows at once.
 
     All messages wait while the driver is suspended. A button publishes false when it is released.
     """

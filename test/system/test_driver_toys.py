@@ -113,7 +113,7 @@ def test_the_estop_stops_a_toy_until_it_is_released(
 def test_whatever_ends_the_driver_stops_a_toy(
     start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
 ) -> None:
-    """The driver's exit, or the guard on all lines of the board, stops a toy robot."""
+    """When the driver ends or hangs, its exit or the guard stops a toy robot."""
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -169,7 +169,7 @@ def test_the_raw_bytes_of_each_line_have_a_topic(
 def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The driver names the missing line; when the driver dies, its guard stops the other half."""
+    """If one of two lines is missing, the driver names it, and the guard uses the other line."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"
     driver = start_toy(start_driver, toy)

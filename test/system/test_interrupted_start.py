@@ -32,7 +32,7 @@ runpy.run_module({module!r}, run_name="__main__")
 def test_it_ends_as_it_does_later(
     module: str, arguments: list[str], library: str, exit_code: int, said: str
 ) -> None:
-    """After ctrl-C during the imports the exit code is the usual one, without a traceback."""
+    """Ctrl-C during the imports gives the usual exit code for ctrl-C, without a traceback."""
     program = INTERRUPTED_AT.format(module=module, library=library)
     done = subprocess.run(
         [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False

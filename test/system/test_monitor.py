@@ -37,10 +37,11 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
-    """Press the key w, again if necessary, until the robot drives and ``said`` has its command.
+    """Press the key w, again if necessary, until the robot drives.
 
-    After a stall of the computer the monitor may discard a key press as outdated. It may also
-    discover the driver earlier than the subscription of the test.
+    ``said`` must also have the command of the key. After a stall of the computer the monitor may
+    discard a key press as outdated. It may also discover the driver earlier than the subscription
+    of the test.
     """
     for _ in range(20):
         said.clear()
@@ -52,7 +53,7 @@ def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
 
 
 def wait_for_ticks(board: PtyBoard, ticks: int) -> None:
-    """Wait for this number of the board's ticks, which are 10 ms of the board's time each."""
+    """Wait until the board has made ``ticks`` more ticks, which are 10 ms each."""
     until = board.board.tick + ticks
     assert board.wait_for(lambda b: b.tick >= until, PATIENCE_S)
 

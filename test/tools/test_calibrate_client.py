@@ -24,7 +24,7 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In a wrong namespace the tool names the drivers that run, and returns exit code 1."""
+    """For a wrong namespace the tool names the drivers that run, and returns exit code 1."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
     said = capsys.readouterr().err

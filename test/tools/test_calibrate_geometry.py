@@ -56,7 +56,10 @@ def paths() -> list[tuple[str, Column, bool]]:
 
 
 def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
-    """Return noisy tape readings of a slipping robot whose sizes are ``factors`` and ``base``."""
+    """Return noisy tape readings of a slipping robot with the sizes ``factors`` and ``base``.
+
+    The sizes are relative to those that the tool believes.
+    """
     made = []
     for name, path, heading in paths():
         rims = np.abs(rims_of(path, BASE_M))

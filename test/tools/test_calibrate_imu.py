@@ -65,7 +65,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 def test_level_is_the_turn_that_makes_gravity_point_up(
     roll: float, pitch: float, mounting: float
 ) -> None:
-    """Roll and pitch found at rest agree with the rotation matrix that is written out here."""
+    """Roll and pitch found at rest agree with the rotation matrix written out in this test."""
     roll += mounting
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     to_body = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])

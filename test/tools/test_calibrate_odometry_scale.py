@@ -63,7 +63,7 @@ def arguments(subcommand: str, *words: str) -> argparse.Namespace:
 
 
 def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
-    """Return a console whose user measures exactly, but adds ``misread_mm`` to the last line."""
+    """Return a console whose user measures exactly, but adds ``misread_mm`` to the last reading."""
     marks = [drive.wanted for drive in plan(1.0, 3)]
     asked = 0
 

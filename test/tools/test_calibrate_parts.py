@@ -37,7 +37,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """A robot with slow odometry has 3 s to obey before the tool reports an error.
+    """A robot with slow odometry has 3 s to move before the tool reports an error.
 
     The error does not mention scales, because this robot has no parameter for them.
     """
@@ -85,7 +85,7 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """The error says by how far, how much or how long the robot exceeded the bounds.
+    """The error says how far the robot drove, how much it turned, or how long it took.
 
     A pose that is not finite is an error, too.
     """

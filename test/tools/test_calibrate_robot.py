@@ -46,7 +46,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` each time from ``AFTER_S`` after the motion began."""
+    """Return a callback that calls ``action`` at each of its calls after ``AFTER_S`` of motion."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -119,7 +119,10 @@ def test_a_value_of_the_diagnostics_is_found_by_its_name(robot: Robot, rigged: R
 
 
 def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
-    """A robot that goes too far by its odometry is stopped; too fast commands are not sent."""
+    """A robot that goes too far by its odometry is stopped.
+
+    Commands above the speed limit are not sent.
+    """
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
     with pytest.raises(ToolError, match=r"it went too far \(0\.\d\d m from its start, 0\.05"):
         robot.drive(steady(SLOWLY, 10.0), near)

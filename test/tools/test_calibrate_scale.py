@@ -80,7 +80,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """A speed whose commands paused is not used, as the driver may have stopped the robot."""
+    """A speed is not used if its commands paused, as the driver may have stopped the robot."""
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
     middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]

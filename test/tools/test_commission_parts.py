@@ -48,7 +48,10 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
-    """Return where up is, in the sensor's axes, for a level, nose-up and left-side-up robot."""
+    """Return the upward direction, in the sensor's axes, for three postures of the robot.
+
+    The postures are level, nose up and left side up.
+    """
     bodies = (
         (0.0, 0.0, 1.0),
         (math.sin(nose_rad), 0.0, math.cos(nose_rad)),
@@ -82,7 +85,7 @@ def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
 def test_a_wheel_is_itself_or_it_is_a_contradiction(
     wheel: int, pattern: tuple[int, int, int]
 ) -> None:
-    """If one wheel is commanded, the user sees that wheel alone turn, in either direction.
+    """A commanded wheel has two possible patterns: it turns alone, forward or backward.
 
     All other patterns of the 27 are contradictions.
     """
@@ -99,7 +102,7 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """If one axis is commanded, the user sees the expected pattern or its reverse.
+    """A commanded axis has two possible patterns: the expected one and its reverse.
 
     All other patterns of the 27 are contradictions.
     """
@@ -167,7 +170,7 @@ def test_a_clumsy_hand_still_finds_right_angles(
 
 
 def test_a_sensor_mounted_askew_stays_so() -> None:
-    """A yaw of 30° is too far from a right angle to be rounded to one."""
+    """The yaw of a sensor that is mounted at 30° is not rounded to a right angle."""
     assert mounting(*postures(rotation(math.pi, 0, math.pi / 6), 0.5, 0.5)).snapped() is None
 
 
@@ -197,7 +200,7 @@ def resting(
 
 
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
-    """The angle of a turn is measured about the vertical, without the gyro's bias.
+    """The angle of a turn is measured about the vertical, after the gyro's bias is subtracted.
 
     A turn to the right or by too little is a contradiction.
     """
@@ -271,7 +274,7 @@ def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """In the right frame a command has the same direction in the body after a turn."""
+    """In the right delta frame a command keeps its direction in the body when the robot turns."""
 
     def heading(rad: float) -> Drift:
         return steady(0.1 * math.cos(rad), 0.1 * math.sin(rad))
@@ -285,7 +288,7 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """The drift of a turn on the spot shows whether the deltas are understood as what they are.
+    """A turn on the spot shows whether the driver interprets the deltas correctly.
 
     Calculated by hand: 0.5 rad/s is 20 mrad, or 24 counts of each wheel, in 40 ms.
     """
@@ -298,7 +301,10 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """A drift uses only data from its own time; missing data or a robot at rest is an error."""
+    """``drift`` uses only data from the given interval of time.
+
+    Missing data and a robot at rest are errors.
+    """
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))
     twist[50:, 0] = 0.2

@@ -132,7 +132,7 @@ def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> N
 
 @pytest.mark.parametrize("key", ["w", "up", "j"])
 def test_keys_steer_with_teleop_alone(key: str) -> None:
-    """Keys of motion steer only with ``--teleop``."""
+    """The keys for driving work only with ``--teleop``."""
     robot = press(key, teleop=True)
     assert robot.dead_man
     assert robot.dead_man.command(0.0) not in (None, HALT)

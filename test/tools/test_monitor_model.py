@@ -140,7 +140,10 @@ def test_a_topic_is_missing_where_the_state_promises_it(state: str, missing: lis
 
 
 def test_diagnostics_are_missing_where_somebody_publishes_them() -> None:
-    """Missing diagnostics are reported only if a driver publishes any; one in a replay does not."""
+    """Missing diagnostics are reported only if diagnostics are expected.
+
+    A driver that replays a recording publishes no diagnostics.
+    """
     assert view(statuses=()).missing(diagnostics=True) == ["/diagnostics"]
     assert view(statuses=()).missing(diagnostics=False) == []
 

@@ -117,7 +117,7 @@ def refused(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """For a path that does not exist the message says what to give."""
+    """If the path of the bag does not exist, the message asks for the folder of a bag."""
     assert "give the folder of a bag" in refused(tmp_path / "nothing", capsys)
 
 
@@ -161,7 +161,7 @@ def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
 def test_nothing_but_nan_is_reported_on(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If all values are NaN, the report counts such messages, and the exit code is 3."""
+    """If all values are NaN, the report counts the messages with NaN; the exit code is 3."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
@@ -171,7 +171,7 @@ def test_nothing_but_nan_is_reported_on(
 def test_a_place_that_cannot_be_written_is_told(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If the folder cannot be created, as a file has its name, the report says so."""
+    """If the output folder cannot be created, as a file has its name, the report says so."""
     (tmp_path / "out").write_text("taken")
     assert "cannot be written" in refused(write(tmp_path / "bag", [drive]), capsys)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""docs/tools/report.md lists the subjects of the report, and the limits that it judges by."""
+"""docs/tools/report.md lists the subjects of the report, and the limits of its judgements."""
 
 import ast
 import re

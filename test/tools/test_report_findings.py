@@ -98,7 +98,7 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
 
 
 def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) -> None:
-    """The states ``disconnected`` and ``connecting`` in a row are reported as one loss."""
+    """``disconnected`` and ``connecting`` in a row are reported as one loss of the board."""
     drive.states += [(8.0, "disconnected"), (8.5, "connecting"), (9.0, "nominal")]
     for topic in (drive.imu, drive.odom, drive.joints):
         topic.drop(8.0, 9.0)
@@ -152,7 +152,7 @@ def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
 
 
 def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
-    """For delays like those of a USB adapter with a latency timer of 16 ms, the advice names it."""
+    """For delays like those of a USB latency timer of 16 ms, the advice names the timer."""
     drive.imu.late_s = drive.imu.late_s + np.remainder(-drive.imu.stamp_s, 0.016)
     late = said(drive, "Timing", "The delay of imu/data_raw")
     assert late.level is Level.WARN
@@ -227,7 +227,7 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 
 
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
-    """Messages without a timestamp are reported; the driver stamps all its messages."""
+    """Messages without a timestamp are reported, as the driver stamps all its messages."""
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan
     assert any("3 messages of imu/data_raw without a stamp" in item.text for item in judge(log))

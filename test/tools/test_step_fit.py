@@ -134,7 +134,7 @@ def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
 
 
 def test_other_gains_must_be_told() -> None:
-    """If a firmware has gains other than the manual's, only a fit with these gains is good."""
+    """If the firmware's gains differ from the manual's, only a fit with the true gains is good."""
     gains = WheelGains(feed_forward=15.0, proportional=40.0, integral=5.0)
     steps = steps_of(*steps_to_and_fro(MotorConstants(), gains), 0, LEVELS)
     told = fit_wheel("A", steps, Gains(15.0, 40.0, 5.0))

@@ -55,7 +55,7 @@ def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_the_loop_is_the_simulated_boards(delay: int) -> None:
-    """The calculated loop has the step response of the simulated board, a separate program."""
+    """The calculated loop has the same step response as the simulated board."""
     motor = Motor(46.0, 6.0, float(delay))
     assert answer(motor, MANUAL, 100).speed == pytest.approx(
         simulated_answer(motor, MANUAL, 100), abs=1e-6
@@ -134,7 +134,7 @@ def test_two_equal_poles_are_no_exception() -> None:
 
 
 def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
-    """The angle at the end of a tick is the sum of all speeds so far, times the tick."""
+    """The angle at the end of a tick is the sum of all speeds so far, times the tick period."""
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))
     speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5).speed

@@ -27,7 +27,7 @@ Start = Callable[..., Any]
 
 
 def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:
-    """The pose in odom is within 2 cm of the truth after a straight, a turn and a curve.
+    """The pose in odom is within 2 cm of the truth after a straight drive, a turn and a curve.
 
     The robot stops when the commands end.
     """
@@ -163,7 +163,7 @@ def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     robot: TwoPorts, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """The driver's exit or the guard stops the robot and switches brush and lift off."""
+    """When the driver ends or hangs, the robot, the brush and the lift are stopped."""
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
         driver.process.send_signal(number)

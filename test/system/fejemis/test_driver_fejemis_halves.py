@@ -23,7 +23,7 @@ Start = Callable[..., Any]
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """The driver stops the half that remains, and the lost half when it is plugged in again.
+    """The driver stops the connected half of the Fejemis, and the other half after its return.
 
     The brush is switched off, and stays off.
     """
@@ -50,7 +50,7 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """The robot stops, and obeys new commands once both halves work again."""
+    """The robot stops if a half of the Fejemis fails, and obeys again once both halves work."""
     with driven(probe, robot):
         robot.do(lambda board: board.befall(name, what))
         if what != "restart":
@@ -104,7 +104,7 @@ def test_it_drives_without_sums(
 
 
 def test_the_same_port_twice_ends_the_start(robot: TwoPorts, start_driver: Start) -> None:
-    """The driver exits with code 2 and says that each half needs a port of its own."""
+    """If the same port is given twice, the driver asks for two ports and exits with code 2."""
     driver: Driver = start_driver(robot.ports[0], board="fejemis", front_port=robot.ports[0])
     driver.wait_for_line("'front_port' must not be .* have a port each")
     assert driver.end() == 2

@@ -72,7 +72,7 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
         assert found, {**self.facts, "last": self.last()}
 
     def do(self, action: Callable[[SimulatedFejemis], Any]) -> Any:
-        """Call ``action`` with the board while no tick is running; return its result."""
+        """Return the result of ``action``, called with the board while no tick is running."""
         with self.lock:
             return action(self.board)
 

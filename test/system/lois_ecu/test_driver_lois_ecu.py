@@ -147,7 +147,10 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 
 
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
-    """The driver writes a gain that the user sets, and again after a restart, but no other gain."""
+    """The driver writes a gain when the user sets it, and again after a restart of the board.
+
+    The driver writes no gain that the user has not set.
+    """
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.5)

@@ -93,9 +93,9 @@ def test_duties_are_commanded_in_duty_mode_alone(
 def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The driver refuses a duty that was sent during its stall.
+    """The driver refuses a duty that was sent while the driver was stalled.
 
-    The duty is the first message of its sender, so the driver does not know the sender's clock.
+    The refusal does not depend on the sender's clock, which is unknown at a first message.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")
@@ -115,10 +115,10 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The terminal mode and the drive mode change at run time, and their topics with them.
+    """The topics of the terminal mode and of the drive mode appear when the mode is set.
 
-    In either terminal mode the public firmware forwards the lines of both GPS and compass. Here
-    both sensors send at the same time.
+    In either terminal mode the public firmware forwards the lines of both GPS and compass. In this
+    test both sensors send at the same time.
     """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
@@ -139,7 +139,7 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 
 
 def recorded(robot: Any) -> Path:
-    """Record while driving, and return the path; repeat it if a busy computer stopped the robot."""
+    """Record while driving, and return the path; retry if a busy computer stopped the robot."""
     for _ in range(10):
         try:
             return Path(robot.record("record_rpm", "wheel_cmd", [3.0, 3.0]))

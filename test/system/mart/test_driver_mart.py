@@ -148,7 +148,7 @@ def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
 def test_whatever_ends_the_driver_stops_each_motion(
     mart: Mart, driver: Driver, probe: Probe, motion: str, number: signal.Signals
 ) -> None:
-    """The driver's exit, or the guard, which knows the motion's stop command, stops the robot."""
+    """When the driver ends, its exit or the guard stops the robot by the motion's stop command."""
     with driven(probe, mart, *MOTIONS[motion]):
         driver.process.send_signal(number)
         mart.stands_for_good()

@@ -61,7 +61,7 @@ def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Co
 
 @pytest.mark.parametrize("fast_s", [0.0, 0.1, 0.3])
 def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
-    """The function ``speed`` of a plant is the derivative of ``turned``.
+    """The function ``speed`` is the time derivative of the function ``turned``.
 
     A first order (``fast_s`` of 0) and two equal time constants are tested, too.
     """
@@ -84,9 +84,9 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """The fit finds the places of marks, which reduces a noise of 10 % to less than 1 %.
+    """The fit finds the places of the marks, and so reduces noise of 10 % to less than 1 %.
 
-    The rest is the rounding of the clock.
+    The remaining noise is the rounding of the clock.
     """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
@@ -96,7 +96,7 @@ def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant(
 
 
 def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
-    """Noise that differs from turn to turn shows a pattern by chance, which is not accepted."""
+    """A chance pattern in random noise is not accepted as the places of encoder marks."""
     random = np.random.default_rng(4)
     assert marks_in([0.1 * random.standard_normal(120) for _ in range(24)], TICKS) is None
     assert marks_in([np.zeros(120)] * 24, TICKS) is None
@@ -130,7 +130,10 @@ def test_records_that_are_too_short_are_refused() -> None:
 
 @pytest.mark.parametrize("begins", [0, 1])
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
-    """The corrections of short and long ticks are found in either order, despite missed edges."""
+    """The corrections of short and long ticks are found even if edges are missed.
+
+    The first tick may be a short or a long one.
+    """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
     ticks_s[[40, 41, 120]] *= 2.0
@@ -160,7 +163,7 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [PLANT, Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """With a goal of 5 %, 95 % of the overshoots are below 8 % on a board that sends meanwhile."""
+    """With a goal of 5 %, 95 % of overshoots are below 8 % if the board sends during the step."""
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
     begun, sent_s = np.meshgrid(np.arange(0.0, 1.0, 0.1), np.arange(0.0, 0.2, 0.02))
@@ -171,7 +174,7 @@ def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plan
 
 
 def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
-    """A board that sends after a step does not change the response; one that sends earlier does."""
+    """Sending after the end of a step does not change the response; sending during it does."""
     loop, gains = replace(LOOP, sends_each_s=100.0), PiGains(0.8, 0.6, 0.1)
     calm = answer(PLANT, gains, loop, 31.0, 3.0)
     late = answer(PLANT, gains, loop, 31.0, 3.0, sent_s=np.arange(50.0, 49.9, -0.01))
