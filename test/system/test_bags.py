@@ -131,7 +131,7 @@ def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
             enough = len(live) // 2
             assert len(both) > enough
             assert all(first[stamp] == second[stamp] for stamp in both)
-            # Once both had begun: in the same order, with the same values.
+            # Once both replays run, their messages have the order and the values of the live drive.
             told = iter([measured(data, kind) for data in live])
             again = [measured(data, kind) for data in first.values()]
             assert all(item in told for item in again[-enough:])

@@ -85,7 +85,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
         message.pose.position.x, message.pose.orientation.w = 0.25, 1.0
     commands, estop = probe.publisher(type(message), topic), probe.publisher(Bool, "estop")
     driver.answers.clear()  # the probe does not publish it again
-    for _ in range(10):  # a stall of the computer is another reason to refuse it
+    for _ in range(10):  # a stall of the computer is another reason for a refusal
         said = len(driver.lines)
         hold.touch()
         estop.publish(Bool(data=True))
@@ -239,7 +239,7 @@ def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver
     driver.wait_for_line(
         "probe publishes cmd_vel with a type other than .*enable_stamped_cmd_vel:=true"
     )
-    until = len(reports) + 4  # one a second; it looks every two
+    until = len(reports) + 4  # one report a second; the driver checks every 2 s
     probe.wait_for(lambda: len(reports) >= until)
     assert driver.output.count("publishes cmd_vel with a type other than") == 1
 

@@ -167,7 +167,7 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
     probe.wait_for_state("nominal")
     commands = driving(probe, board)
     resumed.touch()
-    driver.wait_for_line(r"driver stalled for 6\d\.\d s")  # a busy machine adds to it
+    driver.wait_for_line(r"driver stalled for 6\d\.\d s")  # a busy machine adds to the 60 s
     assert board.wait_for(still, PATIENCE_S)
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
     wait_until(lambda: commands.publish(twist(0.3)) or not still(board.board))

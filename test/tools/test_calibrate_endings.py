@@ -63,7 +63,7 @@ def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
 
 
 def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The result is printed, saved and drawn."""
+    """The result of a calibration is printed, saved and drawn."""
     assert ending() == 0
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     assert "<svg" in (tmp_path / "imu.svg").read_text()

@@ -56,7 +56,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
     log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
     after = rigged.port.board.truth
     assert rigged.port.wait_for(stands, PATIENCE_S)
-    told = np.diff(log.commands.stamp_s) @ log.commands.values[:-1, 2]  # each until the next
+    told = np.diff(log.commands.stamp_s) @ log.commands.values[:-1, 2]  # each holds until the next
     assert told > 0.2
     assert after.yaw_rad - before.yaw_rad == pytest.approx(told, abs=0.03)
     assert log.odometry.pose[-1, 2] - log.odometry.pose[0, 2] == pytest.approx(
@@ -95,7 +95,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
     shown = {each: once(action) for each, action in actions.items()}
     for each in ("other", "wheels"):  # a single message may be lost while the tool is held up
         shown[each] = repeated(actions[each])
-    publishers = [(estop, 1), (other, 2), (wheels, 2)]  # the driver, and the tool but for estop
+    publishers = [(estop, 1), (other, 2), (wheels, 2)]  # the driver, and except for estop the tool
     assert robot._wait(
         lambda: all(each.get_subscription_count() >= count for each, count in publishers),
         PATIENCE_S,

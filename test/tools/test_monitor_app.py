@@ -106,7 +106,7 @@ def test_a_key_asks_for_what_the_last_line_says(key: str, asked: str) -> None:
 
 
 def test_the_estop_is_released_by_two_keys() -> None:
-    """R asks for confirmation and y confirms; any other key cancels."""
+    """The key R asks whether to release the e-stop; y confirms, and any other key cancels."""
     assert press("R", "y").asked == ["release"]
     answers = ("n", "enter", "escape", "R", "w")
     assert press(*(key for answer in answers for key in ("R", answer)), teleop=True).asked == []
@@ -119,7 +119,7 @@ def test_space_stops_even_while_a_question_stands() -> None:
 
 @pytest.mark.parametrize("keys", [["q"], ["ctrl+c"], ["ctrl+q"]])
 def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> None:
-    """ctrl-C and ctrl-Q work too, although the last line of the screen names only q."""
+    """ctrl-C and ctrl-Q end the dashboard, too, although its last line names only q."""
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:

@@ -51,7 +51,7 @@ def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: flo
 
 
 def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
-    """The motion ends 0.3 s after the last repetition, or 0.6 s after a single press."""
+    """A motion ends 0.3 s after the last repetition of a key, or 0.6 s after a single press."""
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.59) != HALT
@@ -107,7 +107,7 @@ def test_who_has_not_steered_commands_nothing() -> None:
     ],
 )
 def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> None:
-    """x is forward, y to the left, and a positive turn to the left (REP-103)."""
+    """Keys command x forward, y to the left, and positive turns to the left, as in REP-103."""
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
     command = dead_man.command(0.0)
@@ -116,7 +116,7 @@ def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> Non
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
 def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
-    """Speeds range from a tenth of the limits to the full limits."""
+    """Speeds range from a tenth of the driver's limits to the full limits."""
     dead_man = DeadMan()
     dead_man.fastest = (0.4, 1.5)
     for step in steps:

@@ -142,7 +142,7 @@ def test_any_way_fits_any_picture(
 
 @given(st.lists(st.integers(0, 10**6), max_size=80), st.integers(0, 70))
 def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
-    """Zero is a blank, the largest value a full bar, and any other value is visible."""
+    """In a sparkline zero is a blank, the largest value a full bar, and all others are visible."""
     line = sparkline(values, columns)
     assert len(line) == columns
     shown = values[-columns:] if columns else []

@@ -204,7 +204,7 @@ def test_a_record_is_a_file_and_an_estop_ends_one(
     assert not answer.success
     assert "could not be saved" in answer.message
     status = probe.listen(DiagnosticArray, "/diagnostics")
-    waiting = probe.call_async(Trigger, "record_rpm")  # for ticks, which do not come
+    waiting = probe.call_async(Trigger, "record_rpm")  # waits for ticks, which do not come
     probe.wait_for(lambda: "record of RPM: " in str(status[-1:]))
     assert "record of RPM is under way" in probe.call(Trigger, "record_torque").message
     assert probe.call(SetBool, "estop", data=True).success
