@@ -100,7 +100,7 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
 
 
 def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
-    """If the reader of the help is gone, such as a pager that was closed, the exit code is 0."""
+    """If the reader of ``--help`` is gone, such as a closed pager, the exit code is still 0."""
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-c", WITHOUT_ROS, "--help"]

@@ -59,7 +59,7 @@ def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
 def test_a_command_changes_no_faster_than_allowed(
     now: tuple[float, float, float], wanted: tuple[float, float, float], seconds: float
 ) -> None:
-    """Commands change no faster than the acceleration limits, and reach the target.
+    """Commands change no faster than the acceleration limits allow, and reach the target.
 
     The linear velocity is limited as a vector, the yaw rate separately.
     """
