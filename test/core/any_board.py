@@ -192,7 +192,7 @@ BOARDS = [
 class AnyBench:
     """A session connected to a robot.
 
-    ``hears``: the robot receives data; ``speaks``: it sends data.
+    ``hears``: whether the robot receives data. ``speaks``: whether the robot sends data.
     """
 
     def __init__(self, board: Board, robot: Robot) -> None:
@@ -234,7 +234,7 @@ class AnyBench:
             self.settle()
 
     def stall(self, seconds: float) -> None:
-        """Stall the process for ``seconds``, then read all data of that time at once."""
+        """Stall the process for ``seconds``, then read all data from the stall at once."""
         waiting: list[Packet] = []
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S

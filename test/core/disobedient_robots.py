@@ -17,7 +17,7 @@ SLOWLY: Triple = (0.05, 0.0, 0.0)
 
 
 def started(board: BoardSettings, **options: object) -> Bench:
-    """Return a bench with a robot at rest, its notices cleared."""
+    """Return a bench whose robot is at rest, with an empty list of notices."""
     bench = Bench(board, **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")

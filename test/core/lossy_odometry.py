@@ -26,7 +26,7 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 class Line:
     """A simulated board and odometry.
 
-    ``loses`` decides by a frame's bytes and time if it is lost.
+    ``loses`` decides by a frame's bytes and time whether the frame is lost.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether commands are sent, as a paused board could take a byte of one for a letter."""
+        """Whether to send commands; a paused board could take a byte of a command for a letter."""
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property

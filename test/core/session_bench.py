@@ -32,7 +32,10 @@ def bare(data: bytes) -> bytes:
 
 
 class Bench:
-    """A session and a simulated board. ``hears``: the board receives; ``speaks``: it sends."""
+    """A session and a simulated board.
+
+    ``hears``: whether the board receives data. ``speaks``: whether the board sends data.
+    """
 
     def __init__(
         self,
@@ -120,12 +123,12 @@ class Bench:
             self.run(TICK_S)
 
     def configure(self, **changed: Any) -> None:
-        """Change fields of SessionSettings; all other fields keep the values from the start."""
+        """Change fields of SessionSettings; fields that are not given keep their first values."""
         self.session.configure(replace(self.settings, **changed), self.now)
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Change fields of OmniBotSettings; all other fields have their defaults."""
+        """Change fields of OmniBotSettings; fields that are not given have their defaults."""
         board = self.board.settings
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed

@@ -23,7 +23,7 @@ def bench(request: pytest.FixtureRequest) -> AnyBench:
 
 
 def test_every_board_of_the_driver_is_among_them() -> None:
-    """A board that is missing in the list of boards would not be tested."""
+    """A board that is missing from the list of boards would not be tested."""
     missing = set(PROFILES) - {name.split()[0] for name in MAKERS}
     assert not missing, "add a robot and an entry of MAKERS to test/core/any_board.py"
 
@@ -55,7 +55,7 @@ def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) 
 
 
 def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
-    """After the timeout the robot stands, and does not start again by itself."""
+    """After the timeout, the robot stands and does not start again by itself."""
     bench.drive_on()
     assert not bench.robot.stands
     bench.run(0.6)
@@ -90,7 +90,7 @@ def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:
-    """The latched e-stop refuses commands, and its release does not move the robot."""
+    """While the e-stop is latched, commands are refused; its release does not move the robot."""
     bench.drive_on()
     bench.estop(True)
     with pytest.raises(CommandRefused, match="e-stop"):

@@ -21,7 +21,7 @@ from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSe
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
-# InterFrameGaps and restarts
+# Pauses and restarts
 
 
 @pytest.mark.parametrize("hidden", [False, True])
@@ -43,7 +43,7 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """After a restart the board's text, SEQ and pose begin at zero, and odom continues.
+    """After a restart, the board's text, SEQ and pose begin at zero, and odom continues.
 
     The result is the same if the text or the first frames are lost.
     """
@@ -62,12 +62,12 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
     way = was.way_to(Pose(now.x_m, now.y_m, now.yaw_rad))
     odom_way = before.way_to(on.estimates[-1].pose)
     assert way.way_m > 0.1
-    assert math.hypot(way.x_m - odom_way.x_m, way.y_m - odom_way.y_m) < 0.025  # one delta's age
+    assert math.hypot(way.x_m - odom_way.x_m, way.y_m - odom_way.y_m) < 0.025  # one delta period
     assert way.yaw_rad == pytest.approx(odom_way.yaw_rad, abs=0.025)
 
 
 def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
-    """After a restart the covariance stays larger, as the way that the robot rolled is unknown."""
+    """After a restart, the covariance stays larger: how far the robot rolled is unknown."""
     on = line(1)
     before = on.estimates[-1].covariance
     on.board.receive(b"R")
@@ -90,7 +90,7 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """After a reset in a gap odom begins at zero; the error of the gap is not corrected later."""
+    """After a reset in a gap, odom begins at zero; the error of the gap is not corrected later."""
     for seed in range(4):
         on = line(seed)
         lose(on, 1.0)
@@ -103,7 +103,7 @@ def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
 
 
 def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """While the line is closed the robot drives for three seconds, and odom then includes it."""
+    """The robot drives for three seconds while no data arrives; odom then includes this motion."""
     on = line(2)
     on.loses = lambda _data, _now: True
     on.run(3.0)
@@ -150,7 +150,10 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """-1/8 turn of each wheel rotates the robot by 2πr/8L; B against A drives it forward."""
+    """A turn of each wheel by -1/8 rotates the robot by 2πr/8L.
+
+    A forward turn of B with an equal backward turn of A drives the robot forward.
+    """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)
     odometry = Odometry(OdometrySettings())

@@ -47,14 +47,14 @@ def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
 
 
 def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
-    """On a new line the board has its full time again, however long the silence was."""
+    """On a new line, the board has its full time again, however long the silence was."""
     assert liveness.fell_silent(12.0)
     liveness.begin(12.0)
     assert liveness.wake_at(driven=False) == 14.0
 
 
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
-    """After a stall the board has its full time again, since its data may wait to be read."""
+    """After a stall, the board has its full time again, since its data may wait to be read."""
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
     assert not liveness.fell_silent(51.9)
@@ -62,7 +62,7 @@ def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
 
 
 def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None:
-    """No data arrived since the first report, so the silence is not reported again."""
+    """A silence that was reported before a stall is not reported again after the stall."""
     assert liveness.fell_silent(12.0)
     liveness.stalled(50.0)
     assert not liveness.fell_silent(99.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Long tasks of a board: one at a time, and what ends it."""
+"""Long tasks of a board: only one at a time, and what ends a task."""
 
 from collections.abc import Callable
 

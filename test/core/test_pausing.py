@@ -42,7 +42,7 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """P is sent only if data received after the request shows that the board runs."""
+    """P is sent only if data received after the request to pause shows that the board runs."""
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
     assert bench.ask(Request.PAUSE, 5.0).success
@@ -65,7 +65,7 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """A P sent on old data resumes a board that another program paused; P is then repeated."""
+    """A P sent because of old data resumes a paused board, and is then sent again."""
     data = bench.board.step()
     bench.board.receive(b"P")
     notice = bench.board.step()
@@ -123,7 +123,7 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """After a failed pause the answer says so, motion is refused, and P is repeated."""
+    """After a failed pause, the answer says so, motion is refused, and P is repeated."""
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -138,7 +138,7 @@ def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None
 
 
 def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
-    """After ~/start a failed pause is not repeated, and a fresh command moves the robot."""
+    """After ~/start, a failed pause is not repeated, and a fresh command moves the robot."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     bench.hears = True

@@ -212,7 +212,7 @@ class Walk(Bench):
         assert self.now - asked.at <= LIMITS_S[asked.request] + 3.1, "an answer after its time"
         undisturbed = self.meddled_at < asked.at - 2.0 and self.now - asked.at < 2.9
         if done.success and undisturbed and asked.request in WANTED:
-            assert self.board.mode is WANTED[asked.request], "a success that is none"
+            assert self.board.mode is WANTED[asked.request], "a false report of success"
 
     def judge_time(self) -> None:
         for asked in self.asked.values():

@@ -53,7 +53,7 @@ def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
 
 
 def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None:
-    """A request that is cut short by the shutdown is answered that the driver shuts down."""
+    """A request that is cut short by the shutdown gets the answer that the driver shuts down."""
     bench.speaks = False
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.shutdown.begin(bench.now)
@@ -101,7 +101,7 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 
 
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """S is harmless while running and undoes a P in flight; the current command continues."""
+    """S is harmless to a running board and undoes a P in flight; the command continues."""
     bench.drive(0.3)
     start = len(bench.written)
     assert bench.ask(Request.START, 1.0).message == "running (nominal)"
@@ -143,7 +143,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """A paused board whose notices continue their numbers has not restarted."""
+    """If the numbers in a paused board's notices continue, the board has not restarted."""
     bench = Bench(run=False)
     bench.open()
     bench.run(2.5)
@@ -156,7 +156,7 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
     """The board ran before the failed pause, so a reset starts it again.
 
-    The robot stands until a fresh command.
+    The robot stands until a fresh command arrives.
     """
     bench = driving()
     bench.hears = False

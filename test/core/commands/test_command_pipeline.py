@@ -70,7 +70,7 @@ def notices(bench: Bench) -> list[str]:
 
 
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
-    """The sideways speed is set to zero and the forward speed is kept; NaN sideways is refused."""
+    """A sideways speed is set to zero without slowing the robot down, but NaN is refused."""
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
     bench.session.configure(settings, bench.now)
@@ -99,7 +99,7 @@ def test_a_velocity_out_of_the_plane_is_said_once(bench: Bench) -> None:
 
 
 def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
-    """After a refused wheel command the base command continues without a Stop."""
+    """After a refused wheel command, the base command continues without a Stop."""
     bench.drive(0.3)
     start = len(bench.written)
     with pytest.raises(CommandRefused):
@@ -127,7 +127,7 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """Each new command continues the ramp before it; a set point is due every 18 ms."""
+    """Each new command continues the ramp of the last one; a set point is due every 18 ms."""
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)
@@ -159,7 +159,7 @@ def test_a_reversal_is_ramped_through_zero() -> None:
 
 
 def test_turning_is_ramped_by_its_own_limit() -> None:
-    """At 2 rad/s² a step of the yaw rate to 0.5 rad/s takes 0.25 s."""
+    """At 2 rad/s², a step of the yaw rate to 0.5 rad/s takes 0.25 s."""
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.drive(0.0, 0.0, 0.5)
@@ -230,7 +230,7 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """A refused command does not prolong the command before it, which expires as usual."""
+    """A refused command does not extend the previous command, which expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

@@ -21,7 +21,7 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """The robot stops, commands are refused, and only the e-stop followed by Stop is sent."""
+    """The robot stops, commands are refused, and only the e-stop with a Stop behind it is sent."""
     bench.drive(0.5)
     bench.run(0.1)
     start = len(bench.written)
@@ -63,7 +63,7 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """If the port is closed, the answer says so, and the e-stop is sent when the port opens."""
+    """An e-stop on a closed port is answered with a warning, and is sent when the port opens."""
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
@@ -76,7 +76,7 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_nothing(
     bench: Bench,
 ) -> None:
-    """The latched e-stop refuses a hundred commands, and its release does not move the robot."""
+    """While the e-stop is latched, commands are refused; its release does not move the robot."""
     estop(bench, True)
     for _ in range(100):
         with pytest.raises(CommandRefused, match="e-stop"):
@@ -119,7 +119,7 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
 
 
 def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
-    """Repeated requests to latch the e-stop, or to release it, are not reported again."""
+    """Only the first of several requests to latch the e-stop, or to release it, is reported."""
     for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
         bench.session.estop(active, bench.now, by=by)
         bench.settle()
@@ -127,7 +127,7 @@ def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) ->
 
 
 def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
-    """The answer warns if the board has sent no data for 2 s, or if the port is not open."""
+    """The answer to an e-stop warns if no data came for 2 s, or if the port is not open."""
     assert estop(bench, True) == "e-stop latched"
     bench.speaks = False
     bench.run(2.0)

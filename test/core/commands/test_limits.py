@@ -43,7 +43,7 @@ def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
 def test_a_shortened_vector_keeps_its_direction_and_the_limit(
     vector: list[float], limit: float
 ) -> None:
-    """A vector of any length above the limit is shortened to the limit in the same direction."""
+    """A vector longer than the limit is shortened to the limit, and keeps its direction."""
     short = shorten(vector, limit)
     assert math.hypot(*short) <= limit * ULPS
     assert limit == 0 or same_direction(short, vector)
@@ -106,7 +106,7 @@ def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
 
 
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
-    """(3, -4) m/s becomes (0.3, -0.4), not (0.5, -0.5); the yaw rate is limited separately."""
+    """At a limit of 0.5 m/s, (3, -4) m/s becomes (0.3, -0.4); yaw is limited separately."""
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
     found = (limited.vx_mps, limited.vy_mps, limited.yaw_rate_radps)
     assert found == pytest.approx((0.3, -0.4, 0.1))
@@ -119,7 +119,7 @@ def test_wheels_are_limited_by_the_fastest() -> None:
 
 
 def test_a_limit_of_zero_lets_nothing_through() -> None:
-    """A limit of zero makes linear velocity, yaw rate and wheel rates zero."""
+    """Limits of zero make linear velocity, yaw rate and wheel rates zero."""
     none = SpeedLimits(linear_mps=0.0, angular_radps=0.0, wheel_radps=0.0)
     assert none.twist(BodyTwist(1.0, -1.0, 1.0)) == BodyTwist(0.0, 0.0, 0.0)
     assert none.wheels((1.0, -2.0, 3.0)) == (0.0, 0.0, 0.0)
@@ -137,7 +137,7 @@ def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
 
 @given(st.lists(finite, max_size=4))
 def test_what_is_finite_is_not_refused(values: list[float]) -> None:
-    """A finite value is accepted however large it is."""
+    """A finite value is accepted, however large it is."""
     require_finite("wheel_cmd", values)
 
 
@@ -145,7 +145,7 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear velocity changes as a vector, straight to the wanted velocity, and reaches it."""
+    """The linear velocity changes as a vector, and reaches the wanted velocity."""
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)
     after = limits.approach(now, wanted, duration_s)
@@ -164,7 +164,7 @@ def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
 
 
 def test_an_acceleration_of_zero_is_not_a_limit() -> None:
-    """An acceleration limit of 0 is switched off."""
+    """An acceleration limit of 0 means no limit."""
     wanted = BodyTwist(0.5, -0.5, 0.5)
     assert SpeedLimits().approach(BodyTwist(-0.5, 0.5, -0.5), wanted, 0.0) == wanted
 
@@ -181,6 +181,6 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """The refusal of a stamped command states the stamp's age and says: check the clocks."""
+    """The refusal of a stamped command states the stamp's age and what to check."""
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

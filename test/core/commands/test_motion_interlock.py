@@ -8,7 +8,7 @@ TIMEOUT_S = 0.5
 
 
 def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> bool:
-    """Return whether the interlock accepts a command at ``now``. ``stands``: a zero command."""
+    """Return whether a command at ``now`` is accepted. ``stands``: whether it is a zero command."""
     return not interlock.arrive(now, TIMEOUT_S, stands=stands)
 
 
@@ -20,7 +20,7 @@ def test_motion_is_allowed_until_something_trips() -> None:
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """A timeout without commands ends the refusal; each refused command restarts the timeout."""
+    """After a trip, motion is refused until no command has arrived for the timeout."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -29,7 +29,7 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """The refusal ends one timeout after the last command, not one timeout after the trip."""
+    """Motion is allowed one timeout after the last command, not one timeout after the trip."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -37,7 +37,7 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """A zero command after a trip is accepted, and so is a motion command after it."""
+    """After a trip, a zero command is accepted, and then motion commands are accepted too."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -60,7 +60,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A trip counts as a first one if the last trip was over a minute ago, or after ~/start."""
+    """A trip counts as a first one if it follows ~/start, or the last trip by over a minute."""
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)
@@ -72,7 +72,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """A release of the e-stop ends the refusal after a second trip, but not after a first."""
+    """Releasing the e-stop allows motion after a second trip, but not after a first trip."""
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

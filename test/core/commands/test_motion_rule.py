@@ -58,7 +58,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """The board restarts while its data is lost, so only its counters show the restart."""
+    """The board restarts while its data is lost, so only its counters reveal the restart."""
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -77,7 +77,7 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """Commands end before the board has booted: an S in a motion frame would start it."""
+    """A motion frame may contain the letter S, so none is sent once the board has booted."""
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -179,7 +179,7 @@ def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Ben
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
     bench: Bench,
 ) -> None:
-    """After the outage the board repeats its last command until the driver's Stop arrives."""
+    """After the outage, the board repeats its last command until the driver's Stop arrives."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = bench.hears = False

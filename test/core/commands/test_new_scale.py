@@ -49,7 +49,7 @@ def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> No
 
 
 def test_a_goal_is_repeated_in_the_new_scale() -> None:
-    """A goal at 1 m is 1000 LSB at 1000 LSB per m, and 500 after the change."""
+    """A goal at 1 m is 1000 LSB at 1000 LSB per m, and 500 LSB at 500 LSB per m."""
     bench = going_to(1.0)
     assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
     bench.configure_board(position_scale=500.0)

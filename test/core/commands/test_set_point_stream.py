@@ -52,7 +52,7 @@ def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> 
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """Only the newest command is sent: each further frame has bytes that may be corrupted."""
+    """Older commands are left out, because each frame adds bytes that may be corrupted."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
@@ -98,7 +98,7 @@ def test_stop_never_waits(stream: Stream) -> None:
 
 
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
-    """A new command is delayed only by the previous new command, not by a repetition."""
+    """A new command is delayed by the last new command, but not by a repetition."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(1.05) == GO
@@ -107,7 +107,7 @@ def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
 
 
 def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
-    """At a command rate of 1 Hz Stop is still repeated faster, since one Stop may be lost."""
+    """At a command rate of 1 Hz, Stop is repeated faster, because a single Stop may be lost."""
     stream = Stream(CommandSettings(rate_hz=1.0))
     order(stream, STOP, 1.0)
     assert len(run(stream, 1.0, 1.49)) == pytest.approx(10, abs=1)
@@ -168,7 +168,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """No Stop is added, because one was sent when the command of the first authority expired."""
+    """No second Stop is needed: one was sent when the first authority's command expired."""
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
     order(stream, TURN, 1.62, Authority.WHEELS)
@@ -197,7 +197,7 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """After a long stall of the process, Stop is sent instead of the command before it."""
+    """After a long stall of the process, Stop is sent instead of an old command."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(60.0) == STOP

@@ -37,7 +37,7 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 
 
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
-    """A zero twist is sent as Stop; on position control, zeros in mode 1 mean the origin."""
+    """A zero twist is sent as Stop, not as zeros in mode 1, which may be a goal at the origin."""
     bench.drive(0.3)
     start = len(bench.written)
     bench.drive()
@@ -59,7 +59,7 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """A wheel command without three rates is refused; the refusal states the number given."""
+    """A wheel command needs three rates; the refusal of another number states that number."""
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)
@@ -68,7 +68,7 @@ def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> N
 
 
 def test_a_huge_command_is_limited_in_its_own_direction(bench: Bench) -> None:
-    """1e300 m/s to the front left becomes 0.5 m/s in that direction: 24.7 LSB per axis."""
+    """A command of 1e300 m/s to the front left becomes 0.5 m/s, which is 24.7 LSB per axis."""
     start = len(bench.written)
     bench.drive(1e300, 1e300, -1e300)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 19 00 19 FF 06")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The last bytes before the port is closed: Stop, then the letters for a pause or reset if set."""
+"""The last bytes before the port is closed: Stop, then letters to pause or reset if requested."""
 
 import pytest
 from robots import driving, paused, standing
@@ -26,13 +26,13 @@ def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
 
 
 def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
-    """The letter P is a toggle, so it is not sent to a paused board."""
+    """The letter P is a toggle, so the shutdown does not send it to a paused board."""
     bench = paused()
     assert bench.last_words("pause") == 3 * STOP
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """A P is sent but not confirmed yet; at shutdown a second P would resume the board."""
+    """A P has been sent, but is not confirmed yet; a second P would resume the board."""
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
     bench.speaks = False
@@ -47,7 +47,7 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """The last notice says paused, but an S, which starts the board, is on its way."""
+    """The board's last notice says paused, but an S, which starts the board, is on its way."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -96,7 +96,7 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """A paused board sends no displacements, but its motors are off, so it counts as at rest."""
+    """A paused board sends no displacements, but its motors are off, so the robot is at rest."""
     bench = paused()
     left(bench)
     assert not bench.session.shutdown.fall_silent(bench.now)

@@ -27,7 +27,7 @@ def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> Dis
 
 
 def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
-    """Return whether rest is proved by displacements at ``speeds``, one every 40 ms."""
+    """Return whether displacements at ``speeds``, at intervals of 40 ms, prove rest."""
     for number, speed in enumerate(speeds):
         proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
     return proof.proved
@@ -61,7 +61,7 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
 
 
 def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopProof) -> None:
-    """A single displacement after Stop does not prove rest, even if it covers 0.1 s."""
+    """A single displacement after Stop does not prove rest, even if its duration is 0.1 s."""
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
     assert not proof.proved

@@ -22,19 +22,19 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
 
 
 def test_straight_ahead_both_wheels_roll_alike() -> None:
-    """1 m/s with wheels of radius 0.1 m is 10 rad/s of both wheels."""
+    """1 m/s with wheels of radius 0.1 m is 10 rad/s for both wheels."""
     assert ROBOT.wheel_rates(BodyTwist(1.0, 0.0, 0.0)) == pytest.approx((10.0, 10.0))
 
 
 def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
-    """1 rad/s at 0.2 m from the centre is 0.2 m/s, which is 2 rad/s of the wheel."""
+    """1 rad/s with wheels 0.2 m from the centre is 0.2 m/s at the rims, and 2 rad/s of a wheel."""
     assert ROBOT.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == pytest.approx((-2.0, 2.0))
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """At 0.5 rad/s the left wheel is on a circle of 0.8 m at 0.4 m/s, the right on 1.2 m at 0.6.
+    """At 0.5 rad/s, the left wheel runs at 0.4 m/s on a circle of 0.8 m, the right at 0.6 on 1.2 m.
 
-    The middle between them moves at 0.5 m/s.
+    The middle between the wheels moves at 0.5 m/s.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 

@@ -60,23 +60,23 @@ def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base
 def test_body_and_back_is_the_same_wheels(
     rates: tuple[float, float, float], radius: float, base: float
 ) -> None:
-    """Wheel rates and twist have three degrees of freedom each, so nothing is lost."""
+    """Wheel rates and twist have three degrees of freedom each; the conversion loses nothing."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     assert kinematics.wheel_rates(kinematics.body_twist(rates)) == close(rates, rel=1e-9, abs_=1e-7)
 
 
 def test_forward_turns_a_back_and_b_forth_and_leaves_c_alone() -> None:
-    """At 1 m/s forward the rims of A and B move at ∓cos 30° m/s."""
+    """At 1 m/s forward, the rims of A and B move at ∓cos 30° m/s."""
     a, b, c = MANUAL.wheel_rates(BodyTwist(1.0, 0.0, 0.0))
     assert (a, b, c) == close((-SQRT3 / 2 / R, SQRT3 / 2 / R, 0.0))
 
 
 def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
-    """At 1 m/s to the left the rim speed is Vy at C, and −sin 30° Vy at A and B."""
+    """At 1 m/s to the left, the rim speed is Vy at C, and −sin 30° Vy at A and B."""
     assert MANUAL.wheel_rates(BodyTwist(0.0, 1.0, 0.0)) == close((-0.5 / R, -0.5 / R, 1.0 / R))
 
 
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
-    """At 1 rad/s to the left each rim moves at −L; the manual's «rotate all» turns right."""
+    """At 1 rad/s to the left, each rim moves at −L m/s; the manual's «rotate all» turns right."""
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

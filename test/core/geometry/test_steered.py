@@ -49,7 +49,7 @@ def test_what_the_steered_wheel_does_to_the_body() -> None:
 
 
 def test_the_driven_wheels_run_on_circles_about_the_same_centre() -> None:
-    """About a centre 0.5 m to the left, the circles are 0.3 m (left wheel) and 0.7 m (right)."""
+    """With the centre of rotation 0.5 m to the left, the wheels run on circles of 0.3 and 0.7 m."""
     assert ROBOT.wheel_rates(BodyTwist(0.5, 0.0, 1.0)) == pytest.approx((3.0, 7.0))
 
 

@@ -41,7 +41,7 @@ def last(bench: Bench) -> ImuEstimate:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -> None:
-    """In nominal and in IMU-only mode the published rates are about zero after a calibration."""
+    """In nominal and IMU-only mode, the published rates are about zero after a calibration."""
     bench = running(gyro_bias_dps=PLANTED_DPS, imu_only=imu_only)
     assert last(bench).angular_velocity == pytest.approx(PLANTED, abs=0.006)
     assert calibrated(bench).success
@@ -59,7 +59,7 @@ def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
 
 
 def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
-    """A calibration is refused during motion commands, and fails if one arrives later."""
+    """Motion commands prevent a calibration, and a motion command that arrives later ends it."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.3, 0.0, 0.0), bench.now)
     with pytest.raises(RequestRefused, match="commanded by cmd_vel; end these commands"):
@@ -90,7 +90,7 @@ def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
 
 @pytest.mark.parametrize("state", ["disconnected", "paused"])
 def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> None:
-    """On a closed port or a paused board, the refusal of a calibration says to call again."""
+    """A calibration is refused while the port is closed or the board is paused."""
     bench = running()
     if state == "paused":
         bench.ask(Request.PAUSE, 5.0)
@@ -155,7 +155,7 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """With ``auto_gyro_bias``, the bias moves by half in 15 s at rest, and not in motion."""
+    """With ``auto_gyro_bias``, half of the bias is found in 15 s at rest, and no more in motion."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)

@@ -46,7 +46,7 @@ def stand(
     force: Vector3 = GRAVITY,
     rolling: Vector3 | None = NONE,
 ) -> None:
-    """Feed readings at 100 Hz, and a displacement with every fourth unless ``rolling`` is None."""
+    """Feed readings at 100 Hz, every fourth with a displacement unless ``rolling`` is None."""
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):
         calibration.hear(rate, force, start_s + number * TICK_S)
@@ -63,7 +63,7 @@ def answer(calibration: GyroCalibration) -> RequestDone:
 
 @given(st.lists(vectors, min_size=1, max_size=30))
 def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
-    """The running mean and standard deviation agree with the textbook's formulas, axis by axis."""
+    """The computed mean and standard deviation agree with the textbook's, axis by axis."""
     for axis in range(3):
         column = [value[axis] for value in values]
         middle = sum(column) / len(column)
@@ -74,7 +74,7 @@ def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
 
 @given(biases, st.integers(0, 2**16))
 def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
-    """After 2 s of noisy readings the bias is right within five standard errors of the mean."""
+    """After 2 s of noisy readings, the bias is right within five standard errors of the mean."""
     calibration = GyroCalibration((0.1, 0.1, 0.1), refine=False)
     calibration.measure("token", 0.0)
     stand(calibration, noisy(bias, NOISE_RADPS, seed), 2.1)
@@ -119,7 +119,7 @@ def test_a_robot_that_moves_is_refused_with_what_showed_it(
 
 
 def test_a_shaken_accelerometer_is_motion() -> None:
-    """A robot is carried so gently that only the accelerometer shows the motion."""
+    """A calibration fails for a robot carried so gently that only the accelerometer shows it."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     for number, rate in enumerate(itertools.islice(noisy(NONE, NOISE_RADPS), 210)):
@@ -128,7 +128,7 @@ def test_a_shaken_accelerometer_is_motion() -> None:
 
 
 def test_readings_before_the_request_do_not_count() -> None:
-    """Motion before a calibration does not make it fail, and rest before it is not used."""
+    """A calibration uses no readings from before the request, whether of motion or of rest."""
     calibration = GyroCalibration(NONE, refine=False)
     stand(calibration, noisy((0.0, 0.0, 2.0), 0.5), 0.9, rolling=(0.01, 0.0, 0.0))
     calibration.measure("token", 0.0)
@@ -138,7 +138,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """A gap in the readings restarts a calibration; with too few readings it fails in time."""
+    """A gap in the readings restarts a calibration; too few readings make it fail in time."""
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)
     for start_s in (100.0, 102.0, 104.0):
@@ -167,7 +167,7 @@ def test_a_measurement_that_is_given_up_says_why_once() -> None:
 @settings(max_examples=25)
 @given(biases)
 def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
-    """At rest the bias moves towards the true one by a twentieth of the difference per second."""
+    """At rest, the bias approaches the true one by a twentieth of the difference per second."""
     calibration = GyroCalibration(NONE, refine=True)
     rates = noisy(bias, NOISE_RADPS)
     stand(calibration, rates, 1.05)
@@ -184,7 +184,7 @@ def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
 def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_stand(
     refine: bool, rolling: Vector3 | None
 ) -> None:
-    """The bias is refined only if this is switched on and displacements show wheels at rest."""
+    """The bias is refined only if refinement is on and displacements show wheels at rest."""
     calibration = GyroCalibration(NONE, refine=refine)
     stand(calibration, noisy((0.1, 0.1, 0.1), NOISE_RADPS), 10.0, rolling=rolling)
     assert calibration.bias == NONE
@@ -194,7 +194,7 @@ def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_sta
 def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
     rates: list[Vector3], measure: bool
 ) -> None:
-    """For any gyro readings the bias is finite and at most as large as a real sensor's."""
+    """For any gyro readings, the bias is finite and at most as large as a real sensor's."""
     calibration = GyroCalibration(NONE, refine=True)
     if measure:
         calibration.measure("token", 0.0)

@@ -17,7 +17,7 @@ Triple = tuple[int, int, int]
 
 @pytest.mark.parametrize(("range_g", "counts"), [(2, 16384), (4, 8192), (8, 4096), (16, 2048)])
 def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
-    """At standard gravity the counts are those of the datasheet's section 6.2."""
+    """At standard gravity, the counts are those of the datasheet's section 6.2."""
     scale = ImuScale(accel_range_g=range_g)
     assert scale.specific_force((counts, -counts, 0)) == pytest.approx((9.80665, -9.80665, 0.0))
 
@@ -28,7 +28,7 @@ def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
 def test_ten_degrees_a_second_are_the_datasheets_counts(
     range_dps: int, counts_per_10_dps: int
 ) -> None:
-    """At 10°/s the counts are those of the datasheet's section 6.1."""
+    """At 10°/s, the counts are those of the datasheet's section 6.1."""
     scale = ImuScale(gyro_range_dps=range_dps)
     assert scale.angular_velocity((0, counts_per_10_dps, -counts_per_10_dps)) == pytest.approx(
         (0.0, 0.17453292519943295, -0.17453292519943295)

@@ -101,7 +101,7 @@ def begins(data: bytes, kind: bytes) -> int:
 def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """After a changed bit, odom is off by at most 17 mm and 0.052 rad; 1.5 s later it is right."""
+    """After a changed bit, odom is off by up to 17 mm and 0.052 rad, and right after 1.5 s."""
     kind, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)

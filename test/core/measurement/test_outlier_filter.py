@@ -41,7 +41,7 @@ def gate() -> OutlierFilter:
 
 
 def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Reading]]:
-    """Return the readings that the filter releases on each given reading."""
+    """Return a list for each reading: the readings that the filter releases at that time."""
     return [
         [found for found, _ in through.admit(reading, number * TICK_S)]
         for number, reading in enumerate(readings)
@@ -74,7 +74,7 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """Each jump is the value of one of the highest bits of a word, at 2 g and 250 °/s."""
+    """Each jump is the value of a high bit of a word, in the ranges of 2 g and 250 °/s."""
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -84,7 +84,7 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
-    """A lasting jump is delivered one reading late; an example is a robot set down on a slope."""
+    """A lasting jump is delivered one reading late, as when a robot is set down on a slope."""
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -130,7 +130,7 @@ def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
 def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
-    """The force in a shock that rings does not return at once, so every reading is delivered."""
+    """All readings of a shock that rings in one axis are delivered."""
     readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
     through = gate()
     assert list(chain(*admitted(readings, through))) == readings
@@ -156,7 +156,7 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement above 2 m/s or 8 rad/s is rejected; the next one counts it as lost."""
+    """A displacement faster than 2 m/s or 8 rad/s is rejected; the next one counts it as lost."""
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
     assert came == [[ahead()], [], [ahead(lost=4)], [ahead()]]
@@ -171,7 +171,7 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """A jump from 0.25 to 1.5 m/s and back in 80 ms is rejected; a pose waits meanwhile."""
+    """A jump from 0.25 to 1.5 m/s and back in 80 ms is rejected; a pose waits for the verdict."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
@@ -179,7 +179,7 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """A jump that lasts may be real, so it is delivered one displacement late."""
+    """A jump that lasts may be real, so the displacement is delivered, but late."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
     assert came[3:] == [[], [], [ahead(0.06), pose, ahead(0.05)], [ahead(0.05)]]
@@ -187,7 +187,7 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
-    """At most ten readings wait for the next displacement; then all are released."""
+    """At most ten readings wait for the next displacement; after that, all are released."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
     assert came[3:14] == [[]] * 10 + [[ahead(0.06), *[pose] * 10]]
@@ -210,7 +210,7 @@ def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
     assert through.admit(rolled_out, 2.1) == []
 
 
-# All of them
+# All readings
 
 values = st.floats(-20.0, 20.0)
 readings = st.one_of(
@@ -288,7 +288,7 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 
 
 def test_an_estimate_that_is_put_right_may_leap() -> None:
-    """With ``corrected``, a jump may be a correction by the board's odometry; it is accepted."""
+    """With ``corrected``, a jump is accepted: the board's odometry may correct itself."""
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)

@@ -67,7 +67,7 @@ def test_what_is_on_the_way_is_inside(
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 1.0, math.pi, -2.0])
 def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> None:
-    """A twist is outside by its distance from the hull less the margin, in almost any direction."""
+    """A twist exceeds the envelope by its distance from the hull less the margin."""
     away = BodyTwist(-0.3 * math.cos(angle), -0.3 * math.sin(angle), 0.0)
     way_mps, turn_radps = outside(
         away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True
@@ -77,7 +77,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """A replaced set point keeps its full weight for a while, then fades to none."""
+    """A replaced set point keeps its full weight for 0.3 s, and has none after 1.1 s."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -102,7 +102,7 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """The envelope is unknown before the first set point, just after it, and just after a goal."""
+    """The envelope is unknown before the first set point, and shortly after it or after a goal."""
     history = SetpointHistory()
     assert not history.known(0.0)
     history.add(AT_REST, 10.0)
@@ -123,8 +123,7 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """The wind-up of a held robot grows by 1.2 times the lost distance, up to the integrator's
-    limit.
+    """A held robot winds up by 1.2 times the lost distance, up to the integrator's limit.
 
     Normal motion reduces the wind-up.
     """
@@ -141,14 +140,14 @@ def test_a_held_robot_winds_up_by_what_it_loses() -> None:
 
 
 def test_a_robot_that_speeds_up_is_not_held() -> None:
-    """A robot that is still at rest is not held if rest was commanded a moment ago."""
+    """A robot at rest does not count as held if rest was commanded a moment ago."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
     assert wind_up.way_m == 0.0
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """In one long displacement the robot may have turned round; a second one makes both count."""
+    """In one long displacement the robot may have turned round, so only two prove it is held."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
     assert wind_up.way_m == 0.0

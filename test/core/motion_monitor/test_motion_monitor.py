@@ -143,7 +143,7 @@ def test_a_new_command_may_be_followed_late() -> None:
 
 
 def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
-    """A robot that is commanded to slow down to a fifth keeps its speed, which is a fault."""
+    """A robot that keeps its speed when commanded to slow down to a fifth is found out."""
     drive = Drive()
     drive.command(0.5, 0.0, 0.0)
     drive.move((0.5, 0.0, 0.0), 1.0)
@@ -173,7 +173,7 @@ def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None
 
 
 def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
-    """On the way to a goal the board itself chooses the motion, so nothing is judged."""
+    """On the way to a goal, the board itself chooses the motion, so nothing is judged."""
     drive = Drive()
     drive.monitor.set_point(None, drive.now)
     assert drive.move((-1.5, 0.0, 3.0), 5.0) == []
@@ -218,7 +218,7 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A robot that drives on after Stop may receive again, so the Stops do not become rarer."""
+    """A driven robot that misses Stop may hear a later Stop, so the Stops do not become rarer."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)

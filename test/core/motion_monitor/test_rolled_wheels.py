@@ -85,9 +85,9 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """After a gap of up to 0.4 s the wheel angles are right within 0.12 rad.
+    """After a gap of up to 0.4 s, the wheel angles are right within 0.12 rad.
 
-    After a gap of 2 s in curves the error is larger, because only the shortest path is known.
+    After a gap of 2 s in curves, the error is larger, because only the shortest path is known.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)

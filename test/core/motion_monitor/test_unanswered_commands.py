@@ -110,7 +110,7 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
 
 
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """For a pushed robot, Stop is sent at once, then ever more rarely; commands still work."""
+    """For a pushed robot, Stop is sent at once, then ever more rarely; commands are obeyed."""
     bench = standing()
     bench.board.grip(0.3, 0.0, 0.2)
     start = len(bench.written)

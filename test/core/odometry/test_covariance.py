@@ -76,7 +76,7 @@ def test_a_robot_at_rest_grows_no_less_sure() -> None:
 
 
 def test_the_covariance_is_a_random_walk_over_the_way() -> None:
-    """Over 1 m, A and B roll 0.87 m, in any number of steps; the variances add up."""
+    """Over 1 m, wheels A and B roll 0.87 m; their variances add up in any number of steps."""
     noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
     for steps in (10, 100):
         odometry = Odometry(OdometrySettings(noise=noise))
@@ -136,8 +136,9 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
     """In 40 drives, wheels of wrong size (1 %) slip (2 %), and the errors fit the covariance.
 
-    For a true covariance the mean of the normalized squared error is 3, one each for x, y and yaw.
-    Over 40 drives it lies between 2.29 and 3.80 with a probability of 95 % (chi-squared of 120).
+    For a true covariance, the mean of the normalized squared error is 3, one each for x, y and yaw.
+    Over 40 drives, the mean lies between 2.29 and 3.80 with a probability of 95 % (chi-squared of
+    120).
     """
     total = 0.0
     for seed in range(40):
@@ -171,7 +172,7 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board's pose comes from the same wheels, so it does not reduce their drift."""
+    """The board's pose is computed from the wheels, so it cannot remove the wheels' drift."""
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):

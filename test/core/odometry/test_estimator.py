@@ -28,7 +28,7 @@ from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, SimulatedBoard
 
-# Ways
+# Driven paths
 
 
 def test_straight_ahead_is_x() -> None:
@@ -75,7 +75,7 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 
 @given(st.lists(small_moves, min_size=1, max_size=40), axis_signs)
 def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
-    """Deltas in the body's axes are published at once, without a pose, at the true position."""
+    """Deltas in the body's axes need no pose: each is published at once, at the true position."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(1.0, signs)
     for move in moves:
         estimates = odometry.displace(trip.move(*xyyaw(move), "body"), 0.0)

@@ -25,7 +25,7 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """At most two seconds are filled in; the driver stops a robot that is silent for longer."""
+    """At most two seconds are filled in, as the driver stops a robot that is silent for longer."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     lost, _ = bridge.tangents(after(250, 0.02), None)

@@ -58,7 +58,7 @@ def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> N
 
 
 def test_the_twist_is_the_true_one() -> None:
-    """With the scales the twist is right, so a filter can fuse it with a gyro."""
+    """With the scales, the twist is right, so a filter can fuse the twist with a gyro."""
     on = bench(TRUE)
     on.drive(0.2, 0.1, 0.4)
     on.run(3.0)

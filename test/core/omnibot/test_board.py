@@ -169,7 +169,7 @@ def test_a_regular_sequence_has_no_losses() -> None:
 
 
 def test_the_first_delta_has_lost_nothing() -> None:
-    """The first delta of a connection, and the first after a pause, reports no losses."""
+    """The first delta of a connection or after a pause reports no losses."""
     board = bot()
     assert lost(board, moved(7)) == [0]
     assert lost(board, PausedFrame(0), moved(100)) == [0]
@@ -199,7 +199,7 @@ def test_faults_are_counted_over_all_connections() -> None:
 
 
 def test_stop_and_emergency_stop_are_the_manuals() -> None:
-    """The bytes are those of the manual's appendix."""
+    """Stop and e-stop have the bytes of the manual's appendix."""
     assert joined(bot().stop()) == STOP
     assert joined(bot().emergency_stop()) == ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
@@ -231,7 +231,7 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
 
 @pytest.mark.parametrize("mode", Mode)
 def test_reset_is_stop_and_r(mode: Mode) -> None:
-    """After a reset the mode is unknown."""
+    """After a reset, the mode is unknown."""
     board = in_mode(mode)
     assert joined(board.reset()) == STOP + ZEROS + b"\x52"
     assert board.mode is Mode.UNKNOWN

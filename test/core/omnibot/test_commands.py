@@ -54,7 +54,7 @@ def test_the_scales_are_those_of_the_settings() -> None:
 
 
 def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
-    """10 rad/s at a radius of 29 mm are 0.29 m/s, which is 20.3 LSB in mode 2."""
+    """10 rad/s at a radius of 29 mm is 0.29 m/s, which is 20.3 LSB in mode 2."""
     assert bare(encoder().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
     wide = encoder(wheel_radius_m=0.058)
     assert bare(wide.wheels((10.0, 0.0, 0.0))) == bytes.fromhex("FF FE 02 00 29 00 00 00 00")
@@ -69,7 +69,7 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """Zeros in mode 1 are never sent: with the switch on position they mean the origin."""
+    """Zeros in mode 1 are never sent: with the switch on position they are a goal, the origin."""
     command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
@@ -182,7 +182,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """The error is 0.5 LSB by rounding, or up to 1.5 LSB where a byte would be a letter."""
+    """The velocity of a frame is off by 0.5 LSB, or up to 1.5 LSB to avoid a letter's byte."""
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
     assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)

@@ -37,7 +37,7 @@ from omnibot_driver.core.omnibot import (
 )
 from omnibot_driver.core.omnibot.frames import Frame
 
-# Undamaged
+# Undamaged streams
 
 
 @pytest.mark.parametrize("name", STREAMS)
@@ -69,7 +69,7 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 ) -> None:
     """A real shock, a stuck sensor and words that look like headers are decoded like the rest."""
     stream = LEAD_IN + b"".join(map(encode, sent))
-    chunks = [chunk for chunk in data.draw(chunkings(stream)) if chunk]  # empty ones are pauses
+    chunks = [chunk for chunk in data.draw(chunkings(stream)) if chunk]  # an empty one is a pause
     assert decoded(chunks, step_s=1e-3) == [REST, REST, *sent]
 
 
@@ -106,7 +106,7 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
     """A frame with a jump is returned, although an adapter pauses within the frame."""
     made = FrameDecoder()
-    made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # it learns how calm the sensor is
+    made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is
     shock = [
         ImuFrame((-6375, 8786, -16371), (2, -8, 1005)),
         DeltaFrame(176, -24, -45, 146),
@@ -217,7 +217,7 @@ def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> N
     assert found == [PausedFrame(n) for n in (7, 8, 9)][start > 0 :]
 
 
-# Counting
+# Fault counters
 
 
 @pytest.mark.parametrize("name", STREAMS)

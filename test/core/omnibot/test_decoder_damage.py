@@ -31,7 +31,7 @@ from omnibot_driver.core.omnibot import (
 )
 from omnibot_driver.core.omnibot.frames import Frame
 
-# Damaged
+# Damaged streams
 
 
 def assert_back_in_step(
@@ -83,7 +83,7 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("extra", [0x00, 0x50, 0x7E, 0xFA, 0xFB, 0xFC, 0xFF])
 def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: int) -> None:
-    """After an inserted byte the decoder is in step again, with at most one false frame."""
+    """After an inserted byte, the decoder is in step again, with at most one false frame."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -126,7 +126,7 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """The FF of the next header completes the frame, which is held until the byte after FF."""
+    """A frame that lost a byte takes FF from the next header; the byte after FF shows the error."""
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
     for number in range(8, 24):
@@ -175,7 +175,7 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """Every byte but the digit is left out in turn; only a text without its blank is valid."""
+    """Each byte of a text but its digit is left out once; only a missing blank is accepted."""
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
     found = decoded([LEAD_IN + hurt + LEAD_IN + LEAD_IN])

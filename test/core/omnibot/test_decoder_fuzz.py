@@ -46,7 +46,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
                 break
             at += 1
         else:
-            pytest.fail(f"{frame} is not in the stream, or not there")
+            pytest.fail(f"{frame} is not in the stream, or out of order")
 
 
 @pytest.mark.slow
@@ -54,7 +54,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
 ) -> None:
-    """Any bytes raise nothing, and fewer than ``DOUBT_BYTES`` are held between calls."""
+    """No bytes raise an exception, and fewer than ``DOUBT_BYTES`` are held between calls."""
     made, now, found = FrameDecoder(), 0.0, []
     for chunk in data.draw(chunkings(stream)):
         now += data.draw(times_s)

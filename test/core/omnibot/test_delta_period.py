@@ -98,7 +98,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 
 
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
-    """At 10 Hz a delta follows ten IMU frames and a pose two deltas; at 25 Hz, four and five."""
+    """At 10 Hz, ten IMU frames precede a delta and two deltas a pose; at 25 Hz, four and five."""
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
     for schedule, right in ((Schedule(0.1), True), (Schedule(), False)):
@@ -149,7 +149,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_lost_delta_is_bridged_and_settled() -> None:
-    """At 10 Hz the pose after every second delta shows the motion of the lost deltas."""
+    """At 10 Hz, a pose follows every second delta and shows the motion of lost deltas."""
     on = Line(BoardSettings(running=True, delta_period_s=TEN_HZ_S))
     on.run(3.0)
     on.loses = lambda data, _now: data[:2] == DELTA
@@ -173,7 +173,7 @@ def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
 
 @pytest.mark.parametrize("period_s", [period_s for period_s in DELTA_PERIODS_S if period_s >= 0.04])
 def test_a_restart_shows_in_the_count(period_s: float) -> None:
-    """A count of 1 after a gap of 1.5 s does not fit a continued count, so it is a restart."""
+    """A count of 1 after a gap of 1.5 s fits no continued count, so the board has restarted."""
     sequence = Sequence(Schedule(period_s))
     for count in range(100):
         sequence.delta(count, count * period_s)

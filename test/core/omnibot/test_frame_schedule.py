@@ -32,7 +32,7 @@ def nominal(imus: int) -> FrameSchedule:
 def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     imus: int, skipped: int, lost: int
 ) -> None:
-    """IMU frames among the damaged bytes are counted; a delta among them is not."""
+    """Lost IMU frames are counted from damaged bytes; a delta in these bytes is not counted."""
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
 
@@ -46,7 +46,7 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """An IMU frame lost before a pose, with a delta, is counted at the frame after the pose."""
+    """An IMU frame that is lost before a pose is counted with the frame after the pose."""
     rhythm = nominal(0)
     for _ in range(4):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):

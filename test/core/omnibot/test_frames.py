@@ -91,7 +91,7 @@ def test_each_command_of_the_appendix_is_these_bytes(typed: str, frame: CommandF
 def test_each_frame_table_is_laid_out_as_in_the_manual(
     typed: str, frame: Frame | CommandFrame
 ) -> None:
-    """Header, words with the most significant byte first, SEQ last; encoded and decoded."""
+    """A frame has a header, words with the most significant byte first, and SEQ, if any, last."""
     assert encode(frame) == bytes.fromhex(typed)
     assert decode(bytes.fromhex(typed)) == frame
 
@@ -278,7 +278,7 @@ def test_what_no_frame_begins_with_is_never_waited_for(data: bytes) -> None:
 
 
 def test_struct_sizes_are_the_lengths_of_the_manual() -> None:
-    """The sizes are 14, 9 and 15 bytes from the board, and 9 to it."""
+    """Frames from the board have 14, 9 and 15 bytes, and frames to the board have 9 bytes."""
     zeros = (0, 0, 0)
     assert len(encode(ImuFrame(zeros, zeros))) == 14
     assert len(encode(DeltaFrame(0, 0, 0, 0))) == 9

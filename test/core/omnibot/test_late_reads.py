@@ -19,7 +19,7 @@ Reads = Iterator[tuple[bytes, float]]
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
 """Durations for which a reader stops, in s.
 
-A line is idle for 8.8 ms between two ticks, and longer by multiples of 10 ms if frames are lost.
+The line is idle for 8.8 ms between two ticks, and longer by multiples of 10 ms if frames are lost.
 """
 
 
@@ -70,7 +70,7 @@ def heard(reads: Reads) -> list[Frame]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """The stop is between any two bytes of five frames, after half a second of prompt reads."""
+    """A reader stops between any two bytes of five frames, after 0.5 s of prompt reads."""
     ticks = ticks_of(name)[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))
@@ -153,8 +153,7 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
     """The front of one frame and the back of a later frame do not form a frame.
 
-    At rest only the pause between the two parts shows this, and a prompt reader measured that
-    pause.
+    At rest only the pause between the two parts shows this; a prompt reader has measured it.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):

@@ -30,7 +30,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """A second after a gap odom is right, even in curves and if SEQ has wrapped."""
+    """One second after a gap, odom is right, even in curves and if SEQ has wrapped."""
     for seed in range(5):
         on = line(seed, frame=frame)
         lose(on, lost * PERIOD_S)
@@ -60,7 +60,7 @@ def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.01, 0.1, 0.3])
 def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float) -> None:
-    """Frames are lost for half a minute; then one second without losses removes the error."""
+    """Frames are lost at random for 30 s; a second without losses removes the error of odom."""
     for seed in range(3):
         random, on = Random(seed), line(seed)
         on.loses = lambda _data, _now, random=random: random.random() < rate
@@ -115,7 +115,7 @@ def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_fa
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """After a long gap displacements wait up to 0.2 s for a pose, so no guess is published."""
+    """After a long gap, displacements wait up to 0.2 s for a pose, so no guess is published."""
     for seed in range(5):
         on = line(seed)
         lose(on, lost * PERIOD_S)
@@ -249,7 +249,7 @@ losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
     pattern: list[tuple[int, int]], seed: int, frame: str
 ) -> None:
-    """After one good second odom is the board's pose; no step before that exceeds 2 m/s."""
+    """After one good second, odom is the board's pose; no step before that exceeds 2 m/s."""
     on = line(seed, frame=frame)
     fate = iter([lost for come, gone in pattern for lost in [False] * come + [True] * gone])
     on.loses = lambda _data, _now: next(fate, False)

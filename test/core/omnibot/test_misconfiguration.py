@@ -35,7 +35,7 @@ def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0
 
 @pytest.mark.parametrize(("sent", "read"), [("big", "little"), ("little", "big")])
 def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
-    """Poses that are valid only in the other byte order lead to advice within two seconds."""
+    """Poses that are valid only in the other byte order lead to advice on the byte order."""
     board = BoardSettings(running=True, pose_byte_order=sent)
     told = advice(board, OmniBotSettings(pose_byte_order=read))
     assert told is not None
@@ -56,7 +56,7 @@ def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: floa
 @pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
 @pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
 def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
-    """After 3 s the advice names the right delta period; the right period causes no advice."""
+    """After 3 s, the advice names the right delta period; the right period causes no advice."""
     board = BoardSettings(running=True, delta_period_s=sent_s)
     told = advice(board, OmniBotSettings(delta_period_s=read_s), 3.0)
     if sent_s == read_s:

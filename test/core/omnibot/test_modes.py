@@ -69,7 +69,7 @@ def test_only_p_is_ever_refused() -> None:
     ids=["text", "delta", "pose"],
 )
 def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard: Mode) -> None:
-    """One text, delta or pose sets the mode, whatever the mode before."""
+    """A single text, delta or pose sets the mode, whatever the mode before."""
     made = tracker(mode)
     made.hear(frame)
     assert made.mode is heard
@@ -77,7 +77,7 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """24 IMU frames alone may be five deltas lost by chance; 25 mean IMU-only mode."""
+    """After 24 IMU frames alone, five deltas may be lost by chance; 25 mean IMU-only mode."""
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
         made.hear(DELTA)
@@ -101,7 +101,7 @@ def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_r_makes_the_mode_unknown(mode: Mode) -> None:
-    """After R the mode is unknown until data arrives."""
+    """After R, the mode is unknown until data arrives."""
     made = tracker(mode)
     made.apply(Happening.SENT_RESET)
     assert made.mode is Mode.UNKNOWN
@@ -130,7 +130,7 @@ def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", [Mode.UNKNOWN, Mode.PAUSED])
 def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
-    """P is a toggle: it would start a paused board, or have an unknown effect."""
+    """P is a toggle: it would start a paused board; in an unknown mode its effect is unknown."""
     made = tracker(mode)
     with pytest.raises(RequestRefused, match=mode.value):
         made.apply(Happening.SENT_PAUSE)

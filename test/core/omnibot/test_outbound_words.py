@@ -49,7 +49,7 @@ def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
 def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
     counts: tuple[float, float, float],
 ) -> None:
-    """Up to 20,479 a harmful word is changed by one LSB; beyond, its high byte may be a letter."""
+    """Up to 20,479, a harmful word changes by one LSB; beyond, its high byte may be a letter."""
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5
 

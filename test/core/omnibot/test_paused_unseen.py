@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board that another program pauses and starts, by sending P twice, within one read."""
+"""A board that another program pauses and starts, with two P, within one read."""
 
 import pytest
 from session_bench import STOP, TICK_S, Bench

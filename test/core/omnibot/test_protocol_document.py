@@ -156,7 +156,7 @@ def test_every_kind_of_frame_and_letter_has_an_example() -> None:
 
 
 def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
-    """The bytes are those printed in the manual."""
+    """The ten commands have the bytes that are printed in the manual."""
     shown = {example.remark: example.data.hex(" ").upper() for example in EXAMPLES}
     assert {name: shown.get(name) for name in APPENDIX} == APPENDIX
 

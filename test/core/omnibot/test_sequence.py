@@ -54,7 +54,7 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """A count of 0 after two seconds does not fit a continued count, so it is a restart."""
+    """A count of 0 after two seconds fits no continued count, so the board has restarted."""
     assert begun(count).delta(0, 102.0).restarted
 
 
@@ -64,7 +64,7 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
 def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
     elapsed_s: float, drift: float, imus: int
 ) -> None:
-    """While the TTL side is unplugged, the board's clock runs 1 % slow or fast."""
+    """The TTL side is unplugged for minutes, and the board's clock is 1 % slow or fast."""
     sequence = begun(100)
     passed = round(elapsed_s / 0.04 * (1 + drift))
     step = sequence.delta((100 + passed) % 256, 100.0 + elapsed_s, imus=imus)
@@ -75,7 +75,7 @@ def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
 
 
 def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
-    """In 120 s a board whose clock is 1 % fast sends 30 more deltas than the time suggests."""
+    """In 120 s, a board whose clock is 1 % fast sends 30 more deltas than the time suggests."""
     sequence = Sequence()
     sequence.delta(100, 0.0)
     assert sequence.delta((100 + 3030) % 256, 120.0) == Step(3029)
@@ -140,7 +140,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """A pose counter that starts again is not a gap, which could not fit into the elapsed time."""
+    """A pose counter that begins again is not a gap: a gap of this size would take longer."""
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -150,14 +150,14 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """After a reconnect, a count that fits neither a restart nor a gap means another board."""
+    """After a reconnect, a count that fits neither a restart nor a gap is another board's."""
     sequence = begun(7)
     sequence.reconnect()
     assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)
 
 
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
-    """A false delta comes too early; the true one has the same count, which is not a wrap."""
+    """A false delta comes too early; the true one has the same count. This is not a wrap."""
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)
     assert sequence.delta(10, 100.04, imus=2) == Step(0)
@@ -196,7 +196,7 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """Four IMU frames are too few for the deltas that a continued count would lack."""
+    """Only four IMU frames arrived, too few for the deltas that a continued count would lack."""
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted

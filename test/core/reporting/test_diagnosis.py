@@ -140,7 +140,7 @@ def test_each_fault_alone_raises_its_own_status(
 
 
 def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
-    """If a line of a board is missing, the status says so, and not that the board is silent."""
+    """The status says that a line of the board is missing, and not that the board is silent."""
     robot = Robot()
     robot.connect(trouble="the line 'front' is missing: unplugged")
     robot.set(state="connecting")
@@ -151,7 +151,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """Values that only some boards have, such as their own odometry's rate, are shown as well."""
+    """Values that only some boards have, such as the rate of their own odometry, are shown."""
     robot = Robot()
     assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
     robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
@@ -277,7 +277,7 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
 
 
 def test_what_a_board_does_not_send_has_no_figures() -> None:
-    """The diagnostics have no IMU status, and no rates and counts of IMU and poses."""
+    """A board without IMU and poses has no IMU status, and no rates of IMU readings or poses."""
     robot = Robot()
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}
     robot.set(board=BoardFigures(rates_hz=rates_hz))

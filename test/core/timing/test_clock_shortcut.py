@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The clock's shortcut for ticks that arrive when due: it changes no stamp."""
+"""The clock's shortcut for ticks that arrive when due; the shortcut changes no stamp."""
 
 import random
 
@@ -101,7 +101,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Calm lines use the shortcut; otherwise the other tests would compare nothing."""
+    """Calm lines use the shortcut; without that, the other tests would prove nothing."""
     compared = 0
     compare = DeviceClock._compare
 

@@ -106,7 +106,7 @@ def run(
 def test_stamps_are_even_and_true_to_a_constant(
     chunker: Chunker, skew: float, imu_only: bool
 ) -> None:
-    """From 2 s on the unevenness is below 0.2 ms, and 99 % of the errors are within ±0.5 ms."""
+    """From 2 s on, the unevenness is below 0.2 ms; 99 % of the errors lie within 1 ms."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
         assert stamped.unevenness() < 0.2e-3
@@ -159,7 +159,7 @@ def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) -> None:
-    """Three seconds of frames in the first read, cut anywhere, get their own times."""
+    """The first read holds three seconds of frames, which are stamped with their own times."""
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4, imu_only=imu_only, first_tick=seed * 1234 + 3)
         rng = random.Random(seed)
@@ -276,7 +276,7 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Whatever counters and frame boundaries claim, no stamp decreases or exceeds its arrival."""
+    """Whatever counters and frame boundaries claim, stamps never decrease or pass the arrival."""
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
     for passed_s, readings, edge in reads:
