@@ -2,8 +2,8 @@
 
 """Shared fixtures; ROS traffic stays on this machine and within this test run.
 
-Hypothesis tries the same examples in every run, so a test that turns red was caused by a change.
-``pytest --hypothesis-profile exploring`` looks for other examples. No example has a deadline.
+Hypothesis tries the same examples in every run, so a test that newly fails shows the effect of a
+change. ``pytest --hypothesis-profile exploring`` tries other examples. No example has a deadline.
 """
 
 import os
@@ -28,7 +28,7 @@ os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 99)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 ENDS_WITHIN_S = 60.0
-"""Time limit for the end of a closed link's thread, in s; the driver itself waits less long."""
+"""Time limit for the end of a closed link's thread, in s; the driver's own limit is shorter."""
 
 settings.register_profile("exploring", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("same", settings.get_profile("exploring"), derandomize=True)
@@ -63,7 +63,7 @@ def pytest_report_header() -> str:
 
 @pytest.fixture
 def nothing_left_behind() -> Iterator[None]:
-    """Check that every link, port and board of a test gives back its threads and descriptors."""
+    """Check that every link, port and board of a test releases its threads and descriptors."""
     threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
     yield
     for thread in threading.enumerate():
@@ -76,7 +76,7 @@ def nothing_left_behind() -> Iterator[None]:
 def driver_threads() -> list[str]:
     """Return the names of the threads of links, recordings and simulated boards.
 
-    The test runner has threads of its own; they are left out.
+    The threads of the test runner itself are left out.
     """
     names = (thread.name for thread in threading.enumerate())
     return sorted(name for name in names if name.startswith(("omnibot-", "simulated board")))

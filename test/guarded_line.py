@@ -25,7 +25,7 @@ LATCHED_WORDS = b"and these under the e-stop"
 
 
 class Line:
-    """A pseudo-terminal: ``near`` is the driver's port; the far end is read by the test."""
+    """A pseudo-terminal: ``near`` is the driver's port, and the test reads the far end."""
 
     def __init__(self) -> None:
         self._far, self.near = os.openpty()
@@ -72,7 +72,7 @@ def children() -> list[int]:
 
 
 def started(pid: int) -> None:
-    """Wait until Python runs in the process and it ignores SIGTERM."""
+    """Wait until Python runs in the process and the process ignores SIGTERM."""
     end = time.monotonic() + PATIENCE_S
     bit = 1 << (signal.SIGTERM - 1)
     while not int(status_of(pid, "SigIgn"), 16) & bit:
@@ -97,7 +97,7 @@ def alive(keeper: Keeper, seconds: float) -> float:
 
 
 def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
-    """Send heartbeats at the driver's pace until the condition holds; return the messages."""
+    """Send heartbeats at the driver's pace until ``predicate`` holds; return all messages."""
     told, end = "", time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end
@@ -107,6 +107,6 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
 
 
 def replaced(line: Line, guard: int) -> bool:
-    """Return whether another guard runs, and this one has ended and was reaped."""
+    """Return whether the guard with this process id was reaped and another guard runs."""
     found = line.children()
     return bool(found) and guard not in found

@@ -2,7 +2,7 @@
 
 """How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
-The module knows the line's pace, but nothing of frames. Times are in s.
+The module knows the pace of the serial line, but nothing of frames. Times are in s.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,9 +14,9 @@ LARGEST_PIECE: Final = 16
 PACKET: Final = 62
 """Size of an FTDI packet in bytes."""
 DRIFT: Final = 1.0002
-"""Rate of the adapter's clock against the board's.
+"""Rate of the adapter's clock relative to the board's clock.
 
-Because of it, in 8 s packets end at all phases of a tick.
+The drift makes packets end at every phase of a tick within 8 s.
 """
 
 Handed = tuple[float, bytes]
@@ -26,7 +26,7 @@ Adapter = Callable[[Ticks, Random], Iterator[Handed]]
 
 
 def whole(ticks: Ticks, _random: Random) -> Iterator[Handed]:
-    """Deliver all bytes of a tick when the tick begins, which is faster than any adapter."""
+    """Deliver all bytes of a tick when the tick begins, sooner than any real adapter does."""
     yield from ticks
 
 
@@ -41,7 +41,7 @@ def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
 
 
 def packets(timer_s: float) -> Adapter:
-    """Make an adapter like FTDI's: it delivers 62 bytes, or fewer at the end of its timer."""
+    """Make an adapter like FTDI's: it delivers 62 bytes, or fewer when ``timer_s`` has passed."""
 
     def handed(ticks: Ticks, random: Random) -> Iterator[Handed]:
         held, out = bytearray(), -1.0

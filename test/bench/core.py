@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements of the core alone: decoding against a loop without checks, linearity, and memory."""
+"""Measurements of the core alone: decoding, against a loop without checks; linearity; memory."""
 
 import gc
 import os
@@ -29,7 +29,7 @@ SECONDS = 120.0
 SETTLED = 400
 """Number of ticks before a measurement begins."""
 OTHERS_BYTES = 24 << 20
-"""Number of bytes to touch so that the processor's caches hold nothing else."""
+"""Number of bytes to overwrite, enough to displace everything else from the processor's caches."""
 FAULTY = "1 byte in 100 lost"
 STREAMS = (("clean", ""), (FAULTY, FAULTY))
 GOALS = {"clean": 1.5, FAULTY: 4.0}
@@ -38,7 +38,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB
 
 
 def trust(data: bytes) -> list[Frame]:
-    """Decode without checks, as the floor: whatever looks like a header begins a complete frame."""
+    """Decode without checks, as the floor: any byte that looks like a header's begins a frame."""
     frames: list[Frame] = []
     at, size = 0, len(data) - 15
     while at < size:
@@ -59,15 +59,15 @@ def trust(data: bytes) -> list[Frame]:
 
 
 def trust_all(blocks: Sequence[bytes]) -> int:
-    """Count the frames of all blocks, without keeping them.
+    """Count the frames of all blocks, without keeping the frames.
 
-    ``decode`` does not keep frames either, since that costs time.
+    ``decode`` does not keep its frames either, since keeping them costs time.
     """
     return sum(len(trust(block)) for block in blocks)
 
 
 def decode(chunks: Sequence[bytes]) -> int:
-    """Decode with arrival times of a line without pauses; return the number of frames."""
+    """Decode chunks as they arrive on a line without pauses; return the number of frames."""
     decoder, now, frames = FrameDecoder(), 0.0, 0
     for chunk in chunks:
         now += len(chunk) / BYTES_PER_S
@@ -76,7 +76,7 @@ def decode(chunks: Sequence[bytes]) -> int:
 
 
 def stream(seconds: float, fault: str = "") -> bytes:
-    """Return the stream of a robot that drives, undamaged or with this fault."""
+    """Return the stream of a driving robot, undamaged or damaged by ``fault``."""
     truth = generate(SCENARIOS["driving"], 1, seconds)
     return receive(truth, FAULTS[fault], Random(1)).data if fault else bytes(truth.data)
 
@@ -116,7 +116,7 @@ def linearity() -> list[str]:
 
 
 def cold(ticks: int) -> str:
-    """Measure the time from a read to its publishable IMU reading, with and without warm caches."""
+    """Measure the time from an IMU frame's bytes to its reading, with warm and with cold caches."""
     session, board = _session(), SimulatedBoard(BoardSettings(seed=1, running=True))
     other = bytearray(OTHERS_BYTES)
     taken: dict[bool, list[float]] = {False: [], True: []}

@@ -2,9 +2,9 @@
 
 """Cost of discovery in a fleet, with and without a Fast DDS discovery server: docs/fleet.md.
 
-``unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]`` needs root. In its own
-network namespace only this traffic is counted. The drivers run on this computer, but use only UDP,
-as on several computers. It prints rows of a table.
+``unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]`` needs root. The program runs
+in its own network namespace, so that no other traffic is counted. All drivers run on this computer,
+but they use only UDP, as drivers on several computers do. The program prints rows of a table.
 """
 
 import os
@@ -18,10 +18,12 @@ ROOT: Final = Path(__file__).parents[2]
 SERVER: Final = Path(sys.prefix, "bin/fast-discovery-server")
 PORT: Final = "11811"
 WINDOW_S: Final = 30.0
-"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
+"""Length of a measurement window in s: a fixed time, not a wait for an event."""
 SETTLE_S: Final = 10.0
-"""Length of the start phase, and of the pause after the observer has left, in s: no event reports
-the last packet."""
+"""Length in s of the start phase, and of the pause after the observer has left.
+
+Both are fixed times, because no event reports the last packet.
+"""
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """
 import sys, time, rclpy
@@ -51,7 +53,7 @@ def processor_s(pids: list[int]) -> float:
 
 
 def measure(number: int, *, served: bool) -> str:
-    """Start this number of drivers, discover them, and watch them at rest; return one row."""
+    """Start ``number`` drivers, discover them, watch them at rest; return one row of the table."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT),

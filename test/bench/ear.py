@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A subscriber in its own process: notes the time of each message until its input ends.
+"""A subscriber in its own process: it records the time of each message until its input ends.
 
-Arguments: namespaces. It prints one JSON object with an array per namespace: ``heard`` has pairs of
-the steady clock's time in s and the acceleration along x, ``odometries`` the times alone.
+Arguments: namespaces. The program prints one JSON object with the lists ``heard`` and
+``odometries``, which have an array per namespace. An item of ``heard`` is a pair: the steady
+clock's time in s, and the acceleration along x. An item of ``odometries`` is only the time.
 """
 
 import json

@@ -2,8 +2,8 @@
 
 """The Fejemis's part of ``make bench``: delay of the front angle on its way to the drive board.
 
-A simulated pair runs on two pseudo-terminals in its own process, the driver's link in this one
-without ROS, and busy processes beside both.
+A simulated pair of boards runs on two pseudo-terminals in a process of its own. The driver's link
+runs in this process, without ROS. Busy processes run beside both.
 """
 
 import contextlib
@@ -44,9 +44,10 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both boards in real time; send how long each angle took to the drive board, in s.
+    """Run both boards in real time, and send the delays of all front angles to ``results``.
 
-    The wheel swings from side to side, so that recent angles differ.
+    A delay is the time in s that an angle takes to reach the drive board. The wheel swings from
+    side to side, so that recent angles differ.
     """
     pair = SimulatedFejemis()
     drive, _ = masters
@@ -112,7 +113,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return the delays of all angles beside this number of busy processes, in ms, sorted."""
+    """Return the delays of all angles in ms, sorted, while ``busy`` busy processes run."""
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
         tty.setraw(near)

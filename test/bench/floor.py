@@ -5,8 +5,8 @@
 ``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, and an Odometry and a
 JointState for every delta, trusting the second byte of what looks like a frame. ``commands PORT
 NAMESPACE`` writes a frame for every cmd_vel. Each message or frame has one number by which it is
-recognized. ``bare PORT NAMESPACE`` has the topics and services of the driver without any function:
-its memory is ROS's part.
+recognized. ``bare PORT NAMESPACE`` has the driver's topics and services, but does nothing, so it
+needs only the memory that ROS itself takes.
 """
 
 import os

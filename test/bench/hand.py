@@ -20,7 +20,7 @@ LSB_PER_MPS = 70.0
 
 
 def main() -> None:
-    """Command the robots in turn, with the same wait before each."""
+    """Command the robots in turn, with the same wait before each command."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, int]]] = [[] for _ in namespaces]

@@ -26,14 +26,16 @@ from omnibot_driver.simulator.lois_ecu import LoisSettings, SimulatedLois
 TICK_S: Final = 0.01
 RECORDED_S: Final = 120.0
 WINDOW_S: Final = 8.0
-"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
+"""Length of a measurement window in s: a fixed time, not a wait for an event."""
 SETTLING_S: Final = 10.0
-"""How long the programs run before they are measured, in s: no event reports the end of their
-start."""
+"""How long the programs run before the measurement, in s; no event reports that they are ready."""
 
 
 class Stage:
-    """Boards on pseudo-terminals at ``paths``; ``heard``: reads of commands, with times."""
+    """Boards on pseudo-terminals at ``paths``.
+
+    ``heard``: for each board, the time and the bytes of every read of commands.
+    """
 
     def __init__(self, boards: int) -> None:
         board = SimulatedLois(LoisSettings(running=True))
@@ -79,7 +81,7 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return all figures that have a floor, and no other sections of the report."""
+    """Return all figures that have a floor, and an empty list of further report sections."""
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:
         parameters = {"board": "lois_ecu", "port": stage.paths[0], "motion_monitor": "false"}
@@ -114,7 +116,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 def _latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """Return the time from each command to the first read with its line, in µs."""
+    """Return the time from each command to the first read that contains its line, in µs."""
     found = []
     times = [at for at, _ in heard]
     for at, speed in sent:

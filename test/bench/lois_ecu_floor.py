@@ -22,7 +22,7 @@ RPM_PER_MPS = 60.0 / math.tau / WHEEL_RADIUS_M
 
 
 def rpm_line(speed_mps: float) -> bytes:
-    """Return the command for both wheels forward at this speed."""
+    """Return the command that turns both wheels forward at ``speed_mps``."""
     text = f":02{2 * f'{round(RPM_PER_MPS * speed_mps):04x}'}".encode()
     check = 0
     for character in text:
@@ -31,7 +31,7 @@ def rpm_line(speed_mps: float) -> bytes:
 
 
 def relay(port: int, node: Node) -> None:
-    """Read, and publish prefilled messages for each group."""
+    """Read, and publish prefilled messages for each group of odometry reports."""
     odometries = node.create_publisher(Odometry, "odom", 10)
     joints = node.create_publisher(JointState, "joint_states", 10)
     odometry = Odometry(child_frame_id="base_link")

@@ -20,16 +20,15 @@ from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
 WINDOW_S: Final = 20.0
-"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
+"""Length of a measurement window in s: a fixed time, not a wait for an event."""
 SETTLING_S: Final = 8.0
-"""How long the programs run before they are measured, in s: no event reports the end of their
-start."""
+"""How long the programs run before the measurement, in s; no event reports that they are ready."""
 LATEST_S: Final = 0.9
 """Longest latency in s; a later datagram belongs to the next command."""
 LARGE: Final = 3
-"""Smallest change of a speed that is a new command, in register units.
+"""Smallest change of a speed that shows a new command, in register units.
 
-Smaller changes hold the heading.
+The driver makes smaller changes by itself, to hold the heading.
 """
 
 
@@ -47,7 +46,7 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return all figures that have a floor, and no other sections of the report."""
+    """Return all figures that have a floor, and an empty list of further report sections."""
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]
@@ -99,9 +98,9 @@ def _medians(late: list[list[float]], windows: int) -> list[list[float]]:
 def _latencies(
     sent: list[tuple[float, float]], heard: list[tuple[float, bytes]], *, stops: bool
 ) -> list[float]:
-    """Return the time from each speed command to its datagram, in µs, if the robot drove before.
+    """Return the time from each command to its datagram, in µs, for commands to a moving robot.
 
-    ``stops``: whether to measure stops, or else changes of speed.
+    ``stops``: measure stops; otherwise measure changes of speed.
     """
     found = []
     for (_, before), (at, speed) in pairwise(sent):

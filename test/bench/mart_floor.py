@@ -22,7 +22,7 @@ MPS_PER_UNIT = 0.0078
 
 
 class Relay:
-    """A relay with one socket for everything."""
+    """A relay that sends and receives everything on one socket."""
 
     def __init__(self, address: tuple[str, int], node: Node) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

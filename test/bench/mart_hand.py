@@ -14,13 +14,13 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Speeds in m/s; the rest at the end is long enough for a new start."""
+"""Commanded speeds in m/s; the zeros at the end last until the robot can be started anew."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Command each speed to one robot right after the other; note when it was first published."""
+    """Command each speed to both robots in quick succession; record when it was first published."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

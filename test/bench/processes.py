@@ -15,7 +15,7 @@ PATIENCE_S = 5.0
 
 
 class Program:
-    """A program of this directory, or a module, that runs as a process until its ``with`` ends."""
+    """A program of this directory, or a module, that runs as a process while its context lasts."""
 
     def __init__(self, *arguments: str, environment: dict[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
@@ -70,7 +70,10 @@ class Program:
 
 
 def driver(path: str, namespace: str, before: str = "", **environment: str) -> Program:
-    """Start the driver on this port as users do; ``before``: Python to run in its process first."""
+    """Start the driver on this port as users do.
+
+    ``before``: Python code that runs in the driver's process before the driver.
+    """
     program = ["-m", "omnibot_driver.driver"]
     if before:
         main = "import sys, omnibot_driver.driver as driver; sys.exit(driver.main())"
@@ -85,12 +88,12 @@ def floor(what: str, path: str, namespace: str) -> Program:
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start the smallest relay on this port with one more step, named ``what``."""
+    """Start a relay of ``steps.py`` on this port; ``what``: the name of its last step."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 
 def ear(*namespaces: str) -> Program:
-    """Start a process that subscribes in these namespaces; it is ready when this returns."""
+    """Start a process that subscribes in these namespaces; return when the process is ready."""
     program = Program(str(HERE / "ear.py"), *namespaces)
     program.line()
     return program

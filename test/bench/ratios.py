@@ -9,7 +9,7 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of the driver (``ours``) and of the floor, in pairs measured together.
+    """Values of one figure, of the driver (``ours``) and of the floor, measured in pairs.
 
     ``goal``: largest allowed ratio of ours to the floor.
     """
@@ -22,7 +22,7 @@ class Figure:
 
     @property
     def ratio(self) -> float:
-        """Median over the pairs of the ratio of ours to the floor."""
+        """Median of the ratios of ours to the floor over all pairs."""
         return median(self._ratios)
 
     @property
@@ -69,5 +69,5 @@ def alternate(
 
 
 def short(value: float) -> str:
-    """Format a number with three digits; a large one with all digits before the point."""
+    """Format a number with three digits; a large one with all digits before the decimal point."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

@@ -2,8 +2,8 @@
 
 """The performance report: ``make bench`` writes it into docs/internals/performance.md.
 
-Every figure is measured together with its floor on the same machine. ``--quick`` makes everything
-short, to see whether it runs. The exit code is 1 when a goal is missed.
+Every figure is measured together with its floor on the same machine. ``--quick`` shortens all
+measurements, to test that the program runs. The exit code is 1 when a goal is missed.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from ratios import Figure, table
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
-"""Module that measures each other board, by the board's name."""
+"""By the name of each other board, the module that measures the board."""
 SCALES = (1, 2, 4, 8)
 
 

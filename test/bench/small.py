@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driver and floor on a small computer: one core, of which each process group gets a part.
+"""Driver and floor on a small computer: each process group gets a share of one core.
 
-The part is a quota of Linux's cgroups, whose period is as short as the kernel permits, so the
-computer seems slow and does not stutter. Only root can set it up.
+The share is a quota of Linux's cgroups. Its period is as short as the kernel permits, so that the
+computer seems slow and does not stutter. Only root can set up a cgroup.
 """
 
 import math
@@ -20,7 +20,7 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Parts of one core that driver and floor get, each for itself."""
+"""Shares of one core to test; driver and floor each get a share of this size."""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
 """Processor time in s that a cgroup gets per period; the kernel permits no less."""
@@ -29,14 +29,16 @@ NAMES: Final = ("ours", "floor")
 RELAY: Final = "measurements"
 STOP: Final = b"\xff\xfe\x02"
 STOPPING_S: Final = 2.0
-"""How long a Stop is awaited after the last command, in s. The time stays the same for each part of
-a core, so no event ends it."""
+"""How long to wait for a Stop after the last command, in s.
+
+The wait is a fixed time, so that it is equal for all shares of a core.
+"""
 
 
 class Group:
-    """A group of processes that gets a part of a core, in version 1 or 2 of cgroups.
+    """A group of processes that gets a share of a core, with version 1 or 2 of cgroups.
 
-    Raises OSError if it cannot be set up.
+    Raises OSError if the cgroup cannot be set up.
     """
 
     def __init__(self, name: str) -> None:
@@ -57,7 +59,7 @@ class Group:
 
     @contextmanager
     def joined(self) -> Iterator[None]:
-        """Put this process into the group, and so the processes that it starts in the context."""
+        """Put this process and all that it starts in the context into the group."""
         self._members.write_text(str(os.getpid()))
         try:
             yield
@@ -65,7 +67,7 @@ class Group:
             self._root.write_text(str(os.getpid()))
 
     def give(self, part: float) -> None:
-        """Give the group this part of a core; 1 means all of it."""
+        """Give the group this share of a core; 1 means the whole core."""
         run_us, period_us = round(1e6 * RUN_S), round(1e6 * RUN_S / part)
         if self._is_first:
             self._write("cpu.cfs_quota_us", -1)
@@ -79,9 +81,10 @@ class Group:
 
 
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
-    """Return rows of a table: what driver and floor do with each part of one core.
+    """Return rows of a table: what driver and floor achieve with each share of one core.
 
-    ``seconds``: how long each part is measured. Where cgroups cannot be changed, return a sentence.
+    ``seconds``: length of the measurement with each share. Where cgroups cannot be changed, the
+    result is one sentence.
     """
     try:
         return _table(parts, seconds)

@@ -2,8 +2,8 @@
 
 """Processor time of the driver's reader by stage, measured with timers around the stages.
 
-It is run in the driver's process before the driver starts. At the end it writes a JSON object to
-the file that SPLIT names: seconds per stage, and as ``passed`` how long the reader ran, in s.
+This code runs in the driver's process before the driver starts. At the end it writes a JSON object
+to the file that SPLIT names: seconds per stage, and as ``passed`` how long the reader ran, in s.
 """
 
 import atexit
@@ -27,7 +27,10 @@ within: list[float] = []
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Replace a method by one whose time is added to this stage, less the stages that it calls."""
+    """Replace a method by one that adds its own time to ``stage``.
+
+    Its own time does not include the stages that the method calls.
+    """
     method: Callable[..., Any] = getattr(owner, name)
 
     def measured(*arguments: Any) -> Any:

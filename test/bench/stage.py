@@ -2,8 +2,9 @@
 
 """Boards that send the nominal stream on pseudo-terminals, each at its own phase of the tick.
 
-They take turns within the 10 ms, so that their readers are measured in alternation; all have the
-same kind of adapter. Every IMU frame has a number in its first word; a board has no other function.
+Within each tick of 10 ms the boards send one after the other, so that their readers are measured in
+alternation. All boards have the same kind of adapter. Every IMU frame has a number in its first
+word; a board has no other function.
 """
 
 import heapq

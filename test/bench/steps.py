@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The floor with one more task at each step, up to those that an honest relay needs.
+"""Relays of growing size: each step adds one task to the floor, up to what a correct relay needs.
 
-Arguments: which step (a key of STEPS), port, namespace. It publishes bytes and writes nothing.
+Arguments: the step (a key of STEPS), port, namespace. The relay publishes serialized messages and
+writes nothing to the port.
 """
 
 import os

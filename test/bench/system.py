@@ -25,11 +25,10 @@ from stage import Stage, number_of
 from steps import STEPS
 
 WINDOW_S = 6.0
-"""Length of a window in s: all that happens in this time is measured, so no event ends it."""
+"""Length of a measurement window in s: a fixed time, not a wait for an event."""
 COMMANDS_S = 3.0
 SETTLING_S = 8.0
-"""How long the programs run before they are measured, in s: no event reports the end of their
-start."""
+"""How long the programs run before the measurement, in s; no event reports that they are ready."""
 GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "pieces of 1 to 16 bytes": (1.0, 1.0, 1.0, 1.0),
     "1 ms timer": (None, None, None, None),
@@ -95,7 +94,7 @@ def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
 
 
 def memory() -> list[str]:
-    """Return rows of a table: driver and guard, compared with a node with the same interface."""
+    """Return rows of a table: memory of driver, guard, and a bare node with the same interface."""
     with Stage(2) as stage, ExitStack() as stack:
         stack.enter_context(ear("ours"))
         ours = stack.enter_context(driver(stage.paths[0], "ours"))
@@ -112,7 +111,7 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return rows of a table that begins with the floor and adds a step per row."""
+    """Return rows of a table: the floor, then one more step per row, then the driver."""
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear(*names))
@@ -163,7 +162,7 @@ def commands(adapter: str, windows: int) -> Figure:
 
 
 def imports(times: int) -> Figure:
-    """Measure the import of the driver, compared with the imports that any such node needs."""
+    """Measure how long the driver's import takes, and the imports that any such node needs."""
     floor_names = "rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_srvs.srv"
 
     def seconds(names: str) -> float:

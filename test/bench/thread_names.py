@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes the kernel's number and the name of each thread of a process to the file NAMES.
+"""Writes the kernel's number and the name of each thread to the file that NAMES names.
 
-It is run in the driver's process before the driver starts.
+This code runs in the driver's process before the driver starts.
 """
 
 import os

@@ -40,7 +40,7 @@ def losing_bursts(rate: float, random: Random) -> Damage:
 
 
 def gaining(rate: float, random: Random) -> Damage:
-    """Return damage that inserts bytes of any value, each place with the probability ``rate``."""
+    """Return damage that inserts bytes of any value, at each place with probability ``rate``."""
 
     def damage(data: bytes) -> bytes:
         out = bytearray()
@@ -64,7 +64,7 @@ def noise(random: Random) -> Damage:
 def late(ticks: int) -> Damage:
     """Return damage that holds all data back for this number of ticks, as some adapters do.
 
-    After that, it delivers everything at once.
+    After these ticks, all held data are delivered at once.
     """
     held: list[bytes] = []
 

@@ -27,7 +27,7 @@ SILENCE_S: Final = 1.0
 TRANSIT: Final = 200
 """Number of frames that may be on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""Number of sent frames among which the next message must be found; else it was never sent."""
+"""Number of sent frames among which the next message must be found, or it counts as wrong."""
 
 
 class PiecesTerminal(Terminal):
@@ -75,9 +75,10 @@ def busy_loops() -> Iterator[None]:
 
 
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
-    """Return the number of messages that were never sent, and of sent ones missing in between.
+    """Return how many messages were never sent, and how many sent frames have no message.
 
-    At constant speed many frames are equal, so each possible first one is tried.
+    At constant speed many frames are equal, so the comparison begins at each frame that equals the
+    first message, and the best result counts.
     """
     starts = [n for n, key in enumerate(sent) if same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

@@ -2,9 +2,10 @@
 
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
-It has every scripted fault, random input, and random walks with several seeds; with ``--minutes``
-only a long random walk. Drivers wait for real time, so the pieces run in parallel, each with its
-own drivers, boards and ROS domain. The exit code is 1 when anything was wrong.
+The campaign has every scripted fault, random input, and random walks with several seeds; with
+``--minutes`` it is only a long random walk. Drivers wait for real time, so the pieces of the
+campaign run in parallel, each with its own drivers, boards and ROS domain. The exit code is 1 when
+anything was wrong.
 """
 
 import argparse
@@ -117,7 +118,10 @@ class Campaign(Outcome):
         return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), self._kind, before=before)
 
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
-        """Run a case once and collect its complaints; ``again``: check then that it obeys."""
+        """Run a case once and collect its complaints.
+
+        ``again``: check afterwards that the robot obeys a fresh command.
+        """
         try:
             case(rig)
             row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
@@ -197,9 +201,9 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Run each stop of a driver while its board loses received bytes, for these numbers.
+        """Run all stops of one life of a driver for each number, on a line that loses bytes.
 
-        Bytes are lost until the result is judged.
+        Bytes to the board are lost until the result of the last stop is judged.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

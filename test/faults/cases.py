@@ -2,7 +2,7 @@
 
 """Scripted faults: events while a commander drives, and what must follow.
 
-A case is a function of a rig. The robot of the rig is at rest before and after it; ``findings``
+A case is a function of a rig. The rig's robot is at rest before and after each case; ``findings``
 collects complaints.
 """
 
@@ -28,7 +28,7 @@ NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
 """Time without a heartbeat after which the guard acts, in s."""
 DAMAGED_S: Final = 1.1
-"""Time after the last command until the robot is at rest with a damaged line, in s, plus grace."""
+"""Time in s, plus grace, in which a robot on a damaged line must rest after the last command."""
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
 """Pattern of log lines that are right for a driver whose board receives nothing."""
 NEXT_ATTEMPT_S: Final = 2.0
@@ -95,7 +95,7 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """Damage bytes for ``seconds`` of driving, and after that until the robot must be at rest."""
+    """Damage bytes for ``seconds`` of driving, and afterwards until the robot must be at rest."""
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board

@@ -55,9 +55,9 @@ os.close(terminal)
 class Ending:
     """A way to end the driver, and what must follow; the board must receive Stop last.
 
-    ``before``: Python that is run first in the driver's process. ``allowed_s``: how long the robot
-    may drive on. ``late_s``: how much later the process may end. ``full``: the port is full of old
-    commands. ``read``: the driver ends at its next read.
+    ``before``: Python code that runs first in the driver's process. ``allowed_s``: how long the
+    robot may drive on. ``late_s``: additional time in which the process may end. ``full``: whether
+    the port is full of old commands. ``read``: whether the driver ends at its next read.
     """
 
     end: Callable[[Rig], object]
@@ -94,7 +94,7 @@ def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
 def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
     """Return an ending that sends these signals to the driver's process group.
 
-    They follow without pauses, as from a shell or a launcher.
+    The signals follow each other without pauses, as from a shell or a launcher.
     """
 
     def end(rig: Rig) -> None:
@@ -185,7 +185,10 @@ ENDINGS: Final[dict[str, Ending]] = {
 def terminal_is_closed(
     make_rig: Callable[[str], Rig], run: Callable[[Rig, Ending], object]
 ) -> None:
-    """Close the driver's terminal, as when an ssh session drops: SIGHUP, and output is not read."""
+    """Close the driver's terminal, as when an ssh session drops.
+
+    The driver gets SIGHUP, and its output is no longer read.
+    """
     master, slave = pty.openpty()
     with make_rig(TERMINAL.format(os.ttyname(slave))) as rig:
         os.close(slave)

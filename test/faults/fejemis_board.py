@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of the fault campaign: two ports, lines of text with sums, one robot.
+"""The Fejemis's part of the fault campaign: two ports, lines of text with checksums, one robot.
 
-Two boards send at rates of their own, so messages are not compared with what was sent. The robot
-has no wheel command and no reset.
+Both boards send at rates of their own, so messages are not compared with what was sent. The driver
+of this robot has no wheel command and no reset.
 """
 
 import re
@@ -69,7 +69,7 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 def half_restarts(half: str) -> Any:
     """Make a case in which one Teensy restarts.
 
-    Commands do not continue, because the Teensy obeys again at once.
+    The commander leaves before the restart, because a restarted Teensy obeys at once.
     """
 
     def case(rig: Rig) -> None:

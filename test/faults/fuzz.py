@@ -19,7 +19,7 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms, which makes 1000 a second."""
 HELD: Final = 0.99
-"""Least share of the board's readings to publish during the input and 2 s after it."""
+"""Least share of the board's readings that must be published during the input and 2 s after it."""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 

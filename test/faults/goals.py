@@ -19,7 +19,7 @@ from stuck import TAKES_NOTHING
 OLD_GOAL: Final = bytes.fromhex("FF FE 01 7F FF 7F FF 00 00")
 """The farthest goal that a frame can hold."""
 UNHEARD_S: Final = 0.3
-"""Time without data from the board after which the robot is no longer driven, in s."""
+"""Time without data from the board after which the driver no longer drives the robot, in s."""
 HANGS_S: Final = 1.0
 
 

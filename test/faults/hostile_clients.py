@@ -124,9 +124,10 @@ def nonsense_for_parameters(rig: Rig) -> None:
 
 
 def limit_lowered(rig: Rig) -> None:
-    """Lower the speed limit to zero while commands continue: the answer finds the robot stopped.
+    """Lower the speed limit to zero while commands continue: the robot must stop at once.
 
-    Time begins with the answer, because a call first has to find the service, and to arrive.
+    The robot must be at rest when the service answers. The time of the call itself does not count,
+    because the call first has to find the service.
     """
 
     def limit(mps: float) -> None:

@@ -2,8 +2,9 @@
 
 """The LOIS ECU's part of the fault campaign: lines of text, no IMU, two wheels.
 
-Its motors follow at the next of its control interrupts, which are 91 ms apart. The driver predicts
-odometry from the board's groups of reports, so messages are not compared with what was sent.
+The motors obey a command at the board's next control interrupt; the interrupts are 91 ms apart. The
+driver predicts odometry from the board's groups of reports, so messages are not compared with what
+was sent.
 """
 
 from typing import Final

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes towards the board, from before the stop to the verdict.
+"""Stops on a line that loses bytes towards the board, from before a stop until its verdict.
 
 Processes and pseudo-terminal are real. Rates of failure cannot be measured here; they are measured
-in simulated time (test/integrity/outbound.py). Each driver has a board with another receiver.
+in simulated time (test/integrity/outbound.py). The board of each driver has a different receiver.
 """
 
 import signal
@@ -24,7 +24,7 @@ ESTOPPED_S: Final = 0.3 - GRACE_S
 ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
-"""Additional time for a stop at the end of the driver, as its guard repeats Stop, in s."""
+"""Additional time in s for a stop after the driver has ended; it is the guard that repeats Stop."""
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
@@ -80,4 +80,4 @@ LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
     {"timeout": times_out, "ctrl-C": is_interrupted},
     {"e-stop": is_estopped, "SIGKILL": is_killed},
 )
-"""The stops that one driver goes through, by name; the last one ends the driver."""
+"""For each driver, the stops that it goes through, by name; the last one ends the driver."""

@@ -26,13 +26,13 @@ from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 TICKS: Final = 5
 """Number of ticks of the simulated controller in one tick of the campaign."""
 LATE_S: Final = 0.3
-"""Longest delay of a datagram each way, as the parameter ``network_delay`` has it, in s."""
+"""Longest delay of a datagram in each direction, in s, equal to ``network_delay``."""
 LOST_STOP_S: Final = 1.2
 """Delay of a stop in s if two datagrams in a row are lost and the third is as late as possible."""
 BLIND_S: Final = 2.0
-"""Time until a robot that drives without replies is stopped, in s, even with slow exchanges."""
+"""Time in s until a robot is stopped whose driver gets no replies, even with slow exchanges."""
 NETWORK_S: Final = 90.0
-"""Longest wait for a start on a bad network, in s, as the IMU must first be seen to work."""
+"""Longest wait for a start on a bad network, in s; the driver must first see that the IMU works."""
 STRAY_S: Final = 2.5
 """Time until a robot that another program drives is stopped, in s."""
 
@@ -111,7 +111,7 @@ def line_of(rig: Rig) -> Any:
 
 
 def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
-    """Stop publishing while the robot drives: a bad network may only delay the rest."""
+    """Stop publishing while the robot drives: a bad network may delay the stop by ``allowed_s``."""
     line_of(rig).network(faults)
     for twist in ((0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)):
         rig.hand.hold(twist[0], 0.0, twist[1])
@@ -133,7 +133,7 @@ def replies_are_cut(rig: Rig) -> None:
 
 
 def network_is_away(seconds: float, rig: Rig) -> None:
-    """Cut the network both ways; the robot drives on until commands reach it again."""
+    """Cut the network both ways; the robot drives on until a stop reaches the controller again."""
     rig.drive()
     rig.line.from_board = rig.line.to_board = cut
     rig.wait_ticks(round(seconds / TICK_S))

@@ -54,10 +54,9 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def full(self, old: bytes) -> Iterator[None]:
-        """Keep the kernel's buffer full of these commands, about 20 kB, by not reading them.
+        """Fill the kernel's buffer with these commands, about 20 kB, which the board does not read.
 
-        At the end, wait until the board has received all of them, which takes longer in a busy
-        process.
+        At the end of the context, wait until the board has received all of them.
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -72,9 +71,9 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """Keep the buffer full even after the driver has discarded the buffer's content.
+        """Keep the kernel's buffer full even after the driver has discarded the buffer's content.
 
-        The terminal's output is suspended for this.
+        The terminal's output is suspended in the context.
         """
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:

@@ -33,7 +33,7 @@ TIMEOUT_S: Final = 0.5
 """The driver's ``cmd_vel_timeout`` in s."""
 GRACE_S: Final = 0.1
 REST_TICKS: Final = round(1.0 / TICK_S)
-"""Time at rest, in ticks, that shows a robot at rest for good."""
+"""Number of ticks at rest after which a robot counts as at rest for good."""
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
@@ -226,7 +226,7 @@ class Rig:
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 
     def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
-        """Expect the driver to end in time, plus ``late_s``, with one of these exit codes."""
+        """Expect the driver to end in the allowed time plus ``late_s``, with a right exit code."""
         begin_s = time.monotonic()
         try:
             code = self.driver.process.wait(PATIENCE_S)
@@ -240,7 +240,7 @@ class Rig:
         )
 
     def expect_obeys_again(self) -> None:
-        """Expect a fresh command to move the robot, and rest after the commander leaves."""
+        """Expect a fresh command to move the robot, and the robot to rest after the last one."""
         self.probe.wait_for_state("nominal")
         self.drive()
         self.hand.leave()

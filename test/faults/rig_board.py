@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the fault campaign must know of a kind of board; ``<board>_board.py`` has the values."""
+"""What the fault campaign must know of each kind of board; ``<board>_board.py`` has the values."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -15,29 +15,31 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the campaign.
 
-    ``make``: makes a simulated board from settings, or with the usual ones. ``parameters``: those
-    of the driver. ``ports``: the parameters that name its ports, by the link to the terminal.
+    ``make``: makes a simulated board from settings, or with the usual settings. ``parameters``: the
+    driver's parameters for this board. ``ports``: the parameters that name the board's ports, by
+    the link to the terminal.
 
     ``old_command``: bytes of a motion command. ``stop``: the last bytes received when a driver
     ends. ``opening``: the first bytes on a new line. ``wheels``: number of values in wheel_cmd.
-    ``services``: the common services that its driver has. ``tuning``: parameters that refuse
-    invalid values.
+    ``services``: the common services that the board's driver has. ``tuning``: parameters that
+    refuse invalid values.
 
-    ``off_within_s``: time from a stop until the motors are off. ``old_bytes_s``: time to receive
-    what a full port has kept. ``ends_later_s``: additional time for its driver to end. ``deaf_s``:
-    how long it may miss what is sent on a line, so that the next line must repeat it. ``silent_s``:
-    its longest usual pause between two transmissions.
+    ``off_within_s``: time from a stop until the motors are off. ``old_bytes_s``: time in which the
+    board receives what a full port has kept. ``ends_later_s``: additional time for the driver to
+    end. ``deaf_s``: longest time in which the board may lose the commands on a line, so that the
+    driver must repeat them. ``silent_s``: longest usual pause between two transmissions of the
+    board.
 
-    ``imu``: whether it has an IMU. ``jump_stddevs``: largest correction of predicted odometry, in
-    its own standard deviations.
+    ``imu``: whether the board has an IMU. ``jump_stddevs``: largest correction of predicted
+    odometry, in standard deviations of the prediction.
 
-    ``sent``: returns the frames of its last tick. ``not_sent``: returns by kind how many published
-    messages were never sent, and their total. ``lossy``: returns settings of board number n for a
-    line that loses bytes. ``without``: faults and pieces of the campaign that do not apply.
+    ``sent``: returns the frames of the board's last tick. ``not_sent``: returns by kind how many
+    published messages were never sent, and their total. ``lossy``: returns settings of board number
+    n for a line that loses bytes. ``without``: faults and pieces of the campaign that do not apply.
 
-    ``line``, ``serve``, ``port``: replacements for a breakable line of bytes, its server, and the
-    driver's ``port``. ``cases``: returns all faults of one round by its number; None for those of a
-    serial line.
+    ``line``, ``serve``, ``port``: replacements for a breakable line of bytes, for the line's
+    server, and for the driver's ``port``. ``cases``: returns all faults of a round from the round's
+    number; None for the faults of a serial line.
     """
 
     name: str

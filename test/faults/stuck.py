@@ -59,7 +59,10 @@ def full_for_long(rig: Rig) -> None:
 
 
 def estop_into_a_full_port(rig: Rig) -> None:
-    """Latch the e-stop with a full port: the reply warns, and no motion precedes it later."""
+    """Latch the e-stop while the port is full: the reply must contain a warning.
+
+    When the port accepts data again, no new motion command may precede the e-stop.
+    """
     rig.drive()
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "no command")
@@ -130,7 +133,7 @@ def server_dies(rig: NetworkRig) -> None:
 
 
 def server_vanishes(rig: NetworkRig) -> None:
-    """Cut the network without closing the connection; the server returns with no connection."""
+    """Cut the network without closing the connection; a restarted server then has no connection."""
     rig.drive()
     before = len(rig.server.accepted_at)
     rig.server.vanish()

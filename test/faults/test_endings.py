@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ends of the driver: after each, the robot is at rest."""
+"""Ways in which the driver ends: after each of them, the robot is at rest."""
 
 from pathlib import Path
 
@@ -29,9 +29,9 @@ SOME = (
 def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The board receives Stop, then the port is closed, in time and with the right exit code.
+    """The board receives Stop before the driver closes the port, and the exit code is right.
 
-    Where the driver cannot do this, its guard stops the robot.
+    Where the driver cannot send Stop, its guard stops the robot.
     """
     with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
@@ -51,7 +51,7 @@ def test_a_terminal_that_is_closed_ends_the_driver_in_order(
 
 
 def test_a_goal_ends_with_the_driver(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """The driver must cancel the goal when it ends, as the board would continue to it."""
+    """A driver that ends must cancel its goal, as the board would otherwise drive on to it."""
     with GoalRig(tmp_path, BOARD, **lenience) as rig:
         GOAL_ENDINGS["a goal, and SIGKILL"](rig)
         assert not rig.findings.take(), rig.driver.output

@@ -11,7 +11,7 @@ from rig_board import load
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """A misspelt name among a board's left-out cases would leave out nothing."""
+    """A misspelt name in a board's list of left-out cases would leave out no case."""
     kind = load(board)
     own = (kind.cases or survivable)(0)
     assert own.keys() - kind.without

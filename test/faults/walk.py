@@ -2,9 +2,9 @@
 
 """Faults in random order, on top of each other, under random commands.
 
-Every few steps the commander leaves. Then the robot must be at rest in time, return to its state
-and obey a fresh command. The line's other faults end before that, but losses towards the board last
-until then.
+Every few steps the commander leaves. Then the robot must come to rest in time, the driver must
+return to its usual state, and the robot must obey a fresh command. The other faults of the line end
+when the commander leaves; losses towards the board last until the robot rests.
 """
 
 from collections.abc import Callable
@@ -18,9 +18,9 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""Longest time until the robot rests, in s.
+"""Longest time from the commander's leave until the robot rests, in s.
 
-A driver that received nothing must first see that the robot moves.
+A driver that has received no data for a while must first see that the robot moves.
 """
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The bounds of the integrity report, and how streams are run to compare with them."""
+"""The limits of the integrity report, and the runs of streams to compare with the limits."""
 
 from dataclasses import dataclass
 from random import Random
@@ -41,7 +41,7 @@ class Bound:
     def share(self, chunker: str) -> float:
         """Return the least share of intact frames to decode.
 
-        It is smaller where adapter and reader are both late.
+        The share is smaller where adapter and reader are both late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 

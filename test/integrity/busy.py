@@ -2,8 +2,8 @@
 
 """A busy computer: the line is undamaged, but the reader is scheduled late.
 
-A read returns what is there when it is scheduled. Each of these chunkers takes the pieces that an
-adapter delivers, and returns which read has which bytes, and when. Times are in s.
+A read returns what is there when the reader is scheduled. Each chunker of this module takes the
+pieces that an adapter delivers, and returns the end and the time of each read. Times are in s.
 """
 
 from bisect import bisect_right
@@ -23,9 +23,9 @@ READ_S = 20e-6
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
 """Share of wake-ups that wait for their turn beside busy loops, and the range of the delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Share of wake-ups after which busy loops slow the process, and the range of that time in s."""
+"""Share of wake-ups after which busy loops slow the process, and for how long, as a range in s."""
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
-"""Ranges of the delay in s while a process is slowed: of a reader's and of an adapter's wake-up."""
+"""Ranges of the delay of a wake-up of a slowed process, in s: of a reader, and of an adapter."""
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
 """Range of the number of bytes after which another kind of pieces is drawn."""
@@ -115,7 +115,7 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of changing kinds; a late reader reads all that has arrived, or a part."""
+    """Deliver pieces of changing kinds; a late reader reads all arrived bytes or a part of them."""
     kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
     pieces: Chunks = []
     at, size = 0, len(received.data)
@@ -137,7 +137,7 @@ def mixed(received: Received, random: Random) -> Chunks:
 
 
 def hogged(received: Received, random: Random) -> Chunks:
-    """Deliver 4 bytes at a time to a reader; busy loops beside delay both adapter and reader."""
+    """Deliver 4 bytes at a time; busy loops delay both the adapter and the reader."""
     times, pieces, at = received.times_s, [], 0
     adapter, free_s = Turns(SLOW_S), 0.0
     while at < len(times):
@@ -158,4 +158,4 @@ READERS: dict[str, Chunker] = {
     "all mixed": mixed,
 }
 BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
-"""Chunkings in which adapter and reader are both late, so times contain hardly any information."""
+"""Chunkings in which adapter and reader are both late, so that times are nearly meaningless."""

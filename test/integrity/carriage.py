@@ -17,7 +17,7 @@ Fault = Callable[[int, Random], Origins]
 
 
 def none(length: int, random: Random) -> Origins:
-    """Return the origins of a stream without faults that starts anywhere in its first second."""
+    """Return the origins of an undamaged stream that starts at any byte of its first second."""
     return list(range(random.randrange(1700), length))
 
 
@@ -31,7 +31,7 @@ def lost(rate: float) -> Fault:
 
 
 def added(rate: float) -> Fault:
-    """Return a fault that adds bytes of any value, each place with the probability ``rate``."""
+    """Return a fault that adds bytes of any value, at each place with the probability ``rate``."""
 
     def fault(length: int, random: Random) -> Origins:
         origins: Origins = []
@@ -45,7 +45,10 @@ def added(rate: float) -> Fault:
 
 
 def bursts(rate: float) -> Fault:
-    """Return a fault that loses 1 to 200 bytes in a row, with the probability ``rate`` per byte."""
+    """Return a fault that loses 1 to 200 bytes in a row.
+
+    Such a burst begins at each byte with the probability ``rate``.
+    """
 
     def fault(length: int, random: Random) -> Origins:
         origins: Origins = []

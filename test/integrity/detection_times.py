@@ -4,9 +4,9 @@
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-A time begins with the first tick in which the robot is 0.05 m/s or 0.15 rad/s outside the range
-between rest and its command, and ends when Stop is sent. The table has the shortest and the longest
-over all phases of the displacements.
+A reaction time begins with the first tick in which the robot is 0.05 m/s or 0.15 rad/s outside the
+range between rest and its command, and ends when Stop is sent. The table has the shortest and the
+longest time over all phases of the displacements.
 """
 
 from collections.abc import Callable

@@ -4,7 +4,7 @@
 
 A simulated pair of boards, which shares no code with the driver, is driven in curves by one
 session. The bytes of both boards are then played to other sessions, undamaged and damaged. A value
-is wrong if the undamaged lines do not have it. Odometry continues from what is left, so it is
+is wrong if the undamaged lines do not have it. Odometry continues after lost values, so it is
 judged by its distance from the odometry of the undamaged lines.
 """
 
@@ -77,7 +77,7 @@ def session() -> Session:
 
 
 def drive(sums: bool, seed: int, seconds: float) -> Stream:
-    """Drive a pair of boards, with another twist each second; return what they send."""
+    """Drive a pair of boards, with a new twist each second; return what the boards send."""
     random = Random(f"{sums} {seed}")
     firmware = Firmware(sums=sums)
     pair = SimulatedFejemis(FejemisSettings(firmware=firmware, seed=seed, front_m=4.0))
@@ -141,7 +141,7 @@ def value_of(event: Event) -> str | None:
 def score(truth: list[Event], found: list[Event]) -> Score:
     """Compare published values with the true ones.
 
-    A value is right at most as often as the truth has it.
+    If a value is published more often than the truth has it, the surplus is wrong.
     """
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))

@@ -13,14 +13,14 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Number of intact frames beyond which the search for a decoded frame needs a confirmation.
+"""Distance of a match, in intact frames, beyond which the match needs a confirmation.
 
-A decoded frame is searched for among the next sent ones. If the match is further away than this
-number, the next decoded frame must have a near match behind it: a false frame may equal a true one
+A decoded frame is searched for among the frames sent next. A match at a greater distance counts
+only if the next decoded frame has a match shortly behind it: a false frame may equal a true frame
 that is sent later.
 """
 REACH_BYTES = 600
-"""How far back a decoded frame is searched for, in bytes before the present read."""
+"""How far back a decoded frame is searched for, in bytes before the current read."""
 
 
 @dataclass(slots=True)

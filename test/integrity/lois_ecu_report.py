@@ -3,7 +3,8 @@
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
 The simulated board, which shares no code with the driver, drives in curves. The truth is what the
-decoder makes of the undamaged line. A report is wrong if the truth does not have it in this order.
+decoder makes of the undamaged line. A report is right if the truth has an equal report after the
+previous right one, and wrong otherwise.
 """
 
 from collections import Counter
@@ -46,7 +47,7 @@ class Score:
 
 
 def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
-    """Drive a board, with another pair of wheel speeds each second; return what the board sends."""
+    """Drive a board, with new speeds of the wheels each second; return what the board sends."""
     random = Random(f"{firmware} {seed}")
     board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], seed=seed, running=True))
     stream = []

@@ -3,8 +3,8 @@
 """How honest the odometry of a LOIS ECU is: errors and NEES of many simulated drives.
 
 ``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. ``--nominal``:
-wheels have the right size. ``--gains boot``: the gains with which the board starts. Constants were
-chosen on seeds below 4000, so use others to judge.
+wheels have the right size. ``--gains boot``: the gains with which the board starts. The constants
+of the odometry were chosen on seeds below 4000, so judge them by other seeds.
 """
 
 import argparse

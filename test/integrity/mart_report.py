@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Integrity of what is published of a MART controller on a bad network (``make integrity``).
+"""Integrity of the values published for a MART controller on a bad network (``make integrity``).
 
 A complete session runs with the simulated controller, which shares no code with the driver, in
-simulated time. A pose is wrong if its error is beyond what one honest pose in 270,000 has by its
-covariance; a voltage or a range, if it differs from the truth.
+simulated time. A pose is wrong if its error is so large that, by its covariance, only one honest
+pose in 270,000 has such an error. A voltage or a range is wrong if it differs from the truth.
 """
 
 import math
@@ -48,7 +48,10 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""Squared error over covariance above which a pose is wrong; by chance 1 in 270,000 is above."""
+"""Squared error over covariance above which a pose is wrong.
+
+Of honest poses, 1 in 270,000 is above it by chance.
+"""
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
 STAY_M: Final = 1.5
@@ -57,7 +60,7 @@ STAY_M: Final = 1.5
 
 @dataclass(slots=True)
 class Score:
-    """Numbers of messages by kind: ``published``, and of these ``wrong``. Scores can be added."""
+    """Numbers of ``published`` messages and of ``wrong`` messages, by kind. Scores can be added."""
 
     published: Counter[str] = field(default_factory=Counter)
     wrong: Counter[str] = field(default_factory=Counter)

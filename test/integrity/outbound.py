@@ -3,8 +3,8 @@
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
 The real session plays every scene over a damaged line to every receiver; the faults last until the
-verdict. ``--share``: run this part of the trials, and write nothing. ``--examples``: show the bytes
-that led to a fault. The exit code is 1 when a bound is missed on any receiver.
+verdict. ``--share``: run only this share of the trials, and write nothing. ``--examples``: show the
+bytes that led to an error. The exit code is 1 when a bound is missed on any receiver.
 """
 
 import argparse
@@ -35,9 +35,9 @@ class Bound:
     """Limits of the errors that damage to the driver's writes may cause.
 
     ``share``: largest share of driving time with an uncommanded set point. ``long_in``: at most one
-    frame in this many leads to an uncommanded set point longer than 2 ms. Stray motion, false
-    letters and robots that still drive are never allowed. With ``overdue`` False, robots that still
-    drive are only reported.
+    frame in this many leads to an uncommanded set point longer than 2 ms. Stray motion and false
+    letters are never allowed. Robots that still drive are an error only if ``overdue`` is True;
+    otherwise they are only reported.
     """
 
     share: float = 1.0

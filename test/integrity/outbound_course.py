@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver writes in a scene; rehearsed once for all trials with the same board states.
+"""What the driver writes in a scene, rehearsed once for all trials with the same board states.
 
 The line from the board is undamaged, so what the driver writes depends only on what the board
-shows: its mode, and whether the robot moves. A ``Course`` has what the session writes for one
-sequence of states shown. When the board shows something else in a trial, the trial continues with
-another course, which is rehearsed when it is first needed.
+shows: its mode, and whether the robot moves. A ``Course`` has what the session writes while the
+board shows one sequence of states. When the board shows another state in a trial, the trial
+continues with another course, which is rehearsed when it is first needed.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 class Understood:
     """What a receiver understands of an undamaged course of writes.
 
-    held: the bytes that it holds after each write. alike_until: for each write, the next one of
-    another kind (motion, or none), or the next that is not understood exactly as sent.
+    held: the bytes that the receiver holds after each write. alike_until: for each write, the next
+    write of another kind (motion, or none), or the next that is not understood exactly as sent.
     """
 
     held: list[bytes]
@@ -59,7 +59,7 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """Number of runs of the session for this course and for all courses that branch off."""
+        """Number of runs of the session for this course and all courses that branch off from it."""
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

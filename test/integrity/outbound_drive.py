@@ -2,8 +2,9 @@
 
 """The driver's side of an outbound trial: what the real session writes, and when.
 
-A ``Scene`` is what the driver is asked to do. ``rehearse`` runs the session through it in simulated
-time, with what the board shows. The end of a driver, by its link and its guard, is imitated here.
+A ``Scene`` is what the driver is asked to do. ``rehearse`` runs the session through a scene in
+simulated time, with the states that the board shows. This module imitates how a driver ends by its
+link and its guard.
 """
 
 import contextlib

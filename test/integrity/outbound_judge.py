@@ -2,15 +2,16 @@
 
 """The judge of an outbound trial: it compares what was understood with what was sent.
 
-- The driver *drives* from the first byte of a write with a motion frame until the next other frame
-  should have arrived completely at the board; then it *stands* until the next such write.
-- A set point is *commanded* if, when it is understood, it is among the control frames of the write
-  on the line or of the write before. It stays so at any age until another frame is understood.
-- Any other set point is *uncommanded*, from when it is understood while the driver drives until the
-  next commanded one, or a pause or a reboot.
-- A motion frame that is understood while the driver stands is *stray*.
-- A letter that acts is *false* if its byte is not one of the letters sent, and *added* if the line
-  has added or changed that byte.
+- The driver *drives* from the first byte of a write with a motion frame until the next frame of
+  another kind should have arrived completely at the board. Then it *stands* until the next write
+  with a motion frame.
+- A set point is *commanded* if the board understands it while it is among the control frames of the
+  current write or of the write before. It stays commanded until another frame is understood.
+- Any other set point that the board understands while the driver drives is *uncommanded*, until the
+  next commanded set point, a pause or a reboot.
+- A motion frame that the board understands while the driver stands is *stray*.
+- A letter that acts is *false* if its byte was not sent as a letter, and *added* if the line has
+  added or changed that byte.
 """
 
 import math
@@ -66,8 +67,7 @@ class Score:
 class Judge:
     """Follows every write, and everything that is understood, in the order of time.
 
-    ``driving``: whether the driver drives. ``calm``: whether the set point in force, if any, is
-    neither stray nor uncommanded.
+    ``driving``: whether the driver drives.
     """
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Whether the active set-point, if any, is neither stray nor uncommanded."""
+        """Whether the active set point, if any, is neither stray nor uncommanded."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":
@@ -108,7 +108,7 @@ class Judge:
     def writes(self, last: Items, frames: int) -> None:
         """Record several undamaged writes of the same kind as the previous one.
 
-        ``last``: the newest of them; ``frames``: their number of control frames.
+        ``last``: the newest of these writes; ``frames``: the number of their control frames.
         """
         self._now = last
         if self.driving:
@@ -148,7 +148,7 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the active set-point, and count the time for which it was stray or uncommanded."""
+        """End the active set point, and count the time for which it was stray or uncommanded."""
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s

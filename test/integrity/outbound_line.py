@@ -70,7 +70,10 @@ class NoFaults:
 
 
 class Bursts:
-    """A line that loses bytes in a row, even across writes; bursts begin with ``rate`` per byte."""
+    """A line that loses bytes in a row, even across writes.
+
+    ``rate``: probability that such a burst begins at a byte.
+    """
 
     def __init__(self, rate: float, longest: int, random: Random) -> None:
         self.whole, self._gone = _gap(rate, random), 0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The choice of outbound trials: scenes, numbers and boards; scores by name."""
+"""The choice of outbound trials (scenes, numbers and boards), and the trials' scores by name."""
 
 import math
 import os

@@ -22,7 +22,7 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""Time from which the board runs and the driver knows that, in s."""
+"""Time from which the board runs and the driver knows that the board runs, in s."""
 STANDS_S: Final = 1.2
 """Time after the last command until the robot must be at rest, in s."""
 ESTOPPED_S: Final = 0.3
@@ -248,7 +248,7 @@ def goal(random: Random) -> Scene:
 
 
 def leave(random: Random) -> Scene:
-    """Make a scene in which the driver ends while commands continue, also with a latched e-stop."""
+    """Make a scene in which the driver ends while commands continue, some with a latched e-stop."""
     exits_s = FROM_S + random.uniform(0.1, 0.3)
     wishes = driving(random, FROM_S, exits_s, by_wheels=_wheels(random))
     if random.random() < 0.2:
@@ -265,7 +265,7 @@ def leave(random: Random) -> Scene:
 
 
 def kill(random: Random) -> Scene:
-    """Make a scene in which the driver is killed, also within a write; then its guard writes."""
+    """Make a scene in which the driver is killed, maybe within a write; then its guard writes."""
     wishes, last_s = _leg(random)
     killed_s = last_s + random.choice((0.0002, 0.0007, 0.0012, 0.002, 0.02))
     if random.random() < 0.2:

@@ -3,8 +3,8 @@
 """A minimal simulation of what a board sends, without any code of the driver.
 
 The board is booting, paused or running, and its robot moves or is at rest. A moving robot follows
-the last written motion frame at once and without slip. So the driver is never helped by seeing the
-robot do something else.
+the last written motion frame at once and without slip. Thus the driver cannot notice a damaged
+command by seeing the robot do something else.
 """
 
 import math

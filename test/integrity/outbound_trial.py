@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One outbound trial: a scene, a damaged line, a receiver, and the board behind it.
+"""One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board is modelled by its mode and its set point. It has no motors. It shows that the robot moves
-while the driver drives, and afterwards while its set point is a motion. What it shows follows its
-state after one or two ticks; a shorter set point is not visible.
+The board is modelled by its mode and its set point. It has no motors. The board shows that the
+robot moves while the driver drives, and afterwards while the set point is a motion. What the board
+shows follows its state after one or two ticks; a set point of a shorter duration is not visible.
 """
 
 import math
@@ -35,8 +35,9 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Memo of receivers: the result of consecutive bytes in one kind of running receiver.
 
-Key: the bytes that it holds, whether a pause came before, and the new bytes. Value: the bytes that
-it holds then, and frames by the byte that completes them; None if letters act.
+Key: the bytes that the receiver holds, whether a pause came before the new bytes, and the new
+bytes. Value: the bytes that the receiver holds afterwards, and each frame by the byte that
+completes it; None if letters act.
 """
 
 
@@ -129,7 +130,7 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip writes that arrive undamaged and change nothing, up to the last of them."""
+        """Skip the writes that arrive undamaged and change nothing, except the last of them."""
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1
         if (

@@ -36,7 +36,7 @@ def driver() -> tuple[Feed, Feed]:
 def plain() -> tuple[Feed, Feed]:
     """Make a plain parser; return the functions that feed and flush it.
 
-    At a header it takes the number of bytes that such a frame has, without any check.
+    At a header the parser takes as many bytes as a frame of that kind has, without any check.
     """
     held = bytearray()
 

@@ -2,9 +2,9 @@
 
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-Arguments: ``--seconds`` per stream, the number of ``--seeds`` and the ``--first`` seed. Costs were
-tuned on seeds from 1000 on. The codecs of other boards have modules of their own. The exit code is
-1 when a bound is missed in any scenario.
+Arguments: ``--seconds`` per stream, the number of ``--seeds`` and the ``--first`` seed. The
+decoder's costs were tuned on seeds from 1000 on. The codecs of other boards have modules of their
+own. The exit code is 1 when a bound is missed in any scenario.
 """
 
 import argparse

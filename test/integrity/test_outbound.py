@@ -75,9 +75,9 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """The incomplete frame has no effect until the next write.
+    """A motion frame that lost its last byte has no effect until the next write.
 
-    The zeros before the next write complete it, and the frame of that write replaces it.
+    The zeros before the next write complete the frame, and the frame of that write replaces it.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
@@ -99,7 +99,7 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """Two Stops without zeros between, the first a byte short, look like 255 LSB for wheel C."""
+    """Two adjacent Stops, of which the first lacks a byte, look like 255 LSB for wheel C."""
     judge = Judge()
     judge.write(parse(STOP), 0.0)
     judge.write(parse(STOP), 0.05)
@@ -111,7 +111,7 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """An earlier command is never an error, however old; one with a changed bit is."""
+    """A set point of the write before is no error; a set point with a changed bit is an error."""
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")
     judge = Judge()
@@ -131,7 +131,7 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
     """A letter that was sent is right.
 
-    A payload byte that acts as a letter is false; a byte from the line is "added".
+    A payload byte that acts as a letter is false; a letter that the line has made is "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)
@@ -142,7 +142,10 @@ def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
 
 
 def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
-    """All bytes after a certain one are lost, so Stop never arrives: the judge counts the trial."""
+    """The judge counts a trial in which the robot still drives.
+
+    All bytes after a certain one are lost, so Stop never arrives.
+    """
     course = Course(ENDED["timeout"](Random("cut")))
     driving = next(n for n, items in enumerate(course.items) if items.moves)
     begin = next(n for n, write in enumerate(course.writes) if write.at_s >= FROM_S)

@@ -112,7 +112,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, chunker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Shortcuts change no reading of the driver's board, nor its mode, with requests in between."""
+    """With requests in between, shortcuts change neither the board's readings nor its mode."""
     chunks = chunks_of(scenario, fault, chunker, 2)
 
     def told() -> list[object]:
@@ -136,7 +136,7 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most reads must take the shortcut; else comparing with and without it proves nothing."""
+    """Most reads must take the shortcut for single IMU frames; else tests of it prove nothing."""
     fed = []
     feed = FrameDecoder.feed
 
@@ -185,7 +185,7 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """Weighing at most 6 frames again yields the knowledge after any number of frames."""
+    """The knowledge after any number of frames is found by weighing at most 6 frames again."""
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]
@@ -205,7 +205,7 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
 
 
 def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most edges must be left out; else the comparison above would be of two complete searches."""
+    """Most edges must be left out; otherwise the tests here would compare two complete searches."""
     edges = {True: 0, False: 0}
     pieces = trellis._Search.pieces
     chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
@@ -223,7 +223,7 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """The bound of the remaining cost falls along each edge by no more than the edge's cost."""
+    """The lower bound of the remaining cost falls along each edge by at most the edge's cost."""
     least = least_costs(data)
     search = trellis._Search(
         data, NOTHING_KNOWN, Expectation(16384.0), InterFrameGaps(BYTE_S), "big"

@@ -24,7 +24,7 @@ Key = tuple[object, ...]
 class Truth:
     """A true stream: bytes, their arrival times in s, and frames.
 
-    A frame consists of its content, its first byte, and one past its last byte.
+    A frame consists of its content, the index of its first byte, and the index after its last byte.
     """
 
     data: bytearray = field(default_factory=bytearray)
