@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A program on its own terminal of 80x24: the test types keys and reads what it draws."""
+"""A program on its own terminal of 80x24: the test types keys and reads the program's screen."""
 
 import contextlib
 import fcntl
@@ -75,7 +75,7 @@ class PseudoTerminal:
             keyboard.join()
 
     def wait_for(self, text: str) -> None:
-        """Wait until the program has drawn this text, since the last text that was waited for."""
+        """Wait until the program has drawn ``text``, after the text of the previous call."""
         with self._changed:
             found = self._changed.wait_for(lambda: text.encode() in self._drawn, PATIENCE_S)
             assert found, f"{text!r} is not in {self._drawn[-2000:]!r}"

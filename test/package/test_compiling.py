@@ -50,7 +50,7 @@ FAILURES = {
 
 
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
-    """Build the package into ``lib`` of this folder with a replaced mypyc; return the output."""
+    """Build the package into the folder's ``lib`` with a replaced mypyc; return the output."""
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()
     (folder / "stand_in/mypyc/build.py").write_text(
@@ -82,7 +82,7 @@ def compiled_modules(folder: Path) -> list[str]:
 def test_what_cannot_be_compiled_is_installed_as_it_is(
     tmp_path: Path, fails: str, source: str
 ) -> None:
-    """No compiled part is left, and one line gives the reason."""
+    """If compiling fails, no compiled part is left, and one line of output gives the reason."""
     output = built(tmp_path, fails, source)
     assert f"{PACKAGE}: not compiled (" in output
     assert not compiled_modules(tmp_path / "lib")
@@ -103,6 +103,6 @@ def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path:
 
 
 def test_nothing_is_compiled_unless_it_is_asked_for(tmp_path: Path) -> None:
-    """Neither mypyc nor a compiler is searched for."""
+    """A build without the variable searches neither for mypyc nor for a compiler."""
     assert "compiled" not in built(tmp_path, "raise SystemExit(1)", "no C", wanted="0")
     assert not compiled_modules(tmp_path / "lib")

@@ -55,7 +55,8 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
     """Return a wheel's place, and the velocity of its centre over the floor, in m/s.
 
-    What touches the floor is at rest, so the centre moves by the opposite of the rim's velocity.
+    The wheel's lowest point is at rest on the floor, so the centre moves with the opposite of the
+    rim's velocity at that point.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -89,9 +90,9 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """At the wheel rates of a twist each wheel rolls as the body moves at its place.
+    """At the wheel rates of a twist, each wheel rolls as fast as the body moves at its place.
 
-    The rollers take up motion across, so only the part along the rolling direction must agree.
+    Rollers allow motion along the axle, so only velocities in the rolling direction are compared.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]
@@ -107,7 +108,7 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
 
 
 def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
-    """The axles point away from the centre, as the commissioning guide says."""
+    """The wheels' axles point away from the robot's centre, as the commissioning guide says."""
     for name in WHEELS:
         joint = ROBOT.joint_map[name]
         x, y, _ = joint.origin.xyz
@@ -134,7 +135,7 @@ def test_the_imu_hangs_upside_down() -> None:
 
 
 def test_another_robot_is_described_by_arguments() -> None:
-    """A bigger robot with its IMU elsewhere needs no new file."""
+    """Arguments describe a bigger robot with its IMU elsewhere, so no new file is necessary."""
     robot = description(
         wheel_radius="0.05",
         base_radius="0.2",

@@ -36,14 +36,14 @@ def anchors(page: Path) -> set[str]:
 
 
 def found(pattern: str) -> Iterator[str]:
-    """Yield the pattern's group at all its places in the documents."""
+    """Yield the group of every match of ``pattern`` in the documents."""
     for page in PAGES:
         yield from re.findall(pattern, page.read_text())
 
 
 @pytest.mark.parametrize("name", GENERATED)
 def test_what_is_generated_is_what_the_code_says(name: str) -> None:
-    """Parameters, their files, mode table and diagram are generated; ``make docs`` writes them."""
+    """Generated parts of the documents are exactly what ``make docs`` writes."""
     assert (ROOT / name).read_text(encoding="utf-8") == GENERATED[name](), (
         "run: .venv/bin/python docs/generate.py"
     )
@@ -51,7 +51,7 @@ def test_what_is_generated_is_what_the_code_says(name: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_link_leads_somewhere(page: Path) -> None:
-    """The linked file exists, and its heading if one is named."""
+    """Each link's file exists, and so does the heading if the link names one."""
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if re.match(r"https?://|mailto:", target):
             continue
@@ -77,7 +77,10 @@ def test_every_page_can_be_reached_from_the_readme() -> None:
 
 
 def test_every_command_exists() -> None:
-    """Executables, launch files, arguments, make's targets, parameters and services are checked."""
+    """Commands in the documents name only what exists.
+
+    Executables, launch files, arguments, make's targets, parameters and services are checked.
+    """
     scripts = re.findall(r'f"(\w+) = \{NAME\}', (ROOT / "setup.py").read_text())
     assert {*found(r"ros2 run omnibot_driver\s+([a-z_]+)")} <= set(scripts)
     launches = {path.name for path in (ROOT / "launch").iterdir()}

@@ -25,7 +25,7 @@ SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 
 
 def text_of(node: ast.AST) -> str:
-    """Return a string in the code with gaps for inserted values; empty if it is not a string."""
+    """Return a node's string, with gaps for inserted values; empty for a node of another kind."""
     if isinstance(node, ast.JoinedStr):
         parts = [part.value if isinstance(part, ast.Constant) else GAP for part in node.values]
         return "".join(map(str, parts))
@@ -41,7 +41,7 @@ def code() -> dict[Path, list[ast.AST]]:
 
 @cache
 def said() -> str:
-    """Return all strings of the driver except docstrings, one a line."""
+    """Return all strings of the driver except docstrings, one per line."""
     texts: list[str] = []
     for nodes in code().values():
         docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
@@ -67,7 +67,7 @@ STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
-    """Each part between gaps and colons is in the code, word for word."""
+    """Each part of a quoted message, between gaps and colons, is in the code, word for word."""
     parts = [part.strip() for part in GAPS.split(sentence)]
     assert any(len(part) > 8 for part in parts)
     for part in parts:
@@ -75,7 +75,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 
 def test_what_the_driver_tells_is_explained() -> None:
-    """A sentence of the guide has the message's beginning, or all its parts are in the message."""
+    """A sentence of the guide has each message's beginning, or consists of parts of the message."""
 
     def is_explained(template: str) -> bool:
         begin = next((part for part in template.split(GAP) if len(part) > 9), template)
@@ -88,13 +88,13 @@ def test_what_the_driver_tells_is_explained() -> None:
 
 
 def test_every_state_is_explained() -> None:
-    """The guide's table has a row for each state."""
+    """The guide's table has a row for each state of the driver."""
     assert set(SENTENCES) >= STATES
     assert all(state in said() for state in STATES)
 
 
 def test_every_status_of_the_diagnostics_has_its_row() -> None:
-    """The rows are in the order of publication."""
+    """The guide's rows of diagnostics are in the order in which the driver publishes them."""
     code = (ROOT / "omnibot_driver/core/reporting/diagnosis.py").read_text()
     names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
     rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)
@@ -103,7 +103,7 @@ def test_every_status_of_the_diagnostics_has_its_row() -> None:
 
 
 def test_the_tour_shows_what_the_driver_says() -> None:
-    """The warnings and errors can still be printed, word for word except for inserted values."""
+    """The driver can still print the tour's warnings and errors, except for inserted values."""
     patterns = [
         re.compile(".*".join(map(re.escape, template.split(GAP))))
         for template in said().splitlines()
@@ -116,7 +116,7 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
-    """The form at the end names steps of the guide, and parameters of the driver as corrections."""
+    """The form at the guide's end has all steps of the guide, and the driver's parameters."""
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))
     form = re.findall(r"^\| (.+) \| (\d) \| (.+) \| \|$", text, re.MULTILINE)

@@ -66,7 +66,7 @@ def first_line_with(text: str, process: subprocess.Popen[str]) -> str:
 
 
 MADE_HERE = (".*", "__pycache__", "*.egg-info", "build", "install", "log")
-"""What tests and tools create in a source archive in which they run."""
+"""Names of files and folders that tests and tools create in an unpacked source archive."""
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
 
 
 def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
-    """Users without the repository follow the links in the installed documents."""
+    """Links in the installed documents also work for users without the repository."""
     pages = [*(prefix / "share" / PACKAGE).glob("**/*.md")]
     assert len(pages) > 10
     for page in pages:
@@ -126,7 +126,7 @@ def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
 
 
 def test_colcon_installs_the_executables(prefix: Path) -> None:
-    """``ros2 run`` offers every executable file in lib/omnibot_driver; there are exactly these."""
+    """``ros2 run`` offers every file in lib/omnibot_driver, so only executables are there."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
     executables = {"calibrate", "demo", "driver", "monitor", "report", "simulator"}
     assert {file.name for file in files} == executables
@@ -165,7 +165,7 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
 
 
 def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
-    """colcon searches setup.py for pytest; without it, it would pass without any test."""
+    """colcon looks for pytest in setup.py; if pytest were missing there, no test would be run."""
     one = ["test/core/omnibot/test_modes.py", " --maxfail=1"]
     colcon = [sys.executable, "-m", "colcon"]
     run([*colcon, "test", "--base-paths", sources, "--pytest-args", *one], workspace)
@@ -176,7 +176,7 @@ def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
 
 
 def test_pip_installs_the_same_files(sources: Path, tmp_path: Path) -> None:
-    """A plain ``pip install`` serves users without colcon."""
+    """A plain ``pip install`` installs the same files as colcon does."""
     copy = tmp_path / "sources"  # pip builds inside the source tree
     shutil.copytree(sources, copy)
     pip = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-build-isolation"]

@@ -65,9 +65,9 @@ Started = dict[str, dict[str, Any]]
 
 @pytest.fixture
 def launch(tmp_path: Path) -> Callable[..., Started]:
-    """Return a function that launches a file with recorders as executables.
+    """Return a function that launches a file with recorders in place of the executables.
 
-    It returns the records of the executables that were started.
+    The function returns the records of the executables that were started.
     """
     executables = {
         PACKAGE: "driver",
@@ -114,8 +114,7 @@ def launch(tmp_path: Path) -> Callable[..., Started]:
 
 
 def parameters(record: dict[str, Any]) -> dict[str, Any]:
-    """Return the parameters from all files of a process; values of later files replace earlier
-    ones."""
+    """Return a process's parameters from all its files; later files replace earlier values."""
     merged: dict[str, Any] = {}
     for text in record["files"]:
         for node in yaml.safe_load(text).values():
@@ -141,7 +140,10 @@ def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
 
 
 def test_the_driver_has_every_parameter_that_is_offered() -> None:
-    """At least one board has each parameter, since an unknown one would end the driver."""
+    """At least one board has each parameter that the launch file offers.
+
+    A driver without such a parameter would end.
+    """
     tree = ast.parse((ROOT / "launch/driver.launch.py").read_text())
     (offered,) = (
         [ast.literal_eval(key) for key in node.value.keys if key]
@@ -153,7 +155,7 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
 
 
 class Stub(ModuleType):
-    """A module of launch in which every call of any name only records its arguments."""
+    """A substitute for a module of launch: a call of any name in it only records its arguments."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -165,7 +167,10 @@ class Stub(ModuleType):
 def test_a_board_without_a_parameter_file_is_refused(
     file: str, parameters_of: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """launch itself only warns of a missing file, and starts the node without parameters."""
+    """Only boards with a parameter file can be chosen.
+
+    launch itself would only warn of a missing file, and start the node without parameters.
+    """
     for module in ("launch", "launch_ros"):
         for part in (
             *("", ".actions", ".conditions", ".launch_description_sources"),
@@ -215,7 +220,7 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
 def test_the_parameter_file_is_that_of_the_board(
     launch: Callable[..., Started], tmp_path: Path
 ) -> None:
-    """Another file can be given instead, which names its own board."""
+    """The board selects the parameter file; a user's own file may name the board instead."""
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
     given = parameters(launch("driver.launch.py", "board:=lois_ecu")["driver"])
@@ -232,7 +237,10 @@ def test_the_parameter_file_is_that_of_the_board(
 def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
     launch: Callable[..., Started], tmp_path: Path, file: str
 ) -> None:
-    """Otherwise the driver would send OmniBot's frames to another board."""
+    """The argument ``board`` is obeyed beside a parameter file that names no board.
+
+    Otherwise the driver would send OmniBot's frames to another board.
+    """
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")
     started = launch(f"{file}.launch.py", "board:=lois_ecu", f"params_file:={own}")

@@ -27,7 +27,7 @@ def make(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def no_python(tmp_path: Path) -> str:
-    """Return the path of an interpreter that always fails, as one without packages on PyPI."""
+    """Return the path of an interpreter that always fails, like a Python without wheels on PyPI."""
     interpreter = tmp_path / "python"
     interpreter.write_text("#!/bin/sh\nexit 1\n")
     interpreter.chmod(0o755)
@@ -38,7 +38,7 @@ def no_python(tmp_path: Path) -> str:
 def test_without_wheels_one_sentence_points_to_jazzy(
     target: str, no_python: str, tmp_path: Path
 ) -> None:
-    """make fails before it creates anything, and names Jazzy's installation guide."""
+    """Without wheels, make creates nothing, fails, and names Jazzy's installation guide."""
     done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
     sentence, verdict = done.stderr.splitlines()
     assert done.returncode != 0
@@ -59,7 +59,7 @@ def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
 
 
 def test_make_alone_lists_every_target() -> None:
-    """The default target describes each of the others in one line."""
+    """The default target describes each of the other targets in one line."""
     listed = {line.split()[1] for line in make().stdout.splitlines()}
     targets = {"demo", "check", "test", "docs", "pictures", "integrity", "bench", "faults", "soak"}
     assert listed == {"help", *targets, "compiled", "lint", "format", "clean"}

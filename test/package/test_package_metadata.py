@@ -149,7 +149,7 @@ def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any
 
 
 def test_only_tools_need_what_an_extra_brings() -> None:
-    """A driver works without these packages; only a replay needs rosbags, and says so."""
+    """Apart from tools, only a replay needs a package of an extra, namely rosbags."""
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {
         (file.relative_to(ROOT / PACKAGE).parts[0], library)
@@ -162,7 +162,7 @@ def test_only_tools_need_what_an_extra_brings() -> None:
 
 
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
-    """The README has a command that Ubuntu 24.04 accepts."""
+    """The README has a pip command for what rosdep does not install; Ubuntu 24.04 accepts it."""
     words = f"pip install --user --break-system-packages {' '.join(sorted(FROM_PIP))}"
     assert words in (ROOT / "README.md").read_text()
 
@@ -183,7 +183,7 @@ def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
 
 
 def test_optional_packages_are_started_and_documented() -> None:
-    """rosdep does not install these packages, so the README says how to install them."""
+    """rosdep does not install optional packages, so the README says how to install them."""
     readme = (ROOT / "README.md").read_text()
     assert started_by(python_files("launch")) >= OPTIONAL
     for name in OPTIONAL:
@@ -198,7 +198,7 @@ def test_manifest_declares_what_the_tests_import() -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "launch").iterdir()), ids=lambda path: path.name)
 def test_launch_file_describes_a_launch(path: Path) -> None:
-    """The name has the right ending, the file compiles and defines what ``ros2 launch`` calls."""
+    """A launch file has the right ending, compiles, and defines what ``ros2 launch`` calls."""
     assert path.name.endswith(".launch.py")
     tree = ast.parse(path.read_text(), path)
     compile(tree, path, "exec")
@@ -218,7 +218,7 @@ def test_the_core_imports_itself_and_pure_modules_only() -> None:
 
 
 def test_the_simulator_shares_nothing_with_the_core() -> None:
-    """A misread manual is then not misread in the same way in driver and simulated board."""
+    """The simulator uses no code of the driver, so that they do not misread the manual alike."""
     shared = {
         f"{file.relative_to(ROOT)}: {name}"
         for file in python_files(f"{PACKAGE}/simulator")
@@ -229,7 +229,7 @@ def test_the_simulator_shares_nothing_with_the_core() -> None:
 
 
 def test_mypy_checks_exactly_what_imports_no_ros() -> None:
-    """Modules that need ROS are left out, since ROS has no type annotations."""
+    """mypy checks all modules except those that need ROS, which has no type annotations."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
     without_ros = {
         file

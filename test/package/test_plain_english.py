@@ -83,7 +83,7 @@ def found(phrase: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("phrase", PATTERNS)
 def test_the_phrase_is_not_used(phrase: str) -> None:
-    """CONTRIBUTING.md says what to write instead."""
+    """No text has a phrase that must not be used; CONTRIBUTING.md says what to write instead."""
     assert list(found(phrase)) == []
 
 

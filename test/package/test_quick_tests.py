@@ -26,7 +26,7 @@ def modules() -> Iterator[tuple[str, ast.Module]]:
 
 
 def test_none_of_them_imports_ros() -> None:
-    """The tests and their helpers do not import the module."""
+    """No quick test and no helper of a quick test imports rclpy."""
     for name, module in modules():
         for node in ast.walk(module):
             if isinstance(node, ast.Import | ast.ImportFrom):
@@ -36,7 +36,7 @@ def test_none_of_them_imports_ros() -> None:
 
 
 def test_a_property_of_many_examples_is_marked_slow() -> None:
-    """Without the mark, ``make check`` would take more than a minute."""
+    """A property of many examples is marked slow, so that ``make check`` takes at most a minute."""
     for name, module in modules():
         for node in ast.walk(module):
             if not isinstance(node, ast.FunctionDef):

@@ -54,12 +54,12 @@ def test_each_adapter_gets_the_same_name_and_rights() -> None:
 
 
 def test_only_one_adapter_is_taken_for_the_board() -> None:
-    """With two rules a lidar could become /dev/omnibot."""
+    """Only one rule makes the link; with two rules a lidar could become /dev/omnibot."""
     assert len([rule for rule in ACTIVE if "SYMLINK" in rule]) == 1
 
 
 def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
-    """The timer is 1 ms instead of 16 ms, from when its driver is bound."""
+    """An FTDI adapter's timer is set to 1 ms instead of 16 ms as soon as its driver is bound."""
     (timer,) = [rule for rule in ACTIVE if "ATTR{latency_timer}" in rule]
     assert timer["DRIVER"] == ("==", "ftdi_sio")
     assert "bind" in timer["ACTION"][1].split("|")
@@ -77,7 +77,7 @@ def unit_settings() -> dict[str, list[str]]:
 
 
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
-    """Signals must reach the driver itself."""
+    """The unit starts no shell between, because signals must reach the driver itself."""
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
     assert re.search(r'&& +exec "\S+/lib/omnibot_driver/driver" +--ros-args ', command)
@@ -95,7 +95,7 @@ def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None
 
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")
 def test_systemd_accepts_the_unit() -> None:
-    """systemd reports unknown keys and values on stderr."""
+    """systemd reports no unknown key or value of the unit on stderr."""
     done = subprocess.run(
         ["systemd-analyze", "verify", "--man=no", str(UNIT)],
         capture_output=True,

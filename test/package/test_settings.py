@@ -43,7 +43,7 @@ def parameters(name: str, node: str) -> dict[str, Any]:
 
 
 def driver_names() -> set[str]:
-    """Return the driver's topics and services, relative to its namespace, from its code."""
+    """Return the topics and services in the driver's code, relative to its namespace."""
     calls = [
         node
         for source in (ROOT / NODE).glob("*.py")
@@ -72,7 +72,7 @@ DRIVER = driver_names()
 
 
 def test_the_drivers_names_are_found() -> None:
-    """The other tests of this module compare names with this list."""
+    """The driver's names, with which the other tests compare, are found in its code."""
     assert {"odom", "imu/data_raw", "cmd_vel", f"{NODE}/estop_active", f"{NODE}/estop"} <= DRIVER
 
 
@@ -141,7 +141,7 @@ def test_nav2_uses_the_drivers_topics_and_frames() -> None:
 
 
 def test_every_critic_that_is_tuned_is_used() -> None:
-    """A name that is misspelt in one place would be ignored."""
+    """Each tuned critic is in the list of critics, since a misspelt name would be ignored."""
     mppi = load("nav2_omnibot.yaml")["controller_server"]["ros__parameters"]["FollowPath"]
     assert {name for name in mppi if name.endswith("Critic")} == set(mppi["critics"])
 
@@ -157,7 +157,7 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 
 
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
-    """The sources differ from the output, and have the driver's timeout."""
+    """The mux's sources are not the driver's topics, and have the driver's timeout."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()
     assert {source["timeout"] for source in sources} == {TIMEOUT}
@@ -179,7 +179,7 @@ def test_rviz_shows_topics_and_frames_that_exist() -> None:
 
 
 def test_foxglove_shows_topics_and_services_that_exist() -> None:
-    """Every name in the layout that begins with a slash is the driver's, or one of a few others."""
+    """Each name with a leading slash in Foxglove's layout is the driver's, or in ``OTHERS``."""
     text = (CONFIG / "foxglove.json").read_text()
     names = set(re.findall(r'"/([a-z_/]+)', text))
     assert {"odom", "imu/data_raw", f"{NODE}/state", f"{NODE}/estop"} < names
@@ -195,7 +195,7 @@ def test_foxglove_lays_out_every_panel_once() -> None:
 
 
 def test_foxglove_drives_slowly_and_often_enough() -> None:
-    """The buttons stay within the limits and repeat faster than the command timeout."""
+    """Foxglove's buttons keep the limits, and repeat faster than the command timeout."""
     teleop = json.loads((CONFIG / "foxglove.json").read_text())["configById"]["Teleop!drive"]
     assert teleop["publishRate"] > 2 / TIMEOUT
     limits = {"linear-x": LINEAR, "angular-z": ANGULAR}

@@ -2,7 +2,7 @@
 
 """Pictures of ``calibrate imu``, ``scale`` and ``geometry``, on robots with known errors.
 
-The errors are in docs/tools/calibrate.md, together with those found here.
+The robots' errors, and the errors that calibrate finds, are in docs/tools/calibrate.md.
 """
 
 import math

@@ -90,7 +90,10 @@ class Solid:
         return Hits(rays[met], near[met], normals[0], far[met], normals[1])
 
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
-        """Return normals of the face across this axis, against the ray where it enters."""
+        """Return normals of the faces across ``axis`` that rays meet at the distances ``at``.
+
+        ``sign``: 1 for normals along the ray, -1 for normals against it.
+        """
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))
         local[rows, axis] = sign * np.sign(way[rows, axis])
@@ -199,7 +202,7 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
     """Draw clear solids over what is behind them, from the lowest to the highest.
 
-    Thin edges are denser.
+    A face covers more of what is behind it where it is seen at a flat angle.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

@@ -27,7 +27,11 @@ def test_nothing_is_written_by_default() -> None:
 
 
 def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
-    """``confw`` has radii, gear, ticks, B; ``confs`` has B and F; ``fwoffset`` is in degrees."""
+    """Parameters that are given are written in the units of the boards.
+
+    ``confw`` has wheel radii, gear, encoder ticks and track, ``confs`` has track and steering
+    distance, and ``fwoffset`` has the front wheel's offset in degrees.
+    """
     values = check(
         wheel_radii=[0.08, 0.081],
         gear=20.0,
@@ -56,19 +60,19 @@ def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
     ],
 )
 def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
-    """A command with only some of its values is refused: the others would have to be guessed."""
+    """Parameters of one command must be set together, as the driver cannot guess missing values."""
     with pytest.raises(ParameterError, match=f"parameter '{missing}' must be set too"):
         check(**given)
 
 
 def test_a_track_alone_is_refused() -> None:
-    """Two commands contain the track, both with other values."""
+    """``track`` alone is refused, because two commands contain it, each with further values."""
     with pytest.raises(ParameterError, match="set 'steering_distance' too"):
         check(track=0.4)
 
 
 def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
-    """The second parameter may give the same port by another name."""
+    """One port cannot serve both boards, even if the second parameter gives it by another name."""
     link = tmp_path / "front"
     link.symlink_to("/dev/ttyACM0")
     for front in ("/dev/ttyACM0", str(link)):
@@ -77,12 +81,12 @@ def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
 
 
 def test_ports_are_not_compared_for_a_simulated_pair() -> None:
-    """A simulated pair does not use ``front_port``."""
+    """``front_port`` may equal ``port`` for a simulated pair, which does not use ``front_port``."""
     assert check(port="sim://")["front_port"] == "/dev/ttyACM1"
 
 
 @pytest.mark.parametrize("name", ["baudrate", "max_wheel_speed", "axis_signs", "low_pass"])
 def test_what_the_robot_has_no_use_for_is_refused(name: str) -> None:
-    """The parameter belongs to other boards."""
+    """A Fejemis refuses a parameter that only other boards have."""
     with pytest.raises(ParameterError, match=f"parameter '{name}' belongs to board"):
         check(**{name: 1})

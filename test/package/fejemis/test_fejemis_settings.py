@@ -31,7 +31,7 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
-    """Poses, accelerations and the board's yaw, which includes the gyro, are not fused."""
+    """The filter does not fuse poses, accelerations, or the board's yaw, which uses the gyro."""
     ekf = load("ekf_fejemis.yaml")["/**"]["ros__parameters"]
     fused = {
         sensor: {s for s, used in zip(STATES, ekf[f"{sensor}_config"], strict=True) if used}
@@ -45,7 +45,7 @@ def test_the_filter_fuses_velocities_and_the_gyro() -> None:
 
 
 def test_nav2_plans_and_follows_curves_forward() -> None:
-    """Planner and controller have the same radius; the limits are the driver's."""
+    """Nav2's planner and controller have the same turning radius; speed limits are the driver's."""
     file = load("nav2_fejemis.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     planner = file["planner_server"]["ros__parameters"]["GridBased"]
@@ -70,7 +70,7 @@ def description() -> Any:
 
 
 def test_the_description_has_every_joint_and_frame_of_the_driver() -> None:
-    """The steered wheel turns about an axis that points up."""
+    """The description has the driver's joints and frames; the steering axis points up."""
     robot = description()
     assert robot.get_root() == PARAMETERS.by_name["base_frame"].default
     turning = [joint.name for joint in robot.joints if joint.type != "fixed"]
@@ -81,7 +81,7 @@ def test_the_description_has_every_joint_and_frame_of_the_driver() -> None:
 
 
 def test_the_description_has_the_drivers_sizes() -> None:
-    """Track and wheelbase are those of the default parameters."""
+    """Track and wheelbase of the description are those of the default parameters."""
     joints = description().joint_map
     left, right = (joints[name].origin.xyz for name in WHEELS.joints)
     assert left[1] - right[1] == WHEELS.track_m
@@ -89,7 +89,7 @@ def test_the_description_has_the_drivers_sizes() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """Both maps have the same footprint."""
+    """Both costmaps of Nav2 have the same footprint, which encloses the described wheels."""
     file = load("nav2_fejemis.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]

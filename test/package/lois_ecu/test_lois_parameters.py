@@ -9,7 +9,7 @@ from omnibot_driver.core.errors import ParameterError
 
 
 def test_commands_are_slow_in_a_terminal_mode() -> None:
-    """The public firmware passes commands on to a compass at 4800 baud."""
+    """In a terminal mode, the public firmware passes commands on to a compass at only 4800 baud."""
     with pytest.raises(ParameterError, match="at most 25 Hz"):
         PARAMETERS.check_all({"terminal_mode": "compass", "command_rate": 30.0})
     PARAMETERS.check_all({"command_rate": 30.0})

@@ -25,7 +25,7 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_heading() -> None:
-    """The wheels' pose is not fused; the heading is relative to its first value, as odom is."""
+    """The filter does not fuse the wheels' pose; the heading is relative to its first value."""
     ekf = load("ekf_lois_ecu.yaml")["/**"]["ros__parameters"]
     fused = {
         sensor: {s for s, used in zip(STATES, ekf[f"{sensor}_config"], strict=True) if used}
@@ -58,7 +58,7 @@ def test_nav2_keeps_to_the_drivers_limits_and_does_not_move_sideways() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """Both maps have the same footprint, which is not round for this board."""
+    """Both costmaps of Nav2 have the same footprint, which is not round for this board."""
     file = load("nav2_lois_ecu.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]
