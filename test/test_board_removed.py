@@ -35,7 +35,7 @@ sys.exit(pytest.main(sys.argv[1:]))
 def test_without_the_folders_of_one_board_the_tests_of_the_rest_are_green(
     board: str, tmp_path: Path
 ) -> None:
-    """The folders are removed in a copy, where all remaining modules can be imported."""
+    """In a copy without one board's folders, all other modules are imported, and tests pass."""
     ignored = shutil.ignore_patterns(board, f"{board}.py", f"{board}_*.py", "__pycache__")
     for folder in ("omnibot_driver", "test"):
         shutil.copytree(HOME / folder, tmp_path / folder, ignore=ignored)

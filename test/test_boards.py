@@ -59,7 +59,7 @@ def test_common_code_imports_no_board(path: Path) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
-    """The board's kinematics has one joint per wheel that can be commanded."""
+    """The kinematics of each board has as many joints as the board has wheels to command."""
     values = boards.check_all({"board": name})
     profile = boards.load(name)
     board = profile.make(values)
@@ -69,7 +69,7 @@ def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_names_its_simulated_board(name: str) -> None:
-    """The command ``simulator --board`` runs it by the same name."""
+    """The command ``simulator --board`` runs a profile's simulated board by the profile's name."""
     module = boards.load(name).SIMULATOR
     assert module == f"omnibot_driver.simulator.{name}"
     assert name in simulated_boards()
@@ -79,14 +79,14 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
 
 @pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
 def test_an_unknown_board_is_refused_with_the_names_of_the_known_ones(wrong: object) -> None:
-    """The value may have any type; the error lists the boards."""
+    """An unknown value of ``board`` may have any type; the error lists the boards."""
     with pytest.raises(ParameterError, match="'board' must be "):
         boards.check_all({"board": wrong})
 
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_has_a_table_of_its_own(name: str) -> None:
-    """The table's parameter names are unique, and its own board is the only choice."""
+    """Each profile's parameter names are unique, and ``board`` can only have the profile's name."""
     table = boards.load(name).PARAMETERS
     assert sum(map(len, table.sections.values())) == len(table.rows)
     assert (table.board, table.by_name["board"].choices) == (name, (name,))
@@ -95,7 +95,7 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> None:
-    """The board's traits decide whether the driver advises the user to check ``baudrate``."""
+    """A board has the parameter ``baudrate`` exactly if the board's traits let messages name it."""
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))
     assert ("baudrate" in profile.PARAMETERS.by_name) is board.traits.baudrate
@@ -124,7 +124,7 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """The table has the common rows that fit the board's abilities, its defaults, its own rows."""
+    """The table has the common rows that fit the board's abilities, its defaults and own rows."""
     own = table(
         "few",
         FEW,
@@ -152,13 +152,13 @@ def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
 
 @pytest.mark.parametrize("name", ["guard", "port", "on_exit", "auto_gyro_bias", "max_linear_speed"])
 def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
-    """Importing the profile raises an error that lists what may be dropped."""
+    """A profile cannot drop a row that the driver reads; the error lists which rows it can drop."""
     with pytest.raises(ValueError, match=f"few must not lack {name}, .* may only lack axis_signs"):
         table("few", FEW, without=("baudrate", name))
 
 
 def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
-    """Only the boards' own profiles index such a parameter; other code uses a default."""
+    """Only boards and tools index a parameter that a board may lack; other code uses a default."""
     indexed = {
         node.slice.value
         for path in PACKAGE.rglob("*.py")
@@ -171,7 +171,7 @@ def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
 
 
 def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
-    """Code that reads an absent parameter does not fail."""
+    """The core's code for reading parameters works for a board that lacks most of them."""
     values = table("few", FEW).check_all({})
     settings = session_settings(values, OmniKinematics(0.029, 0.143))
     assert settings.limits.wheel_radps == 0.0
@@ -184,7 +184,10 @@ def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
 def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """An unknown name is refused with the most similar name of this board."""
+    """A parameter of another board is refused with that board's name.
+
+    An unknown name is refused with the most similar name of this board.
+    """
     other = SimpleNamespace(PARAMETERS=table("few", FEW, own={"Docking": (OWN,)}))
     monkeypatch.setitem(boards.PROFILES, "few", "few_profile")
     monkeypatch.setitem(sys.modules, "few_profile", other)

@@ -17,14 +17,14 @@ BIAS = [0.01, -0.02, 0.03]
 
 @pytest.mark.parametrize("bias", [BIAS, [1 / 3, -1e-9, 1.0], [0.0, -0.0, 5e-324]])
 def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> None:
-    """The values are equal to the last digit."""
+    """Loaded values equal the saved values to the last digit."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": bias})
     assert calibration.load(path, PARAMETERS) == {"gyro_bias": bias}
 
 
 def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
-    """An empty file contains no calibration either; the folder is created with the file."""
+    """A missing or empty file contains no calibration; a save also makes the file's folder."""
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}
     calibration.save(path, {"gyro_bias": BIAS})
@@ -33,7 +33,7 @@ def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
 
 
 def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
-    """The order of other names stays, too."""
+    """A save keeps other names in the file, and their order."""
     path = tmp_path / "robot.yaml"
     path.write_text("robot: no. 7\ngyro_bias: [0, 0, 0]\naccel_bias: [1, 2, 3]\n")
     assert calibration.load(path, PARAMETERS) == {
@@ -57,7 +57,7 @@ def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
 def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
     tmp_path: Path, text: str
 ) -> None:
-    """The error names the file; nothing is overwritten."""
+    """For an invalid file, the error names the file, and the file is not overwritten."""
     path = tmp_path / "robot.yaml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(ParameterError, match="correct it, or remove it") as caught:
@@ -74,7 +74,7 @@ def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
 def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The cause here is a full disk."""
+    """A save that fails, here because of a full disk, changes no file and leaves no other file."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
 
@@ -89,14 +89,14 @@ def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
 
 
 def test_others_may_read_the_file(tmp_path: Path) -> None:
-    """The file is made from one of ``mkstemp``, which only its owner may read."""
+    """Every user may read a saved file, although only the owner may read a file of ``mkstemp``."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
     assert stat.S_IMODE(path.stat().st_mode) == 0o644
 
 
 def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
-    """The link's target is written, in the target's folder."""
+    """A save through a symbolic link writes the link's target, in the target's folder."""
     path, link = tmp_path / "far" / "robot.yaml", tmp_path / "robot.yaml"
     link.symlink_to(path)
     calibration.save(link, {"gyro_bias": BIAS})
@@ -106,7 +106,7 @@ def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
 
 
 def test_a_home_that_nobody_has_is_refused() -> None:
-    """Known home folders are filled in."""
+    """A known user's home folder replaces ``~``; an unknown user's home folder is refused."""
     assert calibration.locate("~/robot.yaml") == Path.home() / "robot.yaml"
     with pytest.raises(ParameterError, match="its home folder does not exist; give the full path"):
         calibration.locate("~nosuchuser/robot.yaml")

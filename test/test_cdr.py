@@ -80,7 +80,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
     wheels: Wheels,
     stamp_ns: int,
 ) -> None:
-    """The bytes are equal except for padding, and every field is equal after deserializing."""
+    """Serialized bytes equal rclpy's except for padding, as do all fields after deserializing."""
     serializer, messages = Serializer(chosen), Messages(chosen)
     for ours, message in (
         (serializer.imu(imu, stamp_ns), messages.imu(imu, stamp_ns)),
@@ -95,7 +95,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
 
 
 def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
-    """On a differential drive with wheels of 0.1 m radius, 1 m forward turns both by 10 rad."""
+    """Both wheels of a differential drive, of 0.1 m radius, turn by 10 rad for 1 m forward."""
     two = replace(
         MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS)),
         wheels=DifferentialKinematics(wheel_radius_m=0.1, track_m=0.4),
@@ -129,14 +129,14 @@ def test_no_frame_length_is_refused_at_start(length: int) -> None:
 def test_a_difference_is_found_at_start(
     monkeypatch: pytest.MonkeyPatch, name: str, wrong: object, strange: str
 ) -> None:
-    """The constant parts are checked at the start; varying values are compared in another test."""
+    """The constant parts of messages are checked at the start; another test has varying values."""
     monkeypatch.setattr(cdr, name, wrong)
     chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     assert difference(chosen) == strange
 
 
 def test_the_orientation_that_is_none_is_the_messages_default() -> None:
-    """A default quaternion is the identity, in rclpy too."""
+    """The default quaternion of rclpy is the identity, as in the driver's serializer."""
     nothing = Quaternion()
     assert (nothing.x, nothing.y, nothing.z, nothing.w) == cdr.NO_TURN
 
@@ -145,7 +145,7 @@ def test_the_orientation_that_is_none_is_the_messages_default() -> None:
 def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
     linear: tuple[float, float, float], angular: tuple[float, float, float]
 ) -> None:
-    """The result equals the message's own fields, also for a big-endian sender."""
+    """A velocity read from serialized bytes equals the message's fields, in both byte orders."""
     (x, y, z), (u, v, w) = linear, angular
     data = serialize_message(Twist(linear=Vector3(x=x, y=y, z=z), angular=Vector3(x=u, y=v, z=w)))
     expected = BodyTwist(x, y, w), z == u == v == 0.0
@@ -156,7 +156,7 @@ def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
 def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
-    """Axes that this robot does not have are checked too."""
+    """NaN or infinity is refused on all six axes, also on those that this robot does not have."""
     values = [0.1] * 6
     values[place] = nonsense
     with pytest.raises(CommandRefused, match="NaN or infinity"):
@@ -165,7 +165,7 @@ def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense
 
 @pytest.mark.parametrize("length", range(52))
 def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> None:
-    """A middleware may deliver messages that are too short."""
+    """Bytes that are too few for a velocity are refused; a middleware may deliver such messages."""
     data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
     with pytest.raises(CommandRefused, match="not a valid Twist"):
         cdr.twist(data[:length])
@@ -182,5 +182,8 @@ def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> No
     ids=lambda wheels: f"{len(wheels.joints)} joints",
 )
 def test_any_number_of_wheels_is_serialised_as_rclpy_does(wheels: Any) -> None:
-    """Without wheels, joint_states is not published."""
+    """A JointState with any number of wheels is serialized as by rclpy.
+
+    Without wheels there is none.
+    """
     assert difference(MessageSettings.from_parameters(boards.check_all({}), wheels)) == ""

@@ -31,12 +31,12 @@ from omnibot_driver.keeper import Keeper
 
 @pytest.fixture(autouse=True)
 def _no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a busy computer a guard may start, and repeat its stops, later than the driver waits."""
+    """Let the driver wait longer, as a busy computer may delay a guard's start and stops."""
     monkeypatch.setattr("omnibot_driver.keeper.SPEAKS_WITHIN_S", PATIENCE_S)
 
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
-    """The driver has stopped the robot itself, so the guard writes nothing."""
+    """If the driver has stopped the robot itself at its end, the guard writes nothing."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     alive(keeper, 0.2)
     keeper.end(stopped=True)
@@ -46,14 +46,17 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
-    """The guard repeats the stops for a second, as the board may not receive now. Then it ends."""
+    """After a broken pipe the guard repeats the stop bytes for a second and ends.
+
+    The board may not receive the first stops.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.end(stopped=False)
     assert line.hear(guard.TIMES * LAST_WORDS) == guard.TIMES * LAST_WORDS
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
-    """The guard stays active, and stops the robot again at the next silence."""
+    """When heartbeats are missing, the guard stops the robot, and again at the next silence."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"so far: ")
@@ -67,7 +70,10 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
-    """Which bytes stop a board may depend on the board's current state."""
+    """Changed stop bytes are used by this guard and the next one.
+
+    Which bytes stop a board may depend on the board's current state.
+    """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
     keeper.change(*words)
@@ -87,7 +93,10 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
-    """Old commands fill the buffer and are dropped; they are read only after the guard has gone."""
+    """If old commands fill the port's buffer, the guard discards them to make room for a stop.
+
+    The old commands are not read before the guard has gone.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
     keeper.end(stopped=False)
@@ -95,7 +104,7 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 
 
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
-    """The guard ends, so the driver does not wait for it."""
+    """A guard with a dead port ends by itself, so the driver does not wait for the guard."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     process = keeper._process
     assert process is not None
@@ -106,7 +115,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """Ctrl-C does not reach the guard's session, and it ignores a SIGTERM to the process group."""
+    """A guard has its own session, so ctrl-C does not reach it; it ignores SIGTERM and the like."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     assert os.getsid(pid) == pid
@@ -164,7 +173,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """Each line gets its own last bytes."""
+    """Each line gets its own stop bytes, even if another line is gone."""
     other = Line()
     try:
         words = ((0, b"drive stands"), (1, b"front stands"))
@@ -179,7 +188,10 @@ def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line
 
 
 def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
-    """Each stop is a datagram; those that are lost do not end the guard."""
+    """Each stop is a datagram.
+
+    The guard survives lost datagrams, so that a late host is stopped.
+    """
     host = socket.socket(type=socket.SOCK_DGRAM)
     host.bind(("127.0.0.1", 0))
     address = host.getsockname()
@@ -198,7 +210,7 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """The new stop commands are in the guard's pipe before the driver ends."""
+    """The guard writes the newest stop bytes, which are in its pipe before the driver ends."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):
@@ -208,7 +220,7 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """Last bytes may contain the letter of a latched beat; the next read completes a cut line."""
+    """Stop bytes may contain the letter of a latched heartbeat; a read may cut their line."""
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")
     assert guard.parted(b".=3:be") == (b".", b"", b"=3:be")

@@ -15,7 +15,7 @@ from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """A hung guard would write the old bytes."""
+    """A guard that reads nothing is replaced, because it would write outdated stop bytes."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGSTOP)
@@ -29,7 +29,7 @@ def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Lin
 
 
 def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
-    """The guard does not read yet because it is still starting."""
+    """Unread stop bytes do not mean that a guard hangs, since it may still be starting."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     children = line.children()
     for number in range(30):
@@ -40,7 +40,7 @@ def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
-    """The new guard works; a second death is not reported again."""
+    """A guard that dies is replaced by one that works; a second death is not reported again."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
@@ -57,7 +57,7 @@ def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
 def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The driver continues without a guard."""
+    """If a guard cannot be started, the driver reports it, continues, and tries again later."""
     with monkeypatch.context() as without:
         without.setattr("sys.executable", "/no/python")
         keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -70,7 +70,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
-    """A stopped guard would not stop the robot; the driver acts before the guard's pipe is full."""
+    """A hung guard, which would not stop the robot, is replaced before the guard's pipe is full."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     started(first)
@@ -87,7 +87,7 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard is replaced at once and reaped later.
+    """A guard that does not die is replaced at once and reaped later.
 
     A process in uninterruptible sleep behaves like this guard.
     """
@@ -111,7 +111,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 
 
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """More guards would not help on a host where nothing can be killed."""
+    """The number of undying guards is limited: where nothing can be killed, more would not help."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:
@@ -131,7 +131,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
-    """The guard does not receive the end message."""
+    """The driver does not wait for a suspended guard, which does not receive the end message."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
@@ -142,7 +142,10 @@ def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
 def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A stopped process that signals do not reach imitates an uninterruptible sleep."""
+    """The driver does not wait for a guard that cannot be killed.
+
+    A stopped process that signals do not reach imitates an uninterruptible sleep.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)

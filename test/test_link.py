@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> None:
-    """Without a queue, a timer or another thread in between, the latency is shortest."""
+    """The reader thread itself delivers measurements, since a queue or timer adds latency."""
     listener = Listener()
     link = link_to(board.path, listener, session())
     link.start()
@@ -40,7 +40,7 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 
 
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
-    """The pacer repeats and stops, even while the commanding callback hangs."""
+    """The pacer repeats a command and stops the robot, even while the commanding callback hangs."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -58,7 +58,10 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The pacer passes at each repetition of a command; a hung guard is known by unread beats."""
+    """The guard gets heartbeats at a fixed rate, although the pacer runs at each repeated command.
+
+    Unread heartbeats must show for how long a guard hangs.
+    """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
     listener, ours = Listener(), session()
@@ -76,7 +79,7 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 
 
 def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:
-    """Why the port cannot be opened, how often it was opened, and bytes in each direction."""
+    """The figures have the reason for a closed port, the number of openings, and byte counts."""
     listener, name = Listener(), tmp_path / "board"
     link = link_to(str(name), listener, session())
     link.start()
@@ -96,7 +99,7 @@ def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: P
 def test_closing_writes_stop_and_ends_the_threads(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A second close does nothing."""
+    """Closing a link writes Stop and ends its threads; closing it again does nothing."""
     end_patiently(monkeypatch)
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
@@ -113,7 +116,7 @@ def test_closing_writes_stop_and_ends_the_threads(
 def test_every_read_and_every_write_can_be_listened_to(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The bytes are exactly those on the line, including the opening and the final Stop.
+    """A listener gets exactly the bytes on the line, including the opening and the final Stop.
 
     What the board sent before the port was opened is discarded.
     """
@@ -139,7 +142,7 @@ def test_every_read_and_every_write_can_be_listened_to(
 def test_an_estop_is_written_before_the_call_returns(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The answer does not wait for another thread."""
+    """An e-stop is written before the call returns, without a wait for another thread."""
     written: list[bytes] = []
     write = SerialPort.write
     monkeypatch.setattr(
@@ -157,7 +160,7 @@ def test_an_estop_is_written_before_the_call_returns(
 
 
 def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
-    """The link continues to work."""
+    """A refused command raises an error in the caller, and the link continues to work."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -170,7 +173,10 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """Without a guard, only the driver itself can stop the robot."""
+    """A port that no guard can share is reported once.
+
+    Only the driver itself can stop the robot.
+    """
     listener = Listener()
     link = link_to("loop://", listener, session())
     link.start()

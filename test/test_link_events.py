@@ -23,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: PtyBoard) -> None:
-    """The events come from callers, the reader and the pacer; the listener is sometimes slow."""
+    """Events of callers, reader and pacer stay in order, even if the listener is sometimes slow."""
     happened: list[Event] = []
     ours, listener = session(), Listener()
     hear, take_events, deliver = ours.inbound.hear, ours.take_events, listener.deliver
@@ -67,7 +67,10 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
 
 
 def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard) -> None:
-    """The caller and the watchdog's thread do not wait; late events are delivered in order."""
+    """Neither a caller nor the watchdog waits for a hanging listener.
+
+    Events arrive later, in order.
+    """
     listener, ours = Listener(), session()
     deliver, hang, goes_on = listener.deliver, threading.Event(), threading.Event()
 
@@ -96,7 +99,7 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """The log thus shows the reason before the refusal."""
+    """A refusal is delivered after its cause, so that the log shows the reason first."""
     listener, ours = Listener(), session()
     link = link_to(
         board.path, listener, ours, refused=lambda text: listener.deliver([Notice(text)])
@@ -116,7 +119,7 @@ def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) 
 
 
 def test_a_listener_that_raises_ends_the_link_with_a_report(board: PtyBoard) -> None:
-    """A thread reports its end, and the robot is stopped before the port is closed."""
+    """A link whose listener raises an error reports its end, and stops the robot before closing."""
     listener = Listener()
 
     def explode(events: Sequence[Event]) -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A link whose port accepts no more data: Stop is written first when it does again."""
+"""A link whose port accepts no more data: Stop is written first when the port does so again."""
 
 import os
 import threading
@@ -31,9 +31,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """A board that hung may hold half a command, so S, which had no room before, must wait.
+    """After a failed write, the link repeats its opening sequence before anything else.
 
-    The first Stop is written before the port is opened again, since the board may resume sooner.
+    The board may have received half a command. Another Stop precedes the sequence: the link writes
+    it before it opens the port again, since the board may resume sooner.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
@@ -56,7 +57,10 @@ def at_rest(terminal: Terminal) -> tuple[Link, Session]:
 
 
 def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> None:
-    """Closing does not hang; the robot is stopped as soon as the board receives again."""
+    """Closing a link with a full port does not hang.
+
+    The guard stops the robot once there is room.
+    """
     link, _ours = at_rest(terminal)
     terminal.fill()
     assert not link.close("stop")
@@ -65,7 +69,7 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
-    """The link reports until the port is opened again that it is blocked.
+    """While its port is full, a link reports itself as blocked, until the port is opened again.
 
     The e-stop is written first when there is room.
     """
@@ -88,7 +92,7 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 
 
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
-    """The driver's own final Stop finds no room; the guard has to send it."""
+    """If a defect ends the driver while its port is full, the guard has to send the final Stop."""
     link, ours = at_rest(terminal)
     terminal.fill()
     closed, session_closed = ours.closed, threading.Event()

@@ -84,7 +84,7 @@ class Lines:
         self.name.symlink_to(self.sense.path)
 
     def say_that_it_stands(self) -> None:
-        """Report a standstill when the line is open, since earlier data is dropped."""
+        """Report a standstill once the line is open, because data sent before is dropped."""
         self.listener.wait_for(lambda: self.listener.reports[-1:] == [None])
         os.write(self.sense.far, b"d 0 0\n")
         self.come_to_state("nominal")
@@ -115,7 +115,10 @@ def lines(tmp_path: Path) -> Iterator[Lines]:
 def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missing(
     lines: Lines,
 ) -> None:
-    """Both lines are one connection; motion is refused with the name of the missing line."""
+    """While one line is missing, the other still gets stops.
+
+    Both lines are one connection: motion is refused with the name of the missing line.
+    """
     lines.link.start()
     lines.drive.read_until(5 * STOPS)
     lines.come_to_state("connecting")
@@ -145,7 +148,10 @@ def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
 def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
     lines: Lines,
 ) -> None:
-    """The command from before is discarded."""
+    """A lost line stops the robot.
+
+    When it returns, the command from before the loss is discarded.
+    """
     lines.connect()
     lines.link.start()
     lines.say_that_it_stands()
@@ -162,7 +168,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 
 
 def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
-    """The measurements of the robot still arrive."""
+    """Without its drive line the robot is not driven, but its measurements still arrive."""
     lines.connect()
     missing = lines.openers[0] = partial(SerialPort, str(lines.name) + "-not", 115200)
     lines.link.start()
@@ -176,7 +182,7 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
 
 
 def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> None:
-    """The stop bytes change with the state that the board reports."""
+    """The guard's stop bytes change with the state that the board reports."""
     with closing(Lines(tmp_path, MoodyBoard())) as lines:
         lines.connect()
         lines.link.start()
@@ -190,7 +196,7 @@ def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> No
 
 
 def ends_at_rest() -> bool:
-    """Close the link of a robot that drives; return whether it was proved at rest."""
+    """Close the link of a driving robot; return whether the robot was proved to be at rest."""
     with ServedBoard(LineRobot()) as robot:
         lines = [partial(SerialPort, path, 115200) for path in robot.addresses]
         listener, ours = Listener(), session_of(LineBoard())
@@ -203,8 +209,8 @@ def ends_at_rest() -> bool:
 
 
 def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
-    """Odometry comes every 0.4 s, so the proof of a standstill takes longer.
+    """The end of a link waits for the proof of a standstill from odometry, which comes every 0.4 s.
 
-    On a busy computer the proof may come too late, so it tries again.
+    On a busy computer the proof may come too late, so the test tries again.
     """
     assert any(ends_at_rest() for _ in range(5))

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
-    """A link can also be closed before its port appears."""
+    """A port that appears late is opened; a link can also be closed before its port appears."""
     listener, ours = Listener(), session()
     name = str(tmp_path / "omnibot")
     link = link_to(name, listener, ours)
@@ -34,7 +34,10 @@ def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
 def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each wait is 1.5 times the one before, up to a limit, so that a board need not wait long."""
+    """Each wait before an attempt to open the port is 1.5 times the one before, up to a limit.
+
+    The limit keeps the wait for a board short.
+    """
 
     class Timed(Listener):
         def report(self, trouble: str | None) -> None:
@@ -57,7 +60,10 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 
 
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
-    """The link of udev leads to the new port; the command from before is discarded."""
+    """A lost port is found under a new name by udev's link.
+
+    The command from before is discarded.
+    """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard()) as second:
@@ -80,7 +86,7 @@ def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_pat
 
 
 def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
-    """The terminal hangs up when its board ends."""
+    """When a board is unplugged, its port hangs up; the link reports this and is disconnected."""
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard()) as board:
         link = link_to(board.path, listener, ours)
@@ -92,7 +98,10 @@ def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
 
 
 def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too() -> None:
-    """The robot may still follow a command from before the port was lost."""
+    """A port that is opened while the link closes gets a last Stop.
+
+    The robot may still follow a command from before the port was lost.
+    """
     listener, started = Listener(), threading.Event()
     closer = threading.Thread(target=lambda: link.close("stop"))
 
@@ -112,9 +121,9 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
-    """The cable is back, but the driver ends before it would have opened the port again.
+    """A driver that ends while its port is lost tries to open the port once more, to send Stop.
 
-    It knows that the stop was sent and is unconfirmed.
+    The driver knows that the stop was sent and is unconfirmed.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
@@ -135,7 +144,7 @@ def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_pat
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_known_not_to_be_stopped() -> None:
-    """The cable is not back when the driver ends."""
+    """A driver that ends without its cable knows that the robot is not stopped."""
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
         link = link_to(board.path, listener, ours)

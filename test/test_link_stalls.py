@@ -20,7 +20,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def obeyed(command: Callable[[], None]) -> bool:
-    """Return whether the command is accepted; after a stall it is not until the pacer has run."""
+    """Return whether the command is accepted.
+
+    After a stall no command is accepted before the pacer has run.
+    """
     try:
         command()
     except CommandRefused:
@@ -31,7 +34,10 @@ def obeyed(command: Callable[[], None]) -> bool:
 def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A thread that holds the lock blocks the pacer; commands sent later are obeyed."""
+    """A command that waited while the pacer was blocked is refused; later commands are obeyed.
+
+    A thread that holds the lock blocks the pacer.
+    """
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
@@ -68,7 +74,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 
 
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Threads miss no heartbeat by the steady clock, but the robot is stopped."""
+    """A suspended host stops the robot, though by the steady clock no heartbeat is missing."""
     suspended_s = 0.0
     monkeypatch.setattr(
         "omnibot_driver.shared_session.boot_time_s",

@@ -30,13 +30,13 @@ STAMP = messages.time_message(1_700_000_000_123_456_789)
 
 
 def test_a_stamp_is_seconds_and_nanoseconds() -> None:
-    """The conversion is exact, without floating point."""
+    """The conversion of a time to seconds and nanoseconds is exact, without floating point."""
     assert (STAMP.sec, STAMP.nanosec) == (1_700_000_000, 123_456_789)
 
 
 @pytest.mark.parametrize(("sec", "nanosec", "age_s"), [(98, 0, 2.0), (102, 5 * 10**8, -2.5)])
 def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, age_s: float) -> None:
-    """The age is negative when the stamp is in the future."""
+    """The age of a stamp is negative when the stamp is in the future."""
     assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
 
 
@@ -60,7 +60,7 @@ def goal(
 def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
     yaw_rad: float, length: float
 ) -> None:
-    """Some senders do not normalize it."""
+    """A goal's yaw is independent of its quaternion's length, as some senders do not normalize."""
     turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
     pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")
     assert (pose.x_m, pose.y_m) == (1.0, -2.0)
@@ -69,7 +69,7 @@ def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
 
 @pytest.mark.parametrize("frame", ["", "odom"])
 def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
-    """An empty frame means the odometry frame."""
+    """A goal with an empty frame is in the odometry frame."""
     assert messages.goal_pose(goal(1.0, frame=frame), "odom") == Pose(1.0, 0.0, 0.0)
 
 
@@ -89,7 +89,7 @@ def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
 def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
     wrong: PoseStamped, said: str
 ) -> None:
-    """The frame is wrong, a number or rotation is missing, or it is not upright."""
+    """A goal is refused for a wrong frame, a number that is not finite, or an invalid rotation."""
     with pytest.raises(CommandRefused, match=f"cmd_pose re(fus|ject)ed.*{said}"):
         messages.goal_pose(wrong, "odom")
 
@@ -134,7 +134,10 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 
 
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
-    """The first displacement after a pause includes all motion since, at an unknown speed."""
+    """An unknown twist is zero with a large variance.
+
+    The first displacement after a pause includes all motion during the pause, at an unknown speed.
+    """
     message = messages.odometry_message(
         OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS
     )
@@ -160,7 +163,7 @@ poses = st.builds(Pose, *[st.floats(-1e4, 1e4)] * 3)
 
 @given(poses)
 def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose) -> None:
-    """The time is the same too; tf has no covariance."""
+    """A transform has the pose, the frames and the time of odometry; tf has no covariance."""
     estimate = OdometryEstimate(0.0, pose, None, Covariance())
     odometry = messages.odometry_message(estimate, STAMP, PREFIXED)
     transform = messages.transform_message(estimate, STAMP, PREFIXED)
@@ -173,7 +176,10 @@ def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose)
 
 
 def test_every_frame_has_the_prefix_as_it_is() -> None:
-    """No separator is added, as robot_state_publisher does it."""
+    """Every frame name begins with the prefix alone.
+
+    As in robot_state_publisher, no separator follows.
+    """
     assert PREFIXED.odom_frame == "robot1/odom"
     assert PREFIXED.base_frame == "robot1/base_link"
     estimate = ImuEstimate(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -200,7 +206,7 @@ def test_joint_states_are_the_manuals_wheels() -> None:
 
 
 def test_joints_whose_rate_is_not_known_have_none() -> None:
-    """The array is empty, as sensor_msgs requires, not full of zeros."""
+    """If the wheels' rates are unknown, the array is empty, as sensor_msgs requires, not zeros."""
     estimate = OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), None)
     wheels = messages.turned(messages.unturned(SETTINGS.wheels), estimate, SETTINGS.wheels)
     message = messages.joint_state_message(wheels, STAMP, SETTINGS)
@@ -209,7 +215,10 @@ def test_joints_whose_rate_is_not_known_have_none() -> None:
 
 
 def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
-    """Each distance is divided by the radius at its time, so a new radius at rest turns nothing."""
+    """Each distance is divided by the wheel radius at its time.
+
+    A new radius alone turns no joint.
+    """
     small, large = OmniKinematics(0.029, 0.143), OmniKinematics(0.058, 0.2)
     ahead = [OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(x, 0.0, 0.0)) for x in (1, 2)]
     before = messages.turned(messages.unturned(SETTINGS.wheels), ahead[0], small)
@@ -219,7 +228,7 @@ def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
 
 
 def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
-    """The name is node, colon, task; the level is one byte."""
+    """The name of a status is node, colon, task; its level is one byte."""
     statuses = [
         Status("Link", Level.OK, "connected", {"Port": "p"}),
         Status("IMU", Level.STALE, "nothing", {}),
@@ -235,7 +244,7 @@ def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
 
 @given(st.floats(-1e4, 1e4))
 def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
-    """The yaw may include any number of turns."""
+    """The quaternion of any yaw, also of several turns, has the length 1."""
     turn = messages.yaw_quaternion(yaw_rad)
     assert math.hypot(turn.z, turn.w) == pytest.approx(1.0)
     assert math.cos(2 * math.atan2(turn.z, turn.w)) == pytest.approx(math.cos(yaw_rad), abs=1e-6)
@@ -243,7 +252,7 @@ def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
 
 @pytest.mark.parametrize("axis", ["linear.x", "linear.z", "angular.x", "angular.y", "angular.z"])
 def test_a_twist_that_is_not_finite_anywhere_is_refused_as_it_came(axis: str) -> None:
-    """The refusal shows the numbers of all six axes."""
+    """A twist that is not finite is refused with the numbers of all six axes."""
     twist = Twist()
     part, name = axis.split(".")
     twist.linear.y = 0.25

@@ -47,7 +47,7 @@ class Held:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed: int) -> None:
-    """Threads may be delayed between the lock and the delivery, or within one."""
+    """Events leave once and in order, even if threads pause before or during a delivery."""
     outbox, lock = Outbox(), threading.Lock()
     happened: list[int] = []
     left: list[int] = []
@@ -87,7 +87,7 @@ def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed:
 
 
 def test_nobody_claims_what_is_not_next() -> None:
-    """Another thread may be delivering, or other events may wait."""
+    """No thread may claim a delivery while another thread delivers or other events wait."""
     outbox = Outbox()
     held = Held(outbox)
     assert not outbox.claim()
@@ -114,7 +114,7 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 
 
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
-    """The error is raised in the thread that delivered; the next thread delivers the rest."""
+    """The error of a delivery is raised in its own thread; the next thread delivers the rest."""
     outbox = Outbox()
     left: list[int] = []
 
@@ -131,7 +131,7 @@ def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
 
 
 def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
-    """New events leave after that delivery."""
+    """Events that are put into the outbox by a delivery leave after that delivery."""
     outbox = Outbox()
     left: list[int] = []
     outbox.put(lambda: outbox.put(partial(left.append, 2)) or left.append(1))
@@ -140,7 +140,7 @@ def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """Without waiting, the queue would grow without limit."""
+    """A thread waits while the outbox is full; otherwise the queue would grow without limit."""
     outbox = Outbox()
     left: list[int] = []
     held = Held(outbox)

@@ -27,7 +27,7 @@ def taken(pipe: int) -> None:
 
 
 def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
-    """The next line is written when the disk has room again."""
+    """A line that a full disk refuses is lost; the next one is written when there is room again."""
     (source, pipe), (heard, room) = os.pipe(), os.pipe()
     disk = os.open("/dev/full", os.O_WRONLY)
     copier = threading.Thread(target=_copy, args=(source, disk))
@@ -45,7 +45,7 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
 
 
 def test_output_that_is_not_read_does_not_block_the_program() -> None:
-    """The output exceeds all buffers between program and reader."""
+    """Unread output does not block the program, even if it exceeds all buffers up to the reader."""
     program = """
 import contextlib, os
 from omnibot_driver.output import UnblockedOutput
@@ -65,7 +65,7 @@ with UnblockedOutput():
 
 @pytest.mark.parametrize("lines", [16, 100])
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
-    """Python prints ignored errors, and its own traceback, after the context has ended.
+    """Output at the program's end does not block: Python prints its traceback after the context.
 
     The pipe is exactly full (16 lines), or more output waits for it (100 lines).
     """
@@ -89,7 +89,7 @@ raise SystemExit("the last words")
 
 
 def test_what_is_printed_at_the_end_is_seen_where_it_is_read() -> None:
-    """The last text comes after what was printed before."""
+    """Text that is printed at the program's end comes after all text from before."""
     program = """
 import os
 from omnibot_driver.output import UnblockedOutput
@@ -103,7 +103,10 @@ raise SystemExit("then the last words")
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
-    """With such a descriptor, printed text would go to the board."""
+    """A port never gets the descriptor of a closed standard output.
+
+    Printed text would go to the board.
+    """
     program = """
 import os, sys
 from omnibot_driver.output import UnblockedOutput

@@ -39,7 +39,7 @@ def test_an_integer_will_do_for_a_float(parameter: Parameter) -> None:
 
 @pytest.mark.parametrize("parameter", RANGED, ids=name_of)
 def test_both_ends_of_a_range_are_allowed_and_nothing_beyond(parameter: Parameter) -> None:
-    """The message names the parameter, what it may be, its unit, and what was given."""
+    """The message for a value outside the range names parameter, range, unit, and the value."""
     assert parameter.low is not None
     assert parameter.high is not None
     kind = type(parameter.default)
@@ -90,7 +90,7 @@ WRONG_TYPES: dict[type, list[object]] = {
     ids=lambda value: value.name if isinstance(value, Parameter) else repr(value),
 )
 def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object) -> None:
-    """The error is always a ParameterError that names the parameter."""
+    """A value of a wrong type always leads to a ParameterError that names the parameter."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 
@@ -113,7 +113,7 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
     ],
 )
 def test_types_are_told_in_the_words_of_ros(name: str, wrong: object, words: str) -> None:
-    """Types are named as in ``ros2 param describe``; the message explains what YAML made of no."""
+    """Types have the names of ``ros2 param describe``; a message explains how YAML reads ``no``."""
     with pytest.raises(ParameterError) as caught:
         PARAMETERS.by_name[name].check(wrong)
     message = str(caught.value)
@@ -152,7 +152,7 @@ def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
 
 @pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
 def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
-    """Any kind of sequence is accepted; the result is a list of integers."""
+    """Any sequence of three values 1 or -1 is accepted; the result is a list of integers."""
     taken = PARAMETERS.by_name["axis_signs"].check(signs)
     assert taken == [1, -1, 1]
     assert isinstance(taken, list)
@@ -180,7 +180,7 @@ def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
 
 @pytest.mark.parametrize("parameter", VECTORS, ids=name_of)
 def test_a_bias_is_three_numbers_each_within_its_range(parameter: Parameter) -> None:
-    """Integers are accepted; the result is floats."""
+    """A bias is three numbers; integers are accepted, and the result is floats."""
     assert parameter.high is not None
     taken = parameter.check((1, -1, 0.5))
     assert taken == [1.0, -1.0, 0.5]
@@ -209,7 +209,7 @@ ANY = Parameter("any", ["x"], "", "One word.")
 def test_a_list_may_have_any_length_that_its_row_allows(
     parameter: Parameter, value: object, taken: object
 ) -> None:
-    """The elements of the list are numbers or strings."""
+    """A list of numbers or strings may have any length that the parameter's row allows."""
     assert parameter.check(value) == taken
 
 
@@ -228,14 +228,17 @@ def test_a_list_may_have_any_length_that_its_row_allows(
 def test_a_wrong_list_is_refused_with_what_it_may_be(
     parameter: Parameter, wrong: object, sentence: str
 ) -> None:
-    """The message says how many elements, of which type, and the range of each."""
+    """The message for a wrong list has the allowed number, type and range of the elements."""
     with pytest.raises(ParameterError) as refused:
         parameter.check(wrong)
     assert str(refused.value).startswith(f"parameter '{parameter.name}' {sentence}")
 
 
 def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
-    """The default gives the type only; None is refused for other parameters."""
+    """A value that the board keeps is None until it is given; its default only gives the type.
+
+    None is refused for other parameters.
+    """
     gain = Parameter("gain", 1.0, "1", "A gain.", low=0.0, high=9.0, unset=True)
     assert gain.initial is None
     assert gain.check(None) is None

@@ -73,7 +73,7 @@ DIMENSIONLESS = {
     "left_short_correction", "low_pass", "motor_balance", "right_feed_forward", "right_kp",
     "right_long_correction", "right_short_correction", "steering_gains",
 }  # fmt: skip
-"""Real numbers that have no unit, or whose items have different ones."""
+"""Parameters whose numbers have no unit, or have items with different units."""
 
 
 def name_of(parameter: object) -> str | None:
@@ -82,14 +82,14 @@ def name_of(parameter: object) -> str | None:
 
 @pytest.mark.parametrize(("name", "default"), PROMISED.items())
 def test_every_promised_parameter_is_there_with_its_default(name: str, default: object) -> None:
-    """The type is checked too: a float stays a float."""
+    """Every promised parameter has its promised default of the same type: floats stay floats."""
     assert PARAMETERS.by_name[name].default == default
     assert type(PARAMETERS.by_name[name].default) is type(default)
 
 
 @pytest.mark.parametrize("parameter", EVERY_ROW)
 def test_every_default_passes_its_own_check_and_is_explained(parameter: Parameter) -> None:
-    """Each has a description that is a sentence, and a unit if it is a quantity."""
+    """Each parameter has a description that is a sentence, and a unit if it is a quantity."""
     value = parameter.check(parameter.default)
     assert value == parameter.default
     assert type(value) is type(parameter.default)
@@ -103,24 +103,24 @@ def test_every_default_passes_its_own_check_and_is_explained(parameter: Paramete
 
 
 def test_names_are_unique() -> None:
-    """Two rows of one name would hide each other."""
+    """Parameter names are unique, since two rows of one name would hide each other."""
     assert len(PARAMETERS.by_name) == len(PARAMETERS.rows)
 
 
 @pytest.mark.parametrize("name", ["port", "odom_frame", "base_frame", "imu_frame"])
 def test_identity_cannot_change_while_it_runs(name: str) -> None:
-    """Port and frames are read-only."""
+    """Port and frames are read-only while the driver runs."""
     assert PARAMETERS.by_name[name].fixed
 
 
 @pytest.mark.parametrize("name", ["max_linear_speed", "linear_scale", "cmd_vel_timeout"])
 def test_tuning_may_change_while_it_runs(name: str) -> None:
-    """Users find these values by trial."""
+    """Tuning parameters can change while the driver runs, as users find their values by trial."""
     assert not PARAMETERS.by_name[name].fixed
 
 
 def test_what_is_not_given_is_the_default() -> None:
-    """A given value is used."""
+    """A parameter that is not given has its default; a given value is used."""
     assert check_all({}) == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     values = check_all({"max_linear_speed": 1, "port": "/dev/ttyACM3"})
     assert values["max_linear_speed"] == 1.0
@@ -140,27 +140,30 @@ def test_what_is_not_given_is_the_default() -> None:
     ],
 )
 def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, meant: str) -> None:
-    """Without this check, rclpy would ignore the name in silence."""
+    """An unknown name is refused with the most similar known name; rclpy would just ignore it."""
     with pytest.raises(ParameterError, match=f"'{mistyped}'.*'{meant}'"):
         check_all({mistyped: 1})
 
 
 @given(st.text())
 def test_any_unknown_name_is_refused(name: str) -> None:
-    """The name may be similar to known ones or not, or be empty."""
+    """Any unknown name is refused, whether it is similar to known names, or not, or empty."""
     if name not in PARAMETERS.by_name and not boards.owners_of(name):
         with pytest.raises(ParameterError, match="the nearest is"):
             check_all({name: 1})
 
 
 def test_one_wrong_value_among_many_is_found() -> None:
-    """The message names the parameter."""
+    """One wrong value among many is found, and the message names its parameter."""
     with pytest.raises(ParameterError, match="'command_rate'"):
         check_all({"port": "/dev/ttyACM3", "command_rate": 1e6, "baudrate": 9600})
 
 
 def test_odom_and_base_must_be_different_frames() -> None:
-    """TF would have a loop; the IMU frame may equal the base frame."""
+    """``odom_frame`` and ``base_frame`` must differ, since TF would have a loop.
+
+    The IMU frame may equal the base frame.
+    """
     with pytest.raises(ParameterError, match="'odom_frame' must differ from 'base_frame'"):
         check_all({"odom_frame": "base_link"})
     assert check_all({"imu_frame": "base_link"})
@@ -170,7 +173,7 @@ def test_odom_and_base_must_be_different_frames() -> None:
 def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
     signs: list[int],
 ) -> None:
-    """The signs are valid for velocities; for goal positions they are not."""
+    """Axis signs that no mirror makes are valid for velocities, but not for goal positions."""
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
         check_all({"axis_signs": signs, "control_method": "position"})
@@ -178,7 +181,7 @@ def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
 
 
 def test_values_reach_the_core_under_their_meaning() -> None:
-    """Every value is changed, so a mixed-up parameter is found."""
+    """Every parameter differs from its default, so that the test finds parameters mixed up."""
     values = check_all(
         {
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
@@ -238,12 +241,12 @@ def in_the_file() -> dict[str, object]:
 
 
 def test_the_file_has_its_former_name_as_well() -> None:
-    """The former name stays for one release."""
+    """The parameter file also keeps its former name for one release."""
     assert FORMER.read_bytes() == CONFIG.read_bytes()
 
 
 def test_the_file_of_parameters_is_the_table() -> None:
-    """The file has every name with its default, of the exact type that a strict reader expects."""
+    """The parameter file has every name with its default, of exactly the parameter's type."""
     values = in_the_file()
     assert values == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     for name, value in values.items():
@@ -252,7 +255,7 @@ def test_the_file_of_parameters_is_the_table() -> None:
 
 @pytest.mark.parametrize("parameter", PARAMETERS.rows, ids=name_of)
 def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None:
-    """The comment above each parameter has description, range or choices, and unit."""
+    """In the file, the comment above each parameter has description, range or choices, and unit."""
     text = CONFIG.read_text(encoding="utf-8")
     comment = text.split(f"\n    {parameter.name}:")[0].rsplit("\n\n", 1)[-1]
     words = " ".join(comment.replace("#", " ").split())
@@ -266,7 +269,10 @@ def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None
 def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
     kind: str, unit: str, fastest: float
 ) -> None:
-    """Odometry would reject every displacement above it and stop without a message."""
+    """A speed limit above the fastest possible speed is refused.
+
+    Odometry would reject every displacement above the fastest speed, and stop without a message.
+    """
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest
     with pytest.raises(ParameterError) as refused:
@@ -280,7 +286,10 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 
 
 def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
-    """Consumers would discard every measurement of such a sensor."""
+    """A sensor's range with a minimum above its maximum is refused.
+
+    Consumers would discard every measurement of such a sensor.
+    """
     table = boards.table_for({"board": "fejemis"})
     with pytest.raises(ParameterError, match=r"'tof_minimum' \(3 m\) must be below 'tof_maximum'"):
         table.check_all({"board": "fejemis", "tof_minimum": 3.0, "tof_maximum": 2.0})

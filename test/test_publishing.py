@@ -48,7 +48,7 @@ def node() -> Iterator[Node]:
 
 
 def session_with(node: Node) -> tuple[Session, Publishing]:
-    """Return a session that receives only what the test gives it, and its publishing."""
+    """Return a session that receives only what the test gives it, and the session's publishing."""
     session = Session(
         omnibot.make(VALUES),
         parameters.session_settings(VALUES, omnibot.kinematics(VALUES)),
@@ -64,7 +64,7 @@ def session_with(node: Node) -> tuple[Session, Publishing]:
 
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:
-    """Event handlers cost time: the executor checks each one, even of rclpy's own publisher."""
+    """No publisher has event handlers: they cost time, because the executor checks each one."""
     script = (
         "import rclpy\n"
         "from omnibot_driver.node import OmniBotDriver\n"
@@ -84,7 +84,7 @@ def test_a_command_waits_for_no_events_of_publishers() -> None:
 def test_stamps_follow_simulated_time_while_there_is_any(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Simulated time may begin before the driver or later; after it, stamps are system time."""
+    """Stamps are in simulated time while it is in use, whenever it begins; then in system time."""
     published: list[bytes] = []
 
     def published_at_s() -> float:
@@ -151,7 +151,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The angles of a robot at rest do not change when the parameters do."""
+    """Joint angles of a robot at rest do not change when the wheel parameters change."""
     _, publishing = session_with(node)
     published: list[bytes] = []
     monkeypatch.setattr(publishing._joints, "publish", published.append)
@@ -167,7 +167,10 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another thread may publish during the read; the published state must be the last one."""
+    """The last published state must be the one after the read.
+
+    Another thread may publish an intermediate state during the read.
+    """
     session, publishing = session_with(node)
     published: list[str] = []
     monkeypatch.setattr(publishing._state, "publish", lambda state: published.append(state.data))
@@ -204,7 +207,10 @@ class Charge:
 
 
 def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> None:
-    """The profile names the publisher; stamps are in ROS time, and the order is kept."""
+    """The publisher of a value that only one board measures is that of the value's type.
+
+    Stamps are in ROS time, and the order of values is kept.
+    """
     _, publishing = session_with(node)
     published: list[tuple[float, int]] = []
     publishing.extras = {Charge: lambda charge, ns: published.append((charge.volts, ns))}

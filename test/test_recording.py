@@ -46,7 +46,7 @@ def bag(
 
 @pytest.mark.parametrize("plugin", StoragePlugin)
 def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlugin) -> None:
-    """Both storage formats, and the bag's single file, give the same bytes."""
+    """A bag's folder and its single file give the same bytes, in both storage formats."""
     path = bag(tmp_path / "bag", "/omnibot_driver/raw_tx", RX, plugin=plugin)
     (file,) = (found for found in path.iterdir() if found.suffix != ".yaml")
     for place in (path, file):
@@ -54,7 +54,10 @@ def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlug
 
 
 def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
-    """A bag may have two robots, which differ by their topics."""
+    """Options of the URL set speed, delay and topic.
+
+    The topic selects one of two robots in a bag.
+    """
     path = bag(tmp_path / "bag", "/robot1/omnibot_driver/raw_rx", "/robot2/omnibot_driver/raw_rx")
     recording = open_recording(
         f"replay://{path}?speed=2.5&delay=0&topic=/robot2/omnibot_driver/raw_rx"
@@ -65,7 +68,10 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """The channels are in order, whatever the topics' names; one topic selects the robot."""
+    """Lines come back as the board's channels, whatever the topics' names.
+
+    The topic of one line selects the robot.
+    """
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
     assert recording.topics == (f"/b{RX}/two", f"/b{RX}/one")
@@ -76,7 +82,10 @@ def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: P
 
 
 def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_path: Path) -> None:
-    """Five seconds let other nodes find the driver; the bag's single topic is chosen."""
+    """Without options, speed is 1, and the bag's single topic is played after 5 s.
+
+    In this time other nodes find the driver.
+    """
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     assert (recording.speed, recording.delay_s, recording.topics) == (1.0, 5.0, (RX,))
 
@@ -93,7 +102,7 @@ def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_pa
     ],
 )
 def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why: str) -> None:
-    """The message says what is allowed."""
+    """The message for an invalid option says what is allowed."""
     path = bag(tmp_path / "bag", RX)
     with pytest.raises(ParameterError) as refusal:
         open_recording(f"replay://{path}{query}")
@@ -101,21 +110,24 @@ def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why:
 
 
 def test_a_bag_without_the_wire_says_how_to_record_it(tmp_path: Path) -> None:
-    """The usual cause is a recording without ``publish_raw``."""
+    """A bag without raw bytes is refused.
+
+    The usual cause is a recording without ``publish_raw``.
+    """
     path = bag(tmp_path / "bag", "/odom", kind="std_msgs/msg/String")
     with pytest.raises(ParameterError, match="record with `publish_raw: true`"):
         open_recording(f"replay://{path}")
 
 
 def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
-    """The message names all topics that could be meant."""
+    """For a bag of two robots, the message names all topics that could be meant."""
     path = bag(tmp_path / "bag", "/b/raw_rx", "/a/raw_rx")
     with pytest.raises(ParameterError, match="topic=/a/raw_rx or topic=/b/raw_rx"):
         open_recording(f"replay://{path}")
 
 
 def test_what_is_not_a_bag_is_refused(tmp_path: Path) -> None:
-    """The path is missing, an empty folder, or another file."""
+    """A path is refused if nothing is there, or if it is an empty folder or an unreadable file."""
     (tmp_path / "notes.txt").write_text("hello")
     (tmp_path / "torn.mcap").write_bytes(b"\x89MCAP0\r\n")
     for name, why in (
@@ -131,7 +143,7 @@ def test_what_is_not_a_bag_is_refused(tmp_path: Path) -> None:
 def test_without_the_library_it_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The rest of the driver works without it."""
+    """The message for a missing rosbags says what to install; only a replay needs this library."""
     path = bag(tmp_path / "bag", RX)
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(ParameterError) as refusal:
@@ -143,7 +155,7 @@ def test_without_the_library_it_says_what_to_install(
 
 
 def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> None:
-    """The kind of damage does not matter."""
+    """The replay of a bag that is damaged after its opening ends with a message."""
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     (tmp_path / "bag" / "metadata.yaml").unlink()
     with pytest.raises(LinkError, match="cannot be read any further"):
@@ -151,7 +163,7 @@ def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> Non
 
 
 def test_only_its_own_urls_are_taken() -> None:
-    """A device may have any other name."""
+    """Only URLs with ``replay:`` are recordings; a device may have any other name."""
     assert is_recording("replay://x")
     assert not is_recording("/dev/replay")
     assert not is_recording("sim://")

@@ -73,7 +73,7 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each of them was sent before or during the stall."""
+    """Commands that are refused because of a stall do not count as a pause of their sender."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     sender = Sender(bench, monkeypatch)

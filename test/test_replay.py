@@ -112,7 +112,7 @@ def measured(events: Iterable[Event]) -> list[tuple[object, ...]]:
 
 
 def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
-    """Each measurement is the same, in the same order."""
+    """A replay has the same measurements as the recorded session, in the same order."""
     tape: Chunks = []
     listener, ours = Listener(), session()
     link = link_to(
@@ -132,7 +132,7 @@ def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
 
 
 def test_every_replay_is_the_same() -> None:
-    """Measurements, stamps, states and warnings agree, also on a damaged line."""
+    """Replays of a damaged line agree in measurements, stamps, states and warnings."""
     first, second = play(Tape(BAD_LINE)), play(Tape(BAD_LINE))
     assert len(measured(first.events)) > 1000
     assert any(isinstance(event, Notice) and event != ENDED for event in first.events)
@@ -174,7 +174,7 @@ def test_stamps_are_times_of_the_recording() -> None:
 
 
 def test_a_recording_can_be_left_before_its_end() -> None:
-    """Closing does not wait for the recording's end, nor for its beginning."""
+    """Closing a replay waits neither for the recording's beginning nor for its end."""
     for tape in (Tape(BAD_LINE, speed=1e-3), Tape(BAD_LINE, delay_s=3600.0)):
         replay, heard = start(tape)
         if tape.delay_s == 0.0:
@@ -186,7 +186,10 @@ def test_a_recording_can_be_left_before_its_end() -> None:
 
 
 def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
-    """A request that is open at the end is answered; later ones find the port closed."""
+    """A request that is open at the recording's end is answered.
+
+    Later ones find the port closed.
+    """
     endless = ((EPOCH_NS + n * TICK_NS, data) for n, (_, data) in enumerate(itertools.cycle(TAPE)))
     stop = threading.Event()
     tape = Tape(itertools.takewhile(lambda _: not stop.is_set(), endless), speed=1.0)
@@ -207,7 +210,7 @@ TAPE = simulated(100)
 
 
 def test_a_recording_that_breaks_off_says_so() -> None:
-    """Events before that are valid."""
+    """A recording that becomes unreadable ends with a notice; all earlier events are valid."""
 
     def broken() -> Iterator[tuple[int, bytes]]:
         yield from TAPE

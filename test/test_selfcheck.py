@@ -19,7 +19,7 @@ def adapter(root: Path, device: str, latency: str) -> Path:
 
 
 def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) -> None:
-    """The message for FTDI's default has a permanent remedy and one that works until unplugging."""
+    """The message for FTDI's default has a permanent remedy and one that lasts until unplugging."""
     text = selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", "16\n"))
     assert "16 ms" in text
     assert "udev/99-omnibot.rules" in text
@@ -27,7 +27,7 @@ def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) 
 
 
 def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
-    """An example is /dev/omnibot."""
+    """A port may be a link to the adapter, such as /dev/omnibot."""
     sysfs = adapter(tmp_path / "sys", "ttyUSB7", "16\n")
     (tmp_path / "ttyUSB7").touch()
     link = tmp_path / "omnibot"
@@ -39,13 +39,13 @@ def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("latency", ["1\n", "5\n", "", "soon\n"])
 def test_a_short_timer_or_one_that_says_nothing_is_left_alone(tmp_path: Path, latency: str) -> None:
-    """No warning appears."""
+    """A short latency timer, or one without a readable value, leads to no message."""
     assert selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", latency)) == ""
 
 
 @pytest.mark.parametrize("port", ["/dev/ttyACM0", "/dev/pts/3", "socket://host:1", "sim://", ""])
 def test_a_port_without_such_a_timer_is_left_alone(tmp_path: Path, port: str) -> None:
-    """Examples are other adapters, pseudo-terminals and URLs."""
+    """A port without a latency timer, such as a pseudo-terminal or a URL, leads to no message."""
     assert selfcheck.latency_advice(port, adapter(tmp_path, "ttyUSB0", "16\n")) == ""
 
 
@@ -64,7 +64,7 @@ def test_a_port_without_such_a_timer_is_left_alone(tmp_path: Path, port: str) ->
 def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     port: str, use_sim_time: bool, warned: bool
 ) -> None:
-    """Stamps and ages would be wrong."""
+    """Simulated time on a real port leads to a warning: stamps and ages would be wrong."""
     text = selfcheck.clock_advice(port, use_sim_time)
     assert bool(text) == warned
     assert not warned or (port in text and "use_sim_time:=false" in text)
@@ -81,7 +81,10 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """Only ports whose measurements wait for /clock get a notice; a recording has own stamps."""
+    """Only ports whose measurements wait for /clock get a notice.
+
+    A recording has its own stamps.
+    """
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
 
@@ -96,7 +99,7 @@ def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, wa
 def test_a_node_of_the_same_full_name_is_told_of(
     others: list[tuple[str, str]], warned: bool
 ) -> None:
-    """A node in another namespace is fine, and so is a bag of another driver."""
+    """Another node of the same full name is reported, but not a node in another namespace."""
     publishers = [
         SimpleNamespace(node_namespace=namespace, node_name=name)
         for namespace, name in [("/", "omnibot_driver"), *others]
@@ -110,7 +113,7 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """Both types are tried; only the wrong publisher is named."""
+    """Only publishers of the wrong message type are named; both types are tried."""
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert selfcheck.type_conflict([teleop], stamped=False) == ""
     assert selfcheck.type_conflict([nav], stamped=True) == ""

@@ -34,7 +34,7 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
 
 
 def test_a_board_that_ends_with_the_driver_needs_no_guard() -> None:
-    """The driver does not warn that the robot would continue."""
+    """The driver does not warn that a simulated robot has no guard, as the robot ends with it."""
     listener, ours = Listener(), session()
     link = link_to("sim://?running", listener, ours)
     link.start()
@@ -44,7 +44,7 @@ def test_a_board_that_ends_with_the_driver_needs_no_guard() -> None:
 
 
 def test_options_come_after_a_question_mark() -> None:
-    """The options are the simulator's own."""
+    """The options after the question mark are those of the simulator."""
     listener, ours = Listener(), session()
     link = link_to("sim://?imu_only&seed=1&lose=0.001", listener, ours)
     link.start()
@@ -53,7 +53,7 @@ def test_options_come_after_a_question_mark() -> None:
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The defect is reported with its cause, and is not regarded as a lost cable."""
+    """A board's dead thread is reported as a defect with its cause, not as a lost cable."""
 
     def explode(_board: SimulatedBoard) -> bytes:
         raise ZeroDivisionError

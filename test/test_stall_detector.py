@@ -26,7 +26,7 @@ def resumed(length_s: float) -> StallDetector:
 
 
 def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
-    """A busy machine may delay the call a little."""
+    """A small delay of the watchdog's thread, as on a busy machine, is not a stall."""
     standstill = StallDetector()
     assert standstill.begun(5.0) == 0.0  # also before its first run
     for now in (10.0, 10.1, 10.45):
@@ -47,7 +47,7 @@ def test_a_standstill_is_told_once_with_its_length() -> None:
 
 
 def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
-    """Another thread may run first, or alone."""
+    """After a stall no command is fresh before the watchdog runs, even if another thread runs."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert not standstill.outlived_by(wall_ns(100.0 + STANDSTILL_S), 100.0 + STANDSTILL_S)
@@ -63,7 +63,10 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 
 
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
-    """A very busy computer stalls the driver again before a retransmission delivers the command."""
+    """A command that waited through two stalls is not fresh.
+
+    On a very busy computer the driver may stall again before a retransmission delivers a command.
+    """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
     stalls_again(standstill, 105.5, 106.2)
@@ -76,7 +79,7 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """Commands that were sent during the stall have arrived, or never will."""
+    """A stall long ago is forgotten: commands sent in that stall have arrived, or never will."""
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)
     standstill.passed(201.3, wall_ns(201.3))
@@ -85,21 +88,24 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """The command waited in a queue when the driver stalled; it is processed long after the end."""
+    """A command sent shortly before a stall is not fresh, since it waited in a queue meanwhile."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(99.9), 103.4)
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """The offset of the sender's clock is only as certain as the fastest message's transit time."""
+    """A command that seems to be sent right after a stall may have been sent before its end.
+
+    The offset of the sender's clock is only as certain as the fastest message's transit time.
+    """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(103.001), 103.4)
 
 
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
-    """A retransmission may deliver it up to ten seconds late."""
+    """A command sent during a stall is never fresh, even if it arrives ten seconds late."""
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
     assert not standstill.outlived_by(wall_ns(104.9), 108.0)
@@ -112,7 +118,7 @@ def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
 def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_old(
     step_s: float,
 ) -> None:
-    """NTP sets the clock; send times are by the clock as it is now."""
+    """A step of the clock by NTP changes no verdict: send times are by the clock after the step."""
     standstill = resumed(3.0)
     standstill.passed(103.5, wall_ns(103.5))
     standstill.passed(103.6, wall_ns(103.6 + step_s))
@@ -128,7 +134,7 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """Later commands of this sender are accepted again."""
+    """A command from a sender with a wrong clock is refused right after a stall, but not later."""
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)
     standstill.passed(106.0, wall_ns(106.0))

@@ -22,7 +22,7 @@ class FakeNode:
 
 
 def test_without_tf2_there_is_one_warning_and_no_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The warning says what to install, and how to switch it off."""
+    """Without tf2_ros, one warning says what to install, and how to switch transforms off."""
     monkeypatch.setitem(sys.modules, "tf2_ros", None)
     node = FakeNode()
     assert transform_publisher(node) is None
@@ -32,7 +32,7 @@ def test_without_tf2_there_is_one_warning_and_no_publisher(monkeypatch: pytest.M
 
 
 def test_with_tf2_its_broadcaster_gets_the_transforms(monkeypatch: pytest.MonkeyPatch) -> None:
-    """There is one broadcaster for this node, and no warning."""
+    """With tf2_ros there is one broadcaster for the node, and no warning."""
     sent: list[tuple[object, object]] = []
 
     class Broadcaster:

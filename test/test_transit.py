@@ -75,7 +75,7 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """The delay is the time in network and queue; the estimate never exceeds the true delay."""
+    """The estimated delay, of network and queue together, never exceeds the true delay."""
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
         now_s += pause_s
@@ -89,7 +89,10 @@ def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apar
 def test_a_command_that_was_under_way_for_longer_is_refused(
     sender_s: float, receiver_s: float, numbered: bool, late_s: float, silent_s: float
 ) -> None:
-    """Any silence may precede the command, from any sender; the next one in time is accepted."""
+    """A late command is refused after any silence of any sender.
+
+    The next one in time is accepted.
+    """
     receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
     for number in range(10):
         assert not refused(receiver.hear(sender, 100.0 + 0.1 * number, 0.01))
@@ -105,7 +108,7 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """The clock of this computer is enough to notice the delay."""
+    """The driver's clock suffices to refuse a command that waited in the driver's own queue."""
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
     assert delay.total_s == pytest.approx(waited_s)
@@ -129,7 +132,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
 ) -> None:
-    """A step back looks like a network that has become slow, so it is accepted after a while."""
+    """A sender whose clock steps back is heard again soon, though its network seems to be slow."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for _ in range(100):
         now_s += 0.1
@@ -147,7 +150,10 @@ def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
 
 @given(st.floats(1.0, 1e6))
 def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
-    """A later late command is refused: its age is judged by the new clock."""
+    """A sender whose clock is set forward is still heard.
+
+    Its late commands are refused by that clock.
+    """
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(100):
         now_s += 0.1
@@ -158,7 +164,10 @@ def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
 
 
 def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
-    """Each late command follows a silence, like single key presses on a bad network."""
+    """Late commands, each after a silence, do not count as a clock that was set back.
+
+    Single key presses on a bad network are like this.
+    """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.01)
     for number in range(20):
@@ -166,7 +175,7 @@ def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() 
 
 
 def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> None:
-    """Reliable transport sends them all again, the oldest first."""
+    """Reliable transport sends all commands from an outage again; only the old ones are refused."""
     receiver, sender = Receiver(), Sender()
     for number in range(50):
         receiver.hear(sender, 100.0 + 0.1 * number, 0.01)
@@ -178,7 +187,7 @@ def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> 
 def test_two_senders_with_clocks_of_their_own_are_both_heard(
     one_s: float, other_s: float, turns: list[int]
 ) -> None:
-    """One clock is hours ahead of the other; its sender has sent before."""
+    """Two senders are heard though one clock is hours ahead of the other, and one sent before."""
     receiver, senders, now_s = Receiver(), (Sender(one_s, sent=1000), Sender(other_s)), 100.0
     for sender in senders:
         receiver.hear(sender, now_s, 0.01)
@@ -188,7 +197,7 @@ def test_two_senders_with_clocks_of_their_own_are_both_heard(
 
 
 def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
-    """The clocks of both senders agree, since both run on one host."""
+    """A late command is refused, even if a second sender shares the host and thus the clock."""
     receiver, old, new = Receiver(), Sender(sent=1000), Sender()
     for number in range(20):
         receiver.hear(old, 100.0 + 0.1 * number, 0.01)
@@ -198,7 +207,7 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
 
 
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
-    """``ros2 topic pub --once`` is run repeatedly, also on a computer whose clock is behind."""
+    """Each command of ``ros2 topic pub --once`` is heard, also if the sender's clock is behind."""
     receiver = Receiver()
     for number in range(20):
         assert not refused(receiver.hear(Sender(), 100.0 + number, 0.01))
@@ -208,7 +217,7 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """The drift lasts for ten hours, with some silences of an hour."""
+    """Clocks that drift for ten hours, with some silences of an hour, are followed."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -237,8 +246,10 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """After ten messages of a sender, the send time has one estimate, by our clock; an offset of
-    the sender's clock has no effect on it."""
+    """After ten messages of a sender, the send time has one estimate, by our clock.
+
+    An offset of the sender's clock has no effect on this estimate.
+    """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):
         delay = receiver.hear(sender, 100.0 + number, 0.01)

@@ -2,8 +2,8 @@
 
 """Bounds for the number of Python calls per tick of the nominal stream; times are not measured.
 
-A bound is a little above the count when it was set. A change that makes the path longer raises the
-bound and gives the reason in docs/internals/performance.md.
+A bound is a little above the number of calls at the time when it was set. A change that needs more
+calls raises the bound and gives the reason in docs/internals/performance.md.
 """
 
 import gc
@@ -88,13 +88,13 @@ def most_calls(
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 14), (DELTA, 9), (POSE, 9)])
 def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The calls are counted in one read of one tick."""
+    """The bounded calls are those of the decoder in one read of one tick."""
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 48), (DELTA, 159), (POSE, 281)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The calls are counted from the bytes of one read to its events and the link's requests."""
+    """The bounded calls are those from a read's bytes to its events and the link's requests."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
@@ -108,7 +108,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """The calls are counted until the reading can be published."""
+    """The bounded calls are those from a read until the IMU reading can be published."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
@@ -122,7 +122,7 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
 
 
 def test_a_command_calls_no_more_than_it_did() -> None:
-    """The calls are counted from a Twist's bytes to the packets for a running board."""
+    """The bounded calls are those from a Twist's bytes to the packets for a running board."""
     session, board, now = opened_session(), SimulatedBoard(BoardSettings(running=True)), 0.0
     for tick in range(SETTLED):
         now = tick * TICK_S
@@ -142,7 +142,7 @@ def test_a_command_calls_no_more_than_it_did() -> None:
 
 
 def test_a_serialised_tick_calls_no_more_than_it_did() -> None:
-    """An Imu, an Odometry and a JointState are serialised from their estimates."""
+    """The bounded calls are those that serialize an Imu, an Odometry and a JointState."""
     settings = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     make, before = Serializer(settings), unturned(settings.wheels)
     imu = ImuEstimate(0.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))

@@ -58,7 +58,7 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     "FTDI, timer restarted by data": ftdi_restarted,
 }
 BUSY = dict(READERS)
-"""Readers with delays of their own; none is added."""
+"""Readers that have delays of their own, so that no delay is added to them."""
 
 
 @dataclass(slots=True)
@@ -74,7 +74,7 @@ class Stamped:
         return [at - self.sampled_s[tick] for tick, at, _ in self._settled(since_s)]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Return the standard deviation of steps between successive samples from 10 ms, in s."""
+        """Return the standard deviation, from 10 ms, of steps between successive stamps, in s."""
         return math.sqrt(
             fmean(
                 (b[1] - a[1] - TICK_S) ** 2

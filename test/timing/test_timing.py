@@ -12,7 +12,10 @@ PROMPT = [line for line in LINES if "block" not in line]
 @pytest.mark.parametrize("line", PROMPT)
 @pytest.mark.parametrize("scenario", ["driving", "IMU only, noisy gyro"])
 def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
-    """With one byte in 1000 lost, steps are within 0.2 ms (std), 99 % within 0.5 ms, after 2 s."""
+    """With one byte in 1000 lost, stamps are even within 0.2 ms (std) and 99 % are within 0.5 ms.
+
+    The first 2 s of each stream do not count.
+    """
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(line, scenario, 1e-3, skew, seed, 15.0)
         assert stamped.unevenness() < 0.2e-3
@@ -31,7 +34,7 @@ def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
 def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either(
     line: str, scenario: str, skew: float, seed: int
 ) -> None:
-    """With one byte in 100 lost, an earlier version gave wrong stamps on these streams."""
+    """With one byte in 100 lost, stamps stay right where an earlier version was wrong."""
     stamped = stamp(line, scenario, 1e-2, skew, seed, 30.0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -39,7 +42,7 @@ def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either
 
 @pytest.mark.parametrize("event", ["the board restarts", "stall of 0.3 s", "stall of 2 s"])
 def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) -> None:
-    """The stamps' constant offset is the same before and after the event."""
+    """The constant offset of the stamps is the same before and after a restart or a stall."""
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, skew, seed, 20.0, event)
         assert stamped.unevenness() < 0.2e-3
@@ -47,7 +50,7 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) 
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """Without skew the timer keeps its phase, which is known to within 2 ms less 13 bytes.
+    """Without skew, an FTDI's timer keeps its phase, which is known to within 2 ms less 13 bytes.
 
     The check begins after the first 2 s, on streams of which two in five are never cut.
     """
@@ -59,7 +62,10 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 @pytest.mark.parametrize("reader", [name for name in BUSY if "parts" not in name])
 @pytest.mark.parametrize("scenario", ["driving", "IMU only, noisy gyro"])
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str) -> None:
-    """Stamps are as on an undisturbed line; a few are a tick off if reads are in parts."""
+    """Stamps of a late reader are as accurate as on an undisturbed line.
+
+    Readers that read in parts are left out, because a few of their stamps are a tick off.
+    """
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(reader, scenario, 0.0, skew, seed, 15.0)
         assert spread(stamped.errors()) < 0.5e-3

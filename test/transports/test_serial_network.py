@@ -34,7 +34,7 @@ def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
 def test_a_peer_that_vanished_without_a_word_is_given_up(
     monkeypatch: pytest.MonkeyPatch, said: bytes
 ) -> None:
-    """On a half-open connection, nothing is acknowledged and nothing is refused."""
+    """A peer that vanished is given up, although a half-open connection refuses nothing."""
     options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
     monkeypatch.setattr("omnibot_driver.transports.serial_port.PEER_OPTIONS", options)
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -62,7 +62,7 @@ def drop_everything(peer: socket.socket) -> None:
 
 
 def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
-    """The error comes when the buffers on both sides are full."""
+    """A write to a peer that reads nothing ends with an error when all buffers are full."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port, far = connected(server)
         with far, closing(port), pytest.raises(LinkError, match="while writing"):
@@ -89,7 +89,7 @@ def test_a_board_behind_a_socket_is_served_as_well() -> None:
 
 
 def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
-    """pyserial itself closes only a socket that it can still shut down."""
+    """A port closes the socket of a broken connection, which pyserial itself leaves open."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         descriptors = len(os.listdir("/proc/self/fd"))
         port, far = connected(server)

@@ -36,7 +36,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_every_way_a_port_can_refuse_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, error: Exception, advice: str
 ) -> None:
-    """Root is never refused, so the library is replaced by one that refuses."""
+    """Each error at the opening of a port leads to advice.
+
+    Root is never refused, so a substitute for pyserial raises the errors.
+    """
 
     def refuse(*_: object, **__: object) -> None:
         raise error
@@ -49,7 +52,7 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 
 @pytest.mark.parametrize("path", ["/dev/no-such-port", "/dev/null", "spy://a:b"])
 def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None:
-    """A board with several lines has a parameter for each."""
+    """The message names the port's parameter; a board with several lines has one for each."""
     with pytest.raises(LinkError) as refused:
         SerialPort(path, 115200, "front_port")
     assert "front_port" in str(refused.value)
@@ -57,7 +60,7 @@ def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None
 
 
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
-    """The kernel's list of locks names the owner."""
+    """A second user of a port is told who has it: the kernel's list of locks names the owner."""
     port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
         SerialPort(terminal.path, 115200)
@@ -79,7 +82,7 @@ def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Te
 
 
 def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
-    """If DTR fell, a board that is wired to it would restart; the port was set to do so."""
+    """Closing a port switches its hang-up off: if DTR fell, a board wired to it would restart."""
     near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
     attributes = termios.tcgetattr(near)
     attributes[2] |= termios.HUPCL
@@ -92,7 +95,10 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Programs that do not use locks are kept out, too; a pseudo-terminal is left as it is."""
+    """A real terminal is exclusive, also towards programs without locks.
+
+    A pseudo-terminal is not.
+    """
 
     def exclusive() -> bool:
         near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)  # root may open it
@@ -115,7 +121,7 @@ TIOCGEXCL = 0x80045440
 
 
 def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
-    """Data that waits in the kernel is discarded, so that the board first receives the newest."""
+    """After a failed write, old data in the kernel is discarded, so that the newest comes first."""
     port = SerialPort(terminal.path, 115200)
     terminal.fill()
     with pytest.raises(LinkError, match="while writing"):
@@ -125,7 +131,7 @@ def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) 
 
 
 def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
-    """The kernel takes what it has room for, and the rest as the other end is read."""
+    """A long write is completed: the kernel takes the rest as the other end is read."""
     port = SerialPort(terminal.path, 115200)
     message = b"".join(b"%05d" % number for number in range(8000))
     reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))

@@ -60,7 +60,7 @@ def lines(ends: Ends) -> Iterator[Several]:
 
 
 def heard(far: int, words: bytes) -> bytes:
-    """Return all that has arrived, when it ends with these bytes."""
+    """Read until the received bytes end with ``words``; return all of them."""
     came = b""
     while not came.endswith(words):
         came += os.read(far, 4096)
@@ -77,7 +77,7 @@ def next_packets(lines: Several, count: int) -> set[Packet]:
 
 
 def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) -> None:
-    """Both lines are used at the same time."""
+    """Bytes keep their channel while both lines are used at the same time."""
     os.write(ends.far[0], b"drive")
     os.write(ends.far[1], b"front")
     assert next_packets(lines, 2) == {(0, b"drive"), (1, b"front")}
@@ -92,14 +92,14 @@ def read_on(lines: Several) -> NoReturn:
 
 
 def changed(lines: Several) -> dict[int, str]:
-    """Return the missing lines, once the lines have changed."""
+    """Read until the set of missing lines changes; return the missing lines."""
     with pytest.raises(LinesChanged):
         read_on(lines)
     return dict(lines.missing)
 
 
 def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Several) -> None:
-    """The remaining board still receives the stop, and its data is read."""
+    """If one line is lost, the other still carries stops to the board and data from the board."""
     ends.hang_up(0)
     lines.write(((0, b"stop"), (1, b"stop")))
     assert os.read(ends.far[1], 99) == b"stop"
@@ -111,7 +111,7 @@ def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Sev
 
 
 def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
-    """The error is that of the first line."""
+    """If no line is left, the error is that of the first line."""
     ends.hang_up(0)
     changed(lines)
     ends.hang_up(1)
@@ -170,7 +170,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The rest is written as soon as the other end's reader makes room."""
+    """The rest of a write to a full line follows in order as soon as the reader makes room."""
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 60.0)
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -186,7 +186,7 @@ def test_what_a_full_line_does_not_take_at_once_follows_in_order(
 def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
     ends: Ends, tmp_path: Path
 ) -> None:
-    """The open lines are not closed when another line is opened."""
+    """A line that comes back is opened without closing the lines that are open."""
     late = tmp_path / "late"
     paths = str(late), ends.paths[1]
     lines = Several([partial(SerialPort, path, 115200) for path in paths], retry_s=0.01)
@@ -204,13 +204,13 @@ def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
 
 
 def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
-    """The read returns without data."""
+    """A read that waits can be ended; it returns without data."""
     threading.Timer(0.02, lines.interrupt).start()
     assert lines.read() == (0, b"")
 
 
 def test_where_none_can_be_opened_none_is_kept() -> None:
-    """The error is that of the first line, and no descriptor stays open."""
+    """If no line can be opened, the error is that of the first, and no descriptor stays open."""
     before = len(os.listdir("/proc/self/fd"))
     paths = "/dev/no-such", "/dev/no-such-either"
     with pytest.raises(LinkError, match="/dev/no-such does not exist"):
@@ -219,12 +219,12 @@ def test_where_none_can_be_opened_none_is_kept() -> None:
 
 
 def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
-    """A port is exclusive, so it can be opened only once."""
+    """If two lines have the same port, one of them is missing, since a port is exclusive."""
     with contextlib.closing(Several([partial(SerialPort, ends.paths[0], 115200)] * 2)) as lines:
         assert "in use" in lines.missing[1]
 
 
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
-    """The port has no descriptor."""
+    """A port without a descriptor cannot be one of several lines."""
     with pytest.raises(LinkError, match="does not work for a board with several lines"):
         Several([partial(SerialPort, "loop://", 115200)])

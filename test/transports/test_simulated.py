@@ -43,19 +43,19 @@ def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
 
 
 def test_it_needs_no_guard_and_no_kernel() -> None:
-    """The board ends with this process, has no descriptors, and counts no overruns."""
+    """A simulated board ends with this process, has no descriptors, and counts no overruns."""
     with closing(SimulatedTransport("sim://", TOY)) as transport:
         assert transport.ends_with_us
         assert (transport.descriptors, transport.overruns) == (None, None)
 
 
 def test_a_read_ends_without_a_packet() -> None:
-    """The read ends after its time limit."""
+    """A read that gets no packet ends after its time limit."""
     assert InProcessBoard(ToyServer()).read(0.01) == (0, b"")
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
-    """Without interruption, closing a driver would wait for the next notice of a paused board."""
+    """A waiting read can be interrupted; closing would otherwise wait for a paused board."""
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
     canceller.start()
@@ -66,7 +66,7 @@ def test_a_read_that_waits_can_be_interrupted() -> None:
 
 
 def test_after_closing_nothing_is_read_and_nothing_written() -> None:
-    """The transport behaves like a lost port; a second close does nothing."""
+    """A closed transport behaves like a lost port; closing it again does nothing."""
     transport = SimulatedTransport("sim://", TOY)
     transport.close()
     transport.close()
@@ -89,7 +89,7 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
-    """The number of datagrams kept is that of a socket; each is kept whole, also an empty one."""
+    """A channel keeps as many unread datagrams as a socket, each of them whole, even if empty."""
     served = InProcessBoard(ToyServer())
     taken = [served._send(0, data) for data in [b"", *[b"ok 1"] * UNREAD_DATAGRAMS]]
     assert taken == [0, *[4] * (UNREAD_DATAGRAMS - 1), 0]
@@ -115,7 +115,7 @@ def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> 
     ],
 )
 def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -> None:
-    """The message names the command that lists the options."""
+    """The message for an unknown option names the command that lists the options."""
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, TOY)
     assert f"port '{url}' is not valid: " in str(refusal.value)
@@ -124,7 +124,10 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The exception has its cause, and is not regarded as a lost cable; the board can be closed."""
+    """The death of the board's thread is a defect with its cause, not a lost cable.
+
+    The board can still be closed.
+    """
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:
         raise ZeroDivisionError

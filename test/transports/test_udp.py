@@ -67,7 +67,7 @@ def next_packet(transport: UdpPorts) -> Packet:
 
 
 def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPorts) -> None:
-    """Both directions are tested; packets are never joined."""
+    """In both directions, each packet is one datagram; packets are never joined."""
     transport.write(((0, b"one"), (0, b"two"), (1, b"halt")))
     (first, driver), (second, _) = host.ports[0].recvfrom(99), host.ports[0].recvfrom(99)
     assert (first, second) == (b"one", b"two")
@@ -81,7 +81,7 @@ def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPort
 
 
 def test_what_comes_from_another_address_is_not_heard(host: Host, transport: UdpPorts) -> None:
-    """Anybody on the network could send to the port."""
+    """Datagrams from another address are ignored, since anybody on the network could send them."""
     transport.write(((0, b"hello"),))
     _, driver = host.ports[0].recvfrom(99)
     with socket.socket(type=socket.SOCK_DGRAM) as stranger:
@@ -118,7 +118,7 @@ def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
 
 
 def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
-    """The read returns without data."""
+    """A read that waits can be ended; it returns without data."""
     threading.Timer(0.02, transport.interrupt).start()
     assert transport.read() == (0, b"")
 
@@ -136,7 +136,7 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
     ],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
-    """The message has the expected form; the stop port is one higher."""
+    """The message for an invalid URL has the right form; the stop port, one higher, must exist."""
     with pytest.raises(LinkError, match=r"give udp://HOST:PORT"):
         UdpPorts(url, 2)
 
@@ -151,7 +151,7 @@ def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
 
 @pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])
 def test_a_host_that_is_not_known_is_refused(name: str) -> None:
-    """Any error of the resolver is reported; no descriptor stays open."""
+    """For an unknown host, any error of the resolver is reported; no descriptor stays open."""
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(LinkError, match="check the parameter `port`"):
         UdpPorts(f"udp://{name}:5000", 2)
