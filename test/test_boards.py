@@ -124,7 +124,10 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """The table has the common rows that fit the board's abilities, its defaults and own rows."""
+    """A board's table has the common rows that fit its abilities, with the board's defaults.
+
+    The table also has the board's own rows.
+    """
     own = table(
         "few",
         FEW,

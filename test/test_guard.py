@@ -95,7 +95,7 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """If old commands fill the port's buffer, the guard discards them to make room for a stop.
 
-    The old commands are not read before the guard has gone.
+    The test reads the port only after the guard has gone.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
@@ -115,7 +115,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """A guard has its own session, so ctrl-C does not reach it; it ignores SIGTERM and the like."""
+    """A guard ignores signals that are meant for the driver; ctrl-C does not reach its session."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     assert os.getsid(pid) == pid
@@ -131,7 +131,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
 ) -> None:
     """A user may run ``pkill -9 -f omnibot_driver`` while the robot drives.
 
-    The folder of a clone with its .venv has that name too.
+    The path of a clone with its .venv contains that name too.
     """
     interpreter = tmp_path / "omnibot_driver" / ".venv" / "bin" / "python"
     interpreter.parent.mkdir(parents=True)

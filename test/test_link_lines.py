@@ -150,7 +150,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 ) -> None:
     """A lost line stops the robot.
 
-    When it returns, the command from before the loss is discarded.
+    When the line returns, the command from before the loss is discarded.
     """
     lines.connect()
     lines.link.start()

@@ -95,7 +95,7 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """Slow readings of the clocks do not change the offset; a step in either direction does."""
+    """Slow readings of the clocks do not change the offset; a step of a clock changes it."""
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
     assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset
@@ -176,10 +176,7 @@ def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose)
 
 
 def test_every_frame_has_the_prefix_as_it_is() -> None:
-    """Every frame name begins with the prefix alone.
-
-    As in robot_state_publisher, no separator follows.
-    """
+    """Every frame name gets the prefix without a separator, as in robot_state_publisher."""
     assert PREFIXED.odom_frame == "robot1/odom"
     assert PREFIXED.base_frame == "robot1/base_link"
     estimate = ImuEstimate(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -188,7 +185,7 @@ def test_every_frame_has_the_prefix_as_it_is() -> None:
 
 
 def test_joint_states_are_the_manuals_wheels() -> None:
-    """After 1 m forward at 0.1 m/s, A has turned backwards, B forwards, and C not at all.
+    """After 1 m forward at 0.1 m/s, wheel A has turned backwards, B forwards, and C not at all.
 
     Values are in rad and rad/s, of wheels with a radius of 29 mm.
     """
@@ -206,7 +203,7 @@ def test_joint_states_are_the_manuals_wheels() -> None:
 
 
 def test_joints_whose_rate_is_not_known_have_none() -> None:
-    """If the wheels' rates are unknown, the array is empty, as sensor_msgs requires, not zeros."""
+    """If the wheels' rates are unknown, the array of rates is empty, as sensor_msgs requires."""
     estimate = OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), None)
     wheels = messages.turned(messages.unturned(SETTINGS.wheels), estimate, SETTINGS.wheels)
     message = messages.joint_state_message(wheels, STAMP, SETTINGS)

@@ -105,7 +105,7 @@ raise SystemExit("then the last words")
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
     """A port never gets the descriptor of a closed standard output.
 
-    Printed text would go to the board.
+    Otherwise, printed text would go to the board.
     """
     program = """
 import os, sys

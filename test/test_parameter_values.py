@@ -134,7 +134,7 @@ json_like = st.recursive(
 def test_any_value_is_either_taken_in_the_right_type_or_refused(
     parameter: Parameter, value: object
 ) -> None:
-    """The check raises no other exception, and an accepted value is accepted again."""
+    """A check raises no exception but ParameterError, and an accepted value is accepted again."""
     try:
         taken = parameter.check(value)
     except ParameterError:
@@ -145,14 +145,14 @@ def test_any_value_is_either_taken_in_the_right_type_or_refused(
 
 @pytest.mark.parametrize("wrong", [[1, 0, 1], [1, 2, 1], [1, 1, 0.5]])
 def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
-    """Factors other than 1 and -1 are refused."""
+    """Values of ``axis_signs`` other than 1 and -1 are refused."""
     with pytest.raises(ParameterError, match="each 1 or -1"):
         PARAMETERS.by_name["axis_signs"].check(wrong)
 
 
 @pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
 def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
-    """Any sequence of three values 1 or -1 is accepted; the result is a list of integers."""
+    """``axis_signs`` is any sequence of three values 1 or -1; the result is a list of integers."""
     taken = PARAMETERS.by_name["axis_signs"].check(signs)
     assert taken == [1, -1, 1]
     assert isinstance(taken, list)
@@ -164,14 +164,14 @@ def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
 def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
     parameter: Parameter, wrong: str
 ) -> None:
-    """An empty name and a leading slash are invalid in tf2."""
+    """An empty frame name, or one with a leading slash, is refused, as it is invalid in tf2."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 
 
 @pytest.mark.parametrize("wrong", ["/", "/robot1/"])
 def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
-    """A prefix with a leading slash is unknown to tf2; an empty prefix is valid."""
+    """A frame prefix with a leading slash is unknown to tf2; an empty prefix is valid."""
     with pytest.raises(ParameterError, match=r"'frame_prefix'.*such as robot1/"):
         PARAMETERS.by_name["frame_prefix"].check(wrong)
     assert PARAMETERS.by_name["frame_prefix"].check("robot1/") == "robot1/"

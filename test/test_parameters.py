@@ -147,7 +147,7 @@ def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, me
 
 @given(st.text())
 def test_any_unknown_name_is_refused(name: str) -> None:
-    """Any unknown name is refused, whether it is similar to known names, or not, or empty."""
+    """Any unknown name is refused, even if it is similar to a known name, or empty."""
     if name not in PARAMETERS.by_name and not boards.owners_of(name):
         with pytest.raises(ParameterError, match="the nearest is"):
             check_all({name: 1})
@@ -181,7 +181,7 @@ def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
 
 
 def test_values_reach_the_core_under_their_meaning() -> None:
-    """Every parameter differs from its default, so that the test finds parameters mixed up."""
+    """Every parameter differs from its default, so the test finds one in a wrong setting."""
     values = check_all(
         {
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
@@ -255,7 +255,10 @@ def test_the_file_of_parameters_is_the_table() -> None:
 
 @pytest.mark.parametrize("parameter", PARAMETERS.rows, ids=name_of)
 def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None:
-    """In the file, the comment above each parameter has description, range or choices, and unit."""
+    """In the parameter file, the comment above a parameter has description, range and unit.
+
+    Some parameters have choices in place of a range.
+    """
     text = CONFIG.read_text(encoding="utf-8")
     comment = text.split(f"\n    {parameter.name}:")[0].rsplit("\n\n", 1)[-1]
     words = " ".join(comment.replace("#", " ").split())
@@ -271,7 +274,8 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 ) -> None:
     """A speed limit above the fastest possible speed is refused.
 
-    Odometry would reject every displacement above the fastest speed, and stop without a message.
+    Odometry would reject every displacement above the fastest possible speed, and stop without a
+    message.
     """
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest

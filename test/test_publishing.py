@@ -84,7 +84,7 @@ def test_a_command_waits_for_no_events_of_publishers() -> None:
 def test_stamps_follow_simulated_time_while_there_is_any(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stamps are in simulated time while it is in use, whenever it begins; then in system time."""
+    """Stamps are in simulated time while it is active, and in system time afterwards."""
     published: list[bytes] = []
 
     def published_at_s() -> float:
@@ -207,7 +207,7 @@ class Charge:
 
 
 def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> None:
-    """The publisher of a value that only one board measures is that of the value's type.
+    """A value that only one board measures goes to the publisher for the value's type.
 
     Stamps are in ROS time, and the order of values is kept.
     """

@@ -46,7 +46,7 @@ class Sender:
         self._shared = SharedSession(bench.session, bench.events.extend, lambda _reason: None, None)
 
     def is_obeyed(self, action: Action, sent_ns: tuple[int, ...] = ()) -> bool:
-        """Send a command, and let 0.1 s pass."""
+        """Send a command and let 0.1 s pass; return whether the command was accepted."""
         try:
             self._shared.command(action, None, sent_ns)
         except CommandRefused:

@@ -83,8 +83,7 @@ def play(tape: Tape) -> Heard:
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:
-    """Return the bytes that a moving board sends, with their times; the ``silent`` ticks are left
-    out."""
+    """Return a moving board's bytes with their times, without those of the ``silent`` ticks."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     board.receive(bytes.fromhex("FF FE 01 00 0E 00 07 00 32"))
     found = []
@@ -188,7 +187,7 @@ def test_a_recording_can_be_left_before_its_end() -> None:
 def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
     """A request that is open at the recording's end is answered.
 
-    Later ones find the port closed.
+    Later requests find the port closed.
     """
     endless = ((EPOCH_NS + n * TICK_NS, data) for n, (_, data) in enumerate(itertools.cycle(TAPE)))
     stop = threading.Event()
@@ -224,7 +223,7 @@ def test_a_recording_that_breaks_off_says_so() -> None:
 
 
 def test_an_empty_recording_ends_at_once() -> None:
-    """The recording publishes nothing."""
+    """The replay of an empty recording publishes nothing and ends at once."""
     heard = play(Tape([]))
     assert heard.events == [ENDED]
     assert heard.reports == []

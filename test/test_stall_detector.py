@@ -95,7 +95,7 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """A command that seems to be sent right after a stall may have been sent before its end.
+    """A command that seems to be sent right after a stall may have been sent during the stall.
 
     The offset of the sender's clock is only as certain as the fastest message's transit time.
     """

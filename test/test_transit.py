@@ -116,7 +116,7 @@ def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_fir
 
 @given(st.sampled_from([1, -1]), st.floats(1.0, 1e6), st.booleans())
 def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, shared: bool) -> None:
-    """NTP steps the clock of a robot without a battery clock; senders on the robot step with it."""
+    """No command is refused if NTP steps the driver's clock, with or without the sender's clock."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(1000):
         now_s += 0.1
@@ -152,7 +152,7 @@ def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
 def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
     """A sender whose clock is set forward is still heard.
 
-    Its late commands are refused by that clock.
+    Its late commands are refused, since their age is judged by the new clock.
     """
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(100):
@@ -187,7 +187,7 @@ def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> 
 def test_two_senders_with_clocks_of_their_own_are_both_heard(
     one_s: float, other_s: float, turns: list[int]
 ) -> None:
-    """Two senders are heard though one clock is hours ahead of the other, and one sent before."""
+    """Two senders are heard, even if one clock is hours ahead of the other."""
     receiver, senders, now_s = Receiver(), (Sender(one_s, sent=1000), Sender(other_s)), 100.0
     for sender in senders:
         receiver.hear(sender, now_s, 0.01)
@@ -217,7 +217,7 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """Clocks that drift for ten hours, with some silences of an hour, are followed."""
+    """The driver follows clocks that drift for ten hours, with some silences of an hour."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -226,7 +226,7 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
-    """The refusal names the network, or this computer's load."""
+    """A refusal says how old the command is, and names the network or this computer's load."""
     with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
         Delay(1.2, 0.1).require("cmd_vel", 0.5)
     with pytest.raises(

@@ -38,7 +38,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB
 
 
 def trust(data: bytes) -> list[Frame]:
-    """Decode without checks, as the floor: any byte that looks like a header's begins a frame."""
+    """Decode without checks, as the floor does: whatever looks like a header begins a frame."""
     frames: list[Frame] = []
     at, size = 0, len(data) - 15
     while at < size:

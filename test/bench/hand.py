@@ -2,8 +2,9 @@
 
 """Commands two robots in turn, 40 times a second each, for a number of seconds.
 
-Arguments: seconds, namespaces. It prints one JSON array per namespace, of pairs: the steady clock's
-time in s at which a command was published, and its forward speed in the board's units.
+Arguments: seconds, namespaces. The program prints one JSON array per namespace, of pairs: the
+steady clock's time in s at which a command was published, and the command's forward speed in the
+board's units.
 """
 
 import json

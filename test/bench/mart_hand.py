@@ -2,8 +2,8 @@
 
 """Commands two MART robots in turn: another speed once a second, sometimes zero.
 
-Arguments: seconds, namespaces. It prints one JSON array per namespace, of pairs: the steady clock's
-time in s at which a speed was first published, and the speed in m/s.
+Arguments: seconds, namespaces. The program prints one JSON array per namespace, of pairs: the
+steady clock's time in s at which a speed was first published, and the speed in m/s.
 """
 
 import json

@@ -29,7 +29,7 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Upper end of the number in IMU frames, which counts up from 0 to it and down again."""
+"""Largest number in IMU frames; the number counts up from 0 to TURN and down again."""
 NOISE = 997
 """Number of different noise readings, which are repeated."""
 

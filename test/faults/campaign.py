@@ -140,7 +140,7 @@ class Campaign(Outcome):
             print("the log ends:", *rig.driver.lines[-20:], sep="\n    ", flush=True)
 
     def judge(self, rig: Rig, *, damaged_bytes: bool = True) -> None:
-        """Compare the messages published with one rig with those that its board sent."""
+        """Compare the messages that one rig's driver published with those that its board sent."""
         rig.judge_stream(damaged_bytes)
         self.published += rig.findings.published
         self.wrong += rig.findings.wrong

@@ -187,7 +187,10 @@ def unplugged_while_somebody_drives_on(rig: Rig) -> None:
 
 
 def estop(rig: Rig) -> None:
-    """Latch the e-stop through all events; after its release the old command has no effect."""
+    """Keep the e-stop latched while the board reboots, the cable is pulled, and commands continue.
+
+    After the release of the e-stop, the old command must have no effect.
+    """
     rig.drive()
     answer = rig.probe.call(SetBool, "estop", data=True)
     rig.findings.expect(answer.success, "the e-stop was refused")

@@ -2,7 +2,7 @@
 
 """Ways in which a driver ends while the robot drives: on request, by a defect, or by force.
 
-Each ending names the Python that is first run in the driver's process, and leaves a rig without a
+Each ending names the Python code that runs first in the driver's process. It leaves a rig without a
 driver.
 """
 

@@ -24,7 +24,7 @@ ESTOPPED_S: Final = 0.3 - GRACE_S
 ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
-"""Additional time in s for a stop after the driver has ended; it is the guard that repeats Stop."""
+"""Additional time in s for a stop by the guard, which has to repeat Stop after the driver's end."""
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:

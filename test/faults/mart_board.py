@@ -2,7 +2,7 @@
 
 """The MART controller's part of the fault campaign: datagrams, no stream, and blocking motions.
 
-Its faults are those of a network, which loses, doubles and delays complete datagrams. The names of
+The faults are those of a network, which loses, doubles and delays complete datagrams. The names of
 cases say where a fault exceeds what the driver assumes of a network.
 """
 

@@ -37,7 +37,7 @@ REST_TICKS: Final = round(1.0 / TICK_S)
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
-"""Variance of x soon after a reset of odometry, in m²; acceleration assumed in a gap, in m/s²."""
+"""Variance of x just after an odometry reset, in m²; acceleration in a gap of data, in m/s²."""
 WRONG_ONE_IN: Final = 500
 """At most one message in this number may be wrong while one byte in 100 is lost."""
 ENDS_WITHIN_S: Final = 2.0
@@ -226,7 +226,7 @@ class Rig:
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 
     def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
-        """Expect the driver to end in the allowed time plus ``late_s``, with a right exit code."""
+        """Expect the driver to end at most ``late_s`` too late, with one of these exit codes."""
         begin_s = time.monotonic()
         try:
             code = self.driver.process.wait(PATIENCE_S)
@@ -240,7 +240,7 @@ class Rig:
         )
 
     def expect_obeys_again(self) -> None:
-        """Expect a fresh command to move the robot, and the robot to rest after the last one."""
+        """Expect a fresh command to move the robot, and the end of commands to stop it."""
         self.probe.wait_for_state("nominal")
         self.drive()
         self.hand.leave()

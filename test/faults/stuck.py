@@ -46,7 +46,7 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full: the driver opens it repeatedly and reports it once, then recovers."""
+    """Keep the port full: the driver reopens it repeatedly, reports this once, then recovers."""
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(rig.kind.old_command):

@@ -38,7 +38,7 @@ def test_the_robot_stands_still_and_obeys_again(case: Case[Rig], rig: Rig) -> No
 
 
 def test_random_input_from_ros_does_not_disturb_the_node(rig: Rig) -> None:
-    """After 1000 random messages and calls, all calls are answered and readings still published."""
+    """During 1000 random messages and calls, all calls are answered and readings are published."""
     fuzz(rig, 1000, Random(0))
     rig.expect_obeys_again()
     assert not rig.findings.take(), rig.driver.output

@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""Longest time from the commander's leave until the robot rests, in s.
+"""Longest time in s from the end of commands until the robot rests.
 
 A driver that has received no data for a while must first see that the robot moves.
 """

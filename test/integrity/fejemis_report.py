@@ -50,8 +50,8 @@ Stream = list[dict[int, bytes]]
 class Score:
     """Counts of published values, which can be added.
 
-    ``sent``: values that undamaged lines lead to; ``astray_m``: greatest error of the odometry, in
-    m.
+    ``sent``: number of values with undamaged lines; ``astray_m``: greatest error of the odometry,
+    in m.
     """
 
     sent: int = 0

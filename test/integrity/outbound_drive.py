@@ -148,7 +148,7 @@ class _Rehearsal:
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
         """Leave as the link does: send Stop until the robot is at rest, then watch it in silence.
 
-        If it does not come to rest, the guard writes.
+        If the robot does not come to rest, the guard writes.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)

@@ -248,7 +248,7 @@ def goal(random: Random) -> Scene:
 
 
 def leave(random: Random) -> Scene:
-    """Make a scene in which the driver ends while commands continue, some with a latched e-stop."""
+    """Make a scene in which the driver ends during commands, perhaps with a latched e-stop."""
     exits_s = FROM_S + random.uniform(0.1, 0.3)
     wishes = driving(random, FROM_S, exits_s, by_wheels=_wheels(random))
     if random.random() < 0.2:
@@ -265,7 +265,7 @@ def leave(random: Random) -> Scene:
 
 
 def kill(random: Random) -> Scene:
-    """Make a scene in which the driver is killed, maybe within a write; then its guard writes."""
+    """Make a scene in which the driver is killed, perhaps within a write; then its guard writes."""
     wishes, last_s = _leg(random)
     killed_s = last_s + random.choice((0.0002, 0.0007, 0.0012, 0.002, 0.02))
     if random.random() < 0.2:

@@ -2,7 +2,7 @@
 
 """Parser of the driver's writes, by the manual's layout alone.
 
-It knows zeros, control frames and letters, and uses no code of the driver.
+The parser knows zeros, control frames and letters, and uses no code of the driver.
 """
 
 from dataclasses import dataclass

@@ -2,9 +2,9 @@
 
 """Robots that obey, on bad floors and among people: does the motion monitor stop them?
 
-Each robot has its own motors, controllers, scales and line, 5 % slip and a slope. The commander of
-a robot changes its manners every few seconds; people hold, carry and push the robot. Everything is
-in simulated time.
+Each robot has its own motors, controllers, scales and line, 5 % slip and a slope. A robot's
+commander changes its way of commanding every few seconds; people hold, carry and push the robot.
+Everything is in simulated time.
 """
 
 import math

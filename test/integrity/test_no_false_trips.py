@@ -11,14 +11,14 @@ from rough_drive import RoughDrive
 def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
     seed: int, delta_period_s: float
 ) -> None:
-    """The robots obey in spite of slip, slope, delays, and people who push or carry them."""
+    """Robots that obey are not stopped, in spite of slip, slope, delays, and people around."""
     outcome = RoughDrive(seed, delta_period_s).go(60.0)
     assert outcome.trips == []
     assert outcome.happened.total() > 0
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """In the same drive a robot whose wheels turn twice as fast as commanded trips the monitor."""
+    """In a rough drive, a robot with wheels twice as fast as commanded trips the monitor."""
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)
     assert drive.go(30.0).trips

@@ -60,7 +60,7 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """Each receiver plays one script; it must keep the limits, as far as a short run shows them."""
+    """Each receiver plays one script and keeps the limits, as far as a short run can show."""
     scores, _ = one(0.05, (scene, 0), LOSSES)
     for fault in LOSSES:
         score = Score()
@@ -142,7 +142,7 @@ def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
 
 
 def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
-    """The judge counts a trial in which the robot still drives.
+    """The judge reports a robot that still drives.
 
     All bytes after a certain one are lost, so Stop never arrives.
     """

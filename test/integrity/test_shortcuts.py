@@ -84,7 +84,10 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_streams_come_out_alike(scenario: str, fault: str, chunker: str) -> None:
-    """With and without shortcuts, each call returns the same frames and counts, damaged or not."""
+    """With and without shortcuts, the decoder returns the same frames and counts at each call.
+
+    The streams are damaged or undamaged.
+    """
     chunks = chunks_of(scenario, fault, chunker, 1)
     assert outcome(chunks, quick=True) == outcome(chunks, quick=False)
 

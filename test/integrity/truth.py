@@ -2,9 +2,9 @@
 
 """Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
 
-It is typed from the manual's layouts with ``struct`` and shares nothing with the driver. Sensor
-noise is that of an MPU6050 with its filter on: about 46 counts of the accelerometer, 6.5 of the
-gyro.
+The generator is typed from the manual's layouts with ``struct`` and shares nothing with the driver.
+Sensor noise is that of an MPU6050 with its filter on: about 46 counts of the accelerometer, 6.5 of
+the gyro.
 """
 
 import math

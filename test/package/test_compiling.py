@@ -103,6 +103,6 @@ def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path:
 
 
 def test_nothing_is_compiled_unless_it_is_asked_for(tmp_path: Path) -> None:
-    """A build without the variable searches neither for mypyc nor for a compiler."""
+    """A build without ``OMNIBOT_DRIVER_COMPILE`` searches neither for mypyc nor for a compiler."""
     assert "compiled" not in built(tmp_path, "raise SystemExit(1)", "no C", wanted="0")
     assert not compiled_modules(tmp_path / "lib")

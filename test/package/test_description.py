@@ -72,7 +72,7 @@ def test_the_joints_are_those_of_joint_states() -> None:
 
 
 def test_the_frames_are_those_of_the_driver() -> None:
-    """base_link is the root, since odom is its parent and a frame has only one."""
+    """base_link is the root, since odom is its parent and a frame has only one parent."""
     assert ROBOT.get_root() == PARAMETERS.by_name["base_frame"].default
     assert {PARAMETERS.by_name["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
 

@@ -75,7 +75,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 
 def test_what_the_driver_tells_is_explained() -> None:
-    """A sentence of the guide has each message's beginning, or consists of parts of the message."""
+    """For each message, a sentence of the guide has its beginning or consists of its parts."""
 
     def is_explained(template: str) -> bool:
         begin = next((part for part in template.split(GAP) if len(part) > 9), template)
@@ -94,7 +94,7 @@ def test_every_state_is_explained() -> None:
 
 
 def test_every_status_of_the_diagnostics_has_its_row() -> None:
-    """The guide's rows of diagnostics are in the order in which the driver publishes them."""
+    """The rows of the guide are the statuses of the diagnostics, in the order of publication."""
     code = (ROOT / "omnibot_driver/core/reporting/diagnosis.py").read_text()
     names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
     rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)
@@ -103,7 +103,7 @@ def test_every_status_of_the_diagnostics_has_its_row() -> None:
 
 
 def test_the_tour_shows_what_the_driver_says() -> None:
-    """The driver can still print the tour's warnings and errors, except for inserted values."""
+    """Each warning and error in the tour is a message of the driver, except for inserted values."""
     patterns = [
         re.compile(".*".join(map(re.escape, template.split(GAP))))
         for template in said().splitlines()

@@ -124,7 +124,7 @@ def parameters(record: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("path", LAUNCH_FILES, ids=lambda path: path.name)
 def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
-    """Every file of this package to which it refers is in an installed folder of the repository."""
+    """Every file of this package that a launch file names is in an installed folder."""
     strings = [
         node.value
         for node in ast.walk(ast.parse(path.read_text()))
@@ -142,7 +142,7 @@ def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
 def test_the_driver_has_every_parameter_that_is_offered() -> None:
     """At least one board has each parameter that the launch file offers.
 
-    A driver without such a parameter would end.
+    An unknown parameter would end the driver.
     """
     tree = ast.parse((ROOT / "launch/driver.launch.py").read_text())
     (offered,) = (
@@ -288,7 +288,7 @@ def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]
 
 @needs_launch
 def test_the_simulation_is_the_driver_with_a_board_inside(launch: Callable[..., Started]) -> None:
-    """There is only one process; options of the board and the driver's arguments can be given."""
+    """The simulation has one process, which takes options of the board and of the driver."""
     started = launch("simulation.launch.py", "namespace:=robot1")
     assert set(started) == {"driver"}
     assert parameters(started["driver"])["port"] == "sim://"

@@ -49,7 +49,7 @@ def test_without_wheels_one_sentence_points_to_jazzy(
 
 
 def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
-    """``.venv`` is a link to another environment, which make must not clear."""
+    """make must not clear a ``.venv`` that is a link to another environment."""
     (tmp_path / "theirs").mkdir()
     (tmp_path / "theirs/kept").touch()
     (tmp_path / "venv").symlink_to(tmp_path / "theirs")

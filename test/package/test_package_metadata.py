@@ -218,7 +218,7 @@ def test_the_core_imports_itself_and_pure_modules_only() -> None:
 
 
 def test_the_simulator_shares_nothing_with_the_core() -> None:
-    """The simulator uses no code of the driver, so that they do not misread the manual alike."""
+    """The simulator uses no code of the driver, so that one misreading cannot affect both."""
     shared = {
         f"{file.relative_to(ROOT)}: {name}"
         for file in python_files(f"{PACKAGE}/simulator")
@@ -246,7 +246,7 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
 
 
 def test_every_source_file_says_whose_it_is() -> None:
-    """The first line has the owner, and the licence that package.xml declares."""
+    """The first line of each file names the owner, and the licence that package.xml declares."""
     line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
     files = python_files(PACKAGE, "docs", "launch", "test", "setup.py")
     without = [str(file) for file in files if file.read_text().partition("\n")[0] != line]

@@ -34,7 +34,7 @@ OFFERED = rules([line.lstrip("#") for line in LINES if line.lstrip("#").startswi
 
 
 def test_every_rule_matches_before_it_assigns() -> None:
-    """Keys and operators are those that udev knows."""
+    """Keys and operators of each rule are those that udev knows."""
     for rule in ACTIVE + OFFERED:
         for key, (operator, _) in rule.items():
             assert key in MATCHES | ASSIGNMENTS
@@ -77,7 +77,7 @@ def unit_settings() -> dict[str, list[str]]:
 
 
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
-    """The unit starts no shell between, because signals must reach the driver itself."""
+    """The unit starts the driver without a shell, because signals must reach the driver itself."""
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
     assert re.search(r'&& +exec "\S+/lib/omnibot_driver/driver" +--ros-args ', command)

@@ -43,7 +43,7 @@ def parameters(name: str, node: str) -> dict[str, Any]:
 
 
 def driver_names() -> set[str]:
-    """Return the topics and services in the driver's code, relative to its namespace."""
+    """Return the driver's topics and services, relative to its namespace, as its code has them."""
     calls = [
         node
         for source in (ROOT / NODE).glob("*.py")
@@ -85,7 +85,10 @@ def test_ros_reads_each_parameter_file(path: Path) -> None:
 
 
 def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
-    """Velocities are fused from odom, the yaw rate from both; only the filter publishes TF."""
+    """The filter fuses velocities from odom, and the yaw rate from odom and the IMU.
+
+    Only the filter publishes TF.
+    """
     ekf = parameters("ekf.yaml", "/**")
     states = [
         *("x", "y", "z", "roll", "pitch", "yaw"),
@@ -119,7 +122,7 @@ def test_nav2_keeps_to_the_drivers_limits() -> None:
 
 
 def test_nav2_knows_that_the_robot_moves_sideways() -> None:
-    """Localization, control and thresholds allow sideways motion."""
+    """Localization, control and thresholds of Nav2 allow sideways motion."""
     file = load("nav2_omnibot.yaml")
     controller = file["controller_server"]["ros__parameters"]
     assert controller["FollowPath"]["motion_model"] == "Omni"
@@ -129,7 +132,7 @@ def test_nav2_knows_that_the_robot_moves_sideways() -> None:
 
 
 def test_nav2_uses_the_drivers_topics_and_frames() -> None:
-    """Topics of odometry and commands, and all frames, are the driver's."""
+    """Nav2's topics of odometry and commands, and all its frames, are the driver's."""
     file = load("nav2_omnibot.yaml")
     assert set(everything_under("odom_topic", file)) == {"odom"} <= DRIVER
     assert set(everything_under("cmd_vel_out_topic", file)) == {"cmd_vel"} <= DRIVER
@@ -147,7 +150,7 @@ def test_every_critic_that_is_tuned_is_used() -> None:
 
 
 def test_the_mux_is_locked_by_the_drivers_estop() -> None:
-    """The lock's topic is the driver's latched Bool, with a higher priority than every source."""
+    """The mux's lock listens to the driver's latched Bool, and has priority over all sources."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     (lock,) = mux["locks"].values()
     assert lock["topic"] == f"{NODE}/estop_active"
@@ -167,7 +170,7 @@ def test_the_mux_passes_on_what_the_driver_takes() -> None:
 
 
 def test_rviz_shows_topics_and_frames_that_exist() -> None:
-    """Names are relative, so that a display can be put into a robot's namespace."""
+    """RViz's names are relative, so that a display can be put into a robot's namespace."""
     rviz = yaml.safe_load((ROOT / "rviz/omnibot.rviz").read_text())["Visualization Manager"]
     topics = {
         topic["Value"]
@@ -187,7 +190,7 @@ def test_foxglove_shows_topics_and_services_that_exist() -> None:
 
 
 def test_foxglove_lays_out_every_panel_once() -> None:
-    """A panel without a place is not drawn, and a place without settings is empty."""
+    """In Foxglove, a panel without a place is not drawn, and a place without settings is empty."""
     layout = json.loads((CONFIG / "foxglove.json").read_text())
     places = list(everything_under("first", layout)) + list(everything_under("second", layout))
     panels = [place for place in places if isinstance(place, str)]

@@ -68,7 +68,7 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
 
 
 def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Terminal) -> None:
-    """The kernel keeps 15 bytes of a name, and a letter may have two."""
+    """The kernel cuts a program's name after 15 bytes, perhaps within a letter of two bytes."""
     own = Path("/proc/self/comm")
     before = own.read_bytes()
     port = SerialPort(terminal.path, 115200)
