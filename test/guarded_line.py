@@ -77,7 +77,7 @@ def started(pid: int) -> None:
     bit = 1 << (signal.SIGTERM - 1)
     while not int(status_of(pid, "SigIgn"), 16) & bit:
         assert time.monotonic() < end
-        time.sleep(0.005)  # a process changes what it ignores without an event
+        time.sleep(0.005)  # no event reports that a process ignores a signal
 
 
 def status_of(pid: int, field: str) -> str:
@@ -91,7 +91,7 @@ def alive(keeper: Keeper, seconds: float) -> float:
     longest_s = 0.0
     while (now := time.monotonic()) < begun_s + seconds:
         keeper.beat(now)
-        time.sleep(0.05)  # the driver's own pace is what is simulated
+        time.sleep(0.05)  # this simulates the driver's own pace
         longest_s, beaten_s = max(longest_s, time.monotonic() - beaten_s), now
     return longest_s
 
@@ -102,7 +102,7 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
     while not predicate():
         assert time.monotonic() < end
         told += keeper.beat(time.monotonic())
-        time.sleep(0.05)  # the driver's own pace is what is simulated
+        time.sleep(0.05)  # this simulates the driver's own pace
     return told
 
 

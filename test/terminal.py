@@ -24,7 +24,7 @@ def fill(descriptor: int, words: bytes = b"x", *, full_s: float = 0.2) -> None:
             while True:
                 taken += os.write(descriptor, words[taken % len(words) :])
                 full = 0
-        time.sleep(0.01)  # no event says that the kernel has moved it
+        time.sleep(0.01)  # no event says that the kernel has moved data
 
 
 class Terminal:

@@ -89,7 +89,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
     ):
         theirs = serialize_message(message)
         assert padded(ours, theirs) == theirs[: len(ours)]
-        STORE.deserialize_cdr(ours, message_name(message))  # minds every byte too many
+        STORE.deserialize_cdr(ours, message_name(message))  # raises at any surplus byte
         kind = type(message)
         assert deserialize_message(ours, kind) == deserialize_message(theirs, kind)
 

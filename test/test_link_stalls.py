@@ -96,7 +96,7 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     assert board.wait_for(lambda b: kinds(b)[-1:] == ["wheels"], PATIENCE_S)
     listener.wait_for(lambda: any("for 36" in str(event) for event in listener.events))
     with pytest.raises(CommandRefused, match="waited"):
-        drive([time.time_ns() - 1_000_000_000])  # from during the suspension, by a running clock
+        drive([time.time_ns() - 1_000_000_000])  # sent during the suspension
     listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
     assert board.wait_for(lambda b: kinds(b)[-1:] == ["velocity"], PATIENCE_S)
     link.close("stop")

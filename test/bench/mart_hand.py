@@ -37,7 +37,7 @@ def main() -> None:
                     sent[which].append((time.monotonic(), twist.linear.x))
                 publisher.publish(twist)
             first = False
-            time.sleep(REPEAT_S)  # the rate of a node that commands is what is simulated
+            time.sleep(REPEAT_S)  # the rate of a node that commands a robot
         number += 1
     print(json.dumps(sent), flush=True)
 

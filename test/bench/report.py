@@ -15,7 +15,7 @@ from pathlib import Path
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # users have their bytecode, too
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # its generator of streams
+sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # for the generator of streams
 
 import core
 import small

@@ -124,7 +124,7 @@ def _table(parts: Sequence[float], seconds: float) -> list[str]:
 def _row(part: float, stage: Stage, seconds: float) -> str:
     with ear(*NAMES) as listener:
         with Program(str(HERE / "hand.py"), str(seconds), NAMES[0]) as hand:
-            sent = hand.result()[0]  # the start of that process disturbs what measures
+            sent = hand.result()[0]  # the start of hand.py disturbs the other processes
         time.sleep(STOPPING_S)
         result = listener.result()
     start, last = sent[0][0], sent[-1][0]

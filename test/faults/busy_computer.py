@@ -45,7 +45,7 @@ class PiecesTerminal(Terminal):
         self._sent_at = now
         for at in range(0, len(data), PIECE):
             piece = data[at : at + PIECE]
-            time.sleep(len(piece) * BYTE_S)  # the pace of the line is what is simulated
+            time.sleep(len(piece) * BYTE_S)  # this simulates the pace of the line
             sent += super()._send(channel, piece)
         return sent
 

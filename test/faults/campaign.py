@@ -127,9 +127,9 @@ class Campaign(Outcome):
             row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
             if again:
                 rig.expect_obeys_again()
-        except Exception as error:  # whatever it is, the others still run
+        except Exception as error:  # the other cases run after any error
             rig.findings.expect(False, f"{row.name}: {error!r}")
-            rig.line.heal()  # it is judged: the next case has an undamaged line
+            rig.line.heal()  # the next case needs an undamaged line
         row.tried += 1
         rig.findings.stood_after_s.clear()
         complaints = [f"{row.name}: {complaint}" for complaint in rig.findings.take()]

@@ -108,7 +108,7 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
         try:
             publisher.publish(no_message(random) if odd else message(random))
         except RCLError:
-            assert odd  # our own middleware refuses to send it
+            assert odd  # our own middleware refuses to send such bytes
     for future in futures:
         probe.wait_for_future(future)
     probe.call(SetBool, "estop", data=False)

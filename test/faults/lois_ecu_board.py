@@ -40,9 +40,9 @@ BOARD: Final = RigBoard(
     ),
     off_within_s=0.1,
     old_bytes_s=1.8,  # 20 kB at 115200 baud, received byte by byte
-    ends_later_s=1.5,  # it shows a stand after 0.6 s, which is waited for twice
-    deaf_s=0.6,  # lines are lost while it sends; a lost port is open again after 0.5 s
-    silent_s=0.2,  # between two groups
+    ends_later_s=1.5,  # a standstill shows after 0.6 s; the driver waits for it twice
+    deaf_s=0.6,  # commands are lost while the board sends; a lost port is open again after 0.5 s
+    silent_s=0.2,  # the pause between two groups of reports
     imu=False,
     jump_stddevs=4.0,
     without=frozenset(

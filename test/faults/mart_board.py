@@ -263,7 +263,7 @@ BOARD: Final = RigBoard(
     wheels=0,
     services=frozenset({"reset_odometry", "estop"}),
     tuning=(),
-    off_within_s=0.3,  # a stop within a start waits for its beginning
+    off_within_s=0.3,  # a stop during a start waits until the motion has begun
     ends_later_s=2.0,
     imu=False,
     jump_stddevs=4.0,
@@ -273,7 +273,7 @@ BOARD: Final = RigBoard(
     cases=cases,
     without=frozenset(
         {
-            "faults_of_the_network",  # these are of a server of serial lines
+            "faults_of_the_network",  # the faults of a server of serial lines
             "faults_of_goals",
             "goal_ending",
             "losses",

@@ -45,7 +45,7 @@ class Terminal(PtyBoard):
 
     def _receive(self, timeout_s: float) -> Iterable[Packet]:
         if self.deaf:
-            time.sleep(timeout_s)  # in its place: the time of a board's tick
+            time.sleep(timeout_s)  # in place of the read, which lasts for a tick
             return []
         heard = list(super()._receive(timeout_s))
         if not heard:

@@ -81,7 +81,7 @@ def score(truth: list[Report], lines: int, stream: Stream) -> Score:
     at = 0
     for report in found:
         text = repr(report)
-        if not left[text]:  # NaN is equal to no other
+        if not left[text]:  # texts, because NaN is not equal to NaN
             result.wrong += 1
             continue
         place = next((n for n in range(at, len(truth)) if repr(truth[n]) == text), None)

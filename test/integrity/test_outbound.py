@@ -68,7 +68,7 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
             if key[0] == fault:
                 score += more
         if scene in ENDED:
-            bound = replace(BOUNDS[fault], share=1.0, long_in=0.0)  # too few for a rate
+            bound = replace(BOUNDS[fault], share=1.0, long_in=0.0)  # too few frames for a rate
             assert not bound.missed(score), shown(score)
         else:
             assert score.uncommanded_s < 0.12 * score.driving_s

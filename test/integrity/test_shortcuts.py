@@ -105,7 +105,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
     for data, pause_s in arrivals:
         now += pause_s
         chunks.append((data, now))
-    ways = [repr(outcome(chunks, quick=quick)) for quick in (True, False)]  # NaN is not NaN
+    ways = [repr(outcome(chunks, quick=quick)) for quick in (True, False)]  # NaN != NaN
     assert ways[0] == ways[1]
 
 

@@ -33,7 +33,7 @@ needs_launch = pytest.mark.skipif(
     reason="launch or launch_ros is not installed",
 )
 
-# It replaces every executable, and records its arguments and the content of its parameter files.
+# This program replaces every executable, and records the arguments and the parameter files.
 RECORDER = f"""#!{sys.executable}
 import json, os, pathlib, sys
 arguments = sys.argv[1:]
