@@ -111,7 +111,7 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """A set point of the write before is no error; a set point with a changed bit is an error."""
+    """A set point of the write before is right; a set point with a changed bit is an error."""
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")
     judge = Judge()

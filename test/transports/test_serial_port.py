@@ -60,7 +60,7 @@ def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None
 
 
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
-    """A second user of a port is told who has it: the kernel's list of locks names the owner."""
+    """The error for a second user of a port names the owner, from the kernel's list of locks."""
     port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
         SerialPort(terminal.path, 115200)
