@@ -184,6 +184,6 @@ def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> No
 def test_any_number_of_wheels_is_serialised_as_rclpy_does(wheels: Any) -> None:
     """A JointState with any number of wheels is serialized as by rclpy.
 
-    Without wheels there is none.
+    Without wheels, joint_states is not published.
     """
     assert difference(MessageSettings.from_parameters(boards.check_all({}), wheels)) == ""

@@ -175,7 +175,7 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
     """A port that no guard can share is reported once.
 
-    Only the driver itself can stop the robot.
+    Without a guard, only the driver itself can stop the robot.
     """
     listener = Listener()
     link = link_to("loop://", listener, session())

@@ -114,7 +114,7 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 
 
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
-    """The error of a delivery is raised in its thread; the next thread delivers the rest."""
+    """The delivering thread raises the error of a delivery; the next thread delivers the rest."""
     outbox = Outbox()
     left: list[int] = []
 

@@ -91,7 +91,7 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 ) -> None:
     """A late command is refused after any silence of any sender.
 
-    The next one in time is accepted.
+    The next command that comes in time is accepted.
     """
     receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
     for number in range(10):

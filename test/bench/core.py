@@ -187,7 +187,7 @@ def _us_per_frame(work: object, data: object, frames: int) -> float:
 
 
 def _seconds(work: object, data: object) -> float:
-    """Return the processor time of ``work(data)`` in s, which other processes hardly influence."""
+    """Return the processor time of ``work(data)`` in s; other processes hardly influence it."""
     assert callable(work)
     gc.collect()
     begun = time.process_time()

@@ -201,9 +201,10 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Run all stops of one life of a driver for each number, on a line that loses bytes.
+        """For each of ``numbers``, run all stops of a new driver while bytes to its board are lost.
 
-        Bytes to the board are lost until the result of the last stop is judged.
+        ``number_of_life``: place of these stops in LIVES. Bytes are lost until the last stop is
+        judged.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

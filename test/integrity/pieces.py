@@ -18,7 +18,7 @@ Job = TypeVar("Job")
 
 
 def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes]:
-    """Damage a line; return the pieces without the bytes it loses, and with those it adds."""
+    """Damage a line; return the pieces without the lost bytes, and with the added ones."""
     whole = b"".join(pieces)
     ends, at = [], 0
     for piece in pieces:

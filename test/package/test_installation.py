@@ -142,7 +142,7 @@ def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Pat
 
 
 def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, prefix: Path) -> None:
-    """Both programs are started from their installed places; ctrl-C ends the driver in order."""
+    """Driver and simulator are started from their installed places, and ctrl-C ends the driver."""
     executables = prefix / "lib" / PACKAGE
     board = workspace / "board"
     simulator = in_workspace(workspace, [executables / "simulator", "--link", board])

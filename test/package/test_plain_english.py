@@ -44,7 +44,7 @@ PATTERNS = {
     "lattice": r"lattices?",
     "farewell": r"farewells?",
 }
-"""By its name: the pattern of a phrase that must not be used, as full words."""
+"""By the name of a phrase that must not be used, the phrase's pattern, as full words."""
 
 ALLOWED = {
     "test/package/test_plain_english.py": "names the phrases",

@@ -13,7 +13,7 @@ MOST_EXAMPLES = 200
 
 
 def quick_folders() -> list[str]:
-    """Return the folders that the Makefile names."""
+    """Return the folders of the quick tests, which are named in the Makefile."""
     found = re.search(r"^QUICK := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert found
     return found[1].split()

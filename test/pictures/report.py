@@ -33,7 +33,7 @@ STOPPED_ON_LEG = 6
 
 
 def main(folder: Path) -> None:
-    """Write ``report_path.png`` and the others; print the verdict."""
+    """Write ``report_path.png`` and the other pictures of the report; print the verdict."""
     rclpy.init()
     with ExitStack() as stack:
         stack.callback(rclpy.shutdown)

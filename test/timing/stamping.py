@@ -3,7 +3,7 @@
 """Stamps of a generated line, compared with its true sampling times.
 
 The line is that of ``test/integrity``, with a skewed crystal; decoder and clock are the driver's,
-used as in a session. What must hold for every stamp is asserted on the way.
+used as in a session. Each run also asserts what must hold for every stamp.
 """
 
 import math

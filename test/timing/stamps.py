@@ -114,7 +114,7 @@ def lines_and_events(seconds: float, seeds: int) -> None:
 
 
 def busy_readers(seconds: float, seeds: int) -> None:
-    """Measure with hosts that read late."""
+    """Measure the stamps of hosts that read late."""
     cells = [(line, n, mode, "none") for line in BUSY for n in LOSSES[:2] for mode in SCENARIOS]
     found = measured(cells, seconds, seeds)
     rows = {f"{line} | {n:g} | {mode}": figures for (line, n, mode, _), figures in found.items()}

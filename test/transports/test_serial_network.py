@@ -103,7 +103,7 @@ def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
 def test_a_board_behind_rfc2217_is_served_as_well() -> None:
-    """The server is pyserial's own example of a serial port server."""
+    """A port also works through a server by RFC 2217, here the example server of pyserial."""
     board_side = serial.serial_for_url("loop://", timeout=0.05)
     listener = socket.create_server(("127.0.0.1", 0))
     done = threading.Event()

@@ -97,7 +97,7 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
 ) -> None:
     """A real terminal is exclusive, also towards programs without locks.
 
-    A pseudo-terminal is not.
+    A pseudo-terminal is not exclusive.
     """
 
     def exclusive() -> bool:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of other packages for the LOIS ECU: its topics, limits, and no sideways motion."""
+"""Settings of other packages for the LOIS ECU have its topics and limits, no sideways motion."""
 
 from pathlib import Path
 from typing import Any
