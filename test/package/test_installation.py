@@ -126,7 +126,7 @@ def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
 
 
 def test_colcon_installs_the_executables(prefix: Path) -> None:
-    """``ros2 run`` offers every file in lib/omnibot_driver, so only executables are there."""
+    """``ros2 run`` offers the executables in lib/omnibot_driver, which has no other files."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
     executables = {"calibrate", "demo", "driver", "monitor", "report", "simulator"}
     assert {file.name for file in files} == executables
