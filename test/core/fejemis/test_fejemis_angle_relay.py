@@ -33,7 +33,7 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """Most angles are sent to 0.1°; some are rounded further, to be safe from lost characters."""
+    """Most angles are sent in steps of 0.1°; some are rounded more, so that damage is noticed."""
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -41,9 +41,9 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """Angles to the right with a digit 6 are exceptions: they become less than 10° to the left.
+    """The loss of two characters can change only angles to the right that have a digit 6.
 
-    Fewer than a tenth of all angles are exceptions.
+    The changed angle is less than 10° to the left. Fewer than a tenth of all angles can change.
     """
     across = 0
     for angle_deg in EVERY:
@@ -60,7 +60,7 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """Characters of the checksum and the line end may be lost too; the reader is lenient."""
+    """Characters of the checksum may be lost too, and the reader in this test is lenient."""
     text = relayed(angle_deg)
     data = line(text, sums=True)
     for count in (1, 2):
@@ -69,7 +69,7 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
-    """Every notation has a minus sign and a 6, and a checksum does not detect the loss of both."""
+    """An angle of -60° to -69° has a minus sign and a 6; no checksum detects the loss of both."""
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
         assert {"-", "6"} <= {*f"{angle_deg}"}
@@ -91,9 +91,9 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """Without checksums whole degrees are sent, of which any loss leaves a smaller number.
+    """Without checksums, whole degrees are sent, and lost characters never leave more than 90°.
 
-    The inner wheel would be the faster one only at an angle beyond 90°.
+    Only beyond 90° would the inner wheel be faster than the outer one.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)

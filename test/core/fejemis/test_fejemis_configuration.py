@@ -25,7 +25,7 @@ WRITTEN: dict[Written, tuple[float, ...]] = {
 
 
 def test_only_what_the_user_set_is_written() -> None:
-    """Without settings by the user nothing is written; diagnostics show what is read."""
+    """Without settings by the user nothing is written; diagnostics show the boards' values."""
     bench = nominal()
     bench.run(3.0)
     words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -43,7 +43,7 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """Each setting is written to the board that uses it, again after a restart of that board."""
+    """Each setting is written to the board that uses it, and again if that board restarts."""
     from omnibot_driver.simulator.fejemis import Firmware
 
     bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
@@ -68,14 +68,14 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
 
 
 def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
-    """A notice names a setting that stays unset after some tries, here an impossible radius."""
+    """A notice names a setting that a board does not keep; here it is an impossible radius."""
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
     bench.run(6.0)
     assert any("confw" in text for text in bench.notices)
 
 
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """Help text and command differ in the order of values; the track in ``conf`` decides."""
+    """``confs`` lists track and wheelbase in either order; the track in ``conf`` shows which."""
     for turned in (False, True):
         configuration = Configuration("drive", {})
         for _ in range(2):
@@ -85,7 +85,7 @@ def test_the_order_of_the_steering_geometry_is_found_out() -> None:
 
 
 def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_not_take() -> None:
-    """The user's geometry holds before the first reading, and after the board has reported it."""
+    """The driver uses the user's geometry only until the board has reported its own."""
     configuration = Configuration("drive", {Written.STEERING: (0.35, 0.45)})
     wanted, reported = Geometry(0.35, 0.45), Geometry(0.4, 0.42)
     assert configuration.geometry == wanted
@@ -124,7 +124,7 @@ def test_what_was_written_and_read_once_is_not_written_again() -> None:
 
 
 def test_a_small_change_by_the_user_is_written() -> None:
-    """A change within the tolerance for numbers read back is written too, once."""
+    """A setting that the user changes is written, even if the change is very small."""
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
     bench.run(2.0)
@@ -137,7 +137,7 @@ def test_a_small_change_by_the_user_is_written() -> None:
 
 
 def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() -> None:
-    """The board reports ``confs`` all the time, so the old values are read before the change."""
+    """While the robot is driven, the board still reports the old values, and nothing is written."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.4, 0.42)}))
     bench.drive_on()
     bench.board.settings = FejemisSettings(written={Written.STEERING: (0.4, 0.4205)})
@@ -149,7 +149,7 @@ def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() ->
 
 
 def test_a_small_difference_is_written_after_a_start() -> None:
-    """A board that already has nearly the user's values gets them nevertheless."""
+    """A board whose values differ only slightly from the user's settings is sent the settings."""
     configuration = Configuration("front", {Written.STEERING: (0.4, 0.4205)})
     for _ in range(2):
         configuration.hear(parse("confs 0.4200 0.4000"))
@@ -175,7 +175,7 @@ def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
-    """With the wrong checksum setting only heartbeats are understood; a notice gives the reason."""
+    """If the setting for checksums is wrong, only heartbeats are decoded; a notice explains it."""
     bench = Bench(settings=FejemisSettings(line_sums="off"))
     bench.open()
     bench.run(4.0)
@@ -196,7 +196,8 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """The line that writes a setting may be lost, and is not repeated while the robot is driven.
 
-    So motion is refused until the board has the setting, also if the user changes it meanwhile.
+    So motion is refused until the board has the setting, even if the user changes the setting
+    again.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

@@ -57,7 +57,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """Without the refusal, repeated commands would move the robot for 1 s, again and again."""
+    """If a blocked wheel did not refuse motion, each new command would move the robot for 1 s."""
     follower = Follower()
     at = blocked(follower, 0.0)
     assert follower.refusal == UNTIL_IT_MOVES
@@ -69,7 +69,7 @@ def test_motion_is_refused_until_the_wheel_has_moved() -> None:
 
 
 def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
-    """A fault more than a minute after the last one ends when the wheel moves."""
+    """A fault ends when the wheel moves; the second fault within a minute ends only by a start."""
     follower = Follower()
     at = blocked(follower, 0.0)
     follower.look(1.0, at + 1.0)
@@ -96,9 +96,9 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """Firmware that clamps the angle turns the front wheel across instead of reversing.
+    """Some firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
 
-    The robot rolls less than 12 cm before the second fault stops it for good.
+    It rolls less than 12 cm before the second fault refuses motion until a start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
@@ -117,7 +117,7 @@ def test_a_clamped_reverse_is_stopped(w: float) -> None:
 
 
 def test_a_wheel_that_rests_short_of_across_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A turn on the spot does not begin at 82 degrees, so the robot would stand and wait."""
+    """A turn on the spot waits for a wheel angle of 90°; a wheel that rests at 82° is reported."""
     monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)
     bench = nominal()
     drive_whatever_is_said(bench, 0.0, 0.5, 4.0)
@@ -128,7 +128,7 @@ def test_a_wheel_that_rests_short_of_across_is_noticed(monkeypatch: pytest.Monke
 def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A wheel that leaves its angle by 8 degrees does not end a turn that has begun."""
+    """A turn on the spot that has begun continues if the wheel goes back from 90° to 82°."""
     bench = nominal()
     bench.drive_on(0.0, 0.5, seconds=3.0)
     monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)
@@ -138,7 +138,7 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 
 
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
-    """The driver starts the board again by itself, which is not the user's ~/start."""
+    """After a reconnect the driver itself starts the board; only a ~/start ends the refusal."""
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START
     bench.close()

@@ -72,7 +72,7 @@ def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
 
 
 def test_bytes_that_come_before_anything_is_known_move_nothing() -> None:
-    """A board may send lines that a previous driver subscribed to, before its first heartbeat."""
+    """Before its first heartbeat a board may send lines that a previous driver has requested."""
     bench = Bench()
     bench.open()
     for line in (b"fwl 10.50 0x0 0x3c2\n", b"pose 1.0 0 0 0\n", b"gyro 1 2 3\nacc 0 0 9.8\n"):
@@ -84,7 +84,7 @@ def test_bytes_that_come_before_anything_is_known_move_nothing() -> None:
 
 
 def test_many_lines_that_are_not_understood_are_told_once() -> None:
-    """Unknown lines come from a help text, or from a damaged cable, which the user should check."""
+    """Unknown lines, as from a help text or a damaged cable, lead to one notice."""
     bench = nominal()
     for _ in range(3):
         bench.session.inbound.receive(
@@ -96,7 +96,7 @@ def test_many_lines_that_are_not_understood_are_told_once() -> None:
 
 
 def test_a_stream_that_the_firmware_does_not_know_is_told_and_not_asked_for_again() -> None:
-    """Older firmware does not have the time-of-flight sensor, for example; a notice says so."""
+    """Older firmware has no time-of-flight sensor, for example; a notice says so once."""
     bench = nominal()
     del bench.robot.drive._items["tofd"]
     bench.robot.drive.reboot()

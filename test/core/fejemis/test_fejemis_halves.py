@@ -45,7 +45,7 @@ def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> None:
-    """The robot drives again when both boards send again, and only on a new command."""
+    """A silent board stops the robot; once both boards send again, a new command moves it."""
     bench = nominal()
     bench.drive_on()
     bench.speaks = {1 - HALVES[half]}
@@ -69,7 +69,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
 
 @pytest.mark.parametrize("lost", [(), (DRIVE,), (FRONT,)])
 def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]) -> None:
-    """A board that is really silent is reported when it still sends nothing after the stall."""
+    """After a stall of the driver, only a board that still sends nothing is reported as silent."""
     bench = nominal()
     bench.drive_on()
     bench.now += 3.0
@@ -84,7 +84,7 @@ def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
-    """The robot stands still until the half sends again; it moves again only on a new command."""
+    """The robot stops until the restarted board sends again; then a new command moves it."""
     bench = nominal()
     bench.drive_on()
     before = dict(bench.robot.half(half).subscriptions)
@@ -103,7 +103,7 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """The link closes both ports, and opens those that are present again."""
+    """If one port disappears, the link closes both ports and reopens each port that exists."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -152,7 +152,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
-    """A ``start`` could release a robot that its own user has stopped."""
+    """A ``start`` from this driver could release a robot that another user has stopped."""
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -162,7 +162,7 @@ def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[i
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_never_speaks_is_missed(half: str) -> None:
-    """The notice comes once and names the board that never sends."""
+    """If one of the boards never sends, one notice names this board."""
     bench = Bench()
     bench.speaks = {1 - HALVES[half]}
     bench.open()
@@ -172,7 +172,7 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
-    """The driver knows which board was at the port before, and names it, once."""
+    """After a reconnect, the driver knows which board was at the silent port, and names it once."""
     bench = nominal()
     bench.close()
     bench.speaks = {1 - HALVES[half]}
@@ -183,7 +183,7 @@ def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
 
 
 def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
-    """The common notice of a silent robot is enough, as the fault is more likely common to both."""
+    """If both boards are silent after a reconnect, the cause is probably common to both."""
     bench = nominal()
     bench.close()
     bench.speaks = set()
@@ -243,7 +243,7 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """Each bit of the diagnosis has a notice; once all are clear, a new command drives again."""
+    """Each error bit of the angle sensor has a notice and stops the robot until it is clear."""
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -260,7 +260,7 @@ def test_a_broken_angle_sensor_stops_the_robot() -> None:
 
 
 def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
-    """On a busy computer the angle can be too old, and the robot stopped, before that."""
+    """A broken angle sensor is reported once, even if the robot is not driven."""
     bench = nominal()
     bench.robot.befall("front", "hall-broken")
     bench.run(1.0)
@@ -268,7 +268,7 @@ def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
 
 
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """The sensor's diagnosis reports nothing, so only the missing rotation shows the fault."""
+    """A sensor that repeats its last angle reports no error; the missing rotation shows it."""
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
     with pytest.raises(CommandRefused, match="front wheel did not go where"):
@@ -302,7 +302,7 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
 
 
 def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
-    """Both boards have been silent for 0.1 s when the command comes, so the last angle is old."""
+    """When the command comes, the last angle is old: both boards have been silent for 0.1 s."""
     bench = nominal()
     bench.speaks = set()
     bench.run(0.1)
@@ -331,7 +331,7 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
 
 
 def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
-    """Another board may be at the port, or none."""
+    """After a reconnect another board may be at the port, so values of before are not shown."""
     bench = nominal()
     bench.run(6.0)
     told = {"Drive ver", "Drive bat", "Drive cvdrive", "Front id"}
@@ -345,10 +345,10 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The boards keep running; ``ahead_s``: how far the front board's time is ahead.
+    """The boards keep running; the front board's clock is ``ahead_s`` ahead.
 
-    If the drive board's times went on in the front board's clock, the odometry would be stamped too
-    late or too early, or the board would seem to have restarted.
+    If the drive board's times were converted by the front board's clock, the stamps of the odometry
+    would be wrong, or the drive board would seem to have restarted.
     """
     bench = Bench()
     bench.robot.front._clock_s += ahead_s
@@ -365,7 +365,7 @@ def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) 
 
 
 def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() -> None:
-    """The start message counts as a restart even before a heartbeat, as the pose begins anew."""
+    """The start message shows a restart before any heartbeat does, and the pose begins at zero."""
     bench = nominal()
     bench.close()
     bench.session.opened(bench.now)

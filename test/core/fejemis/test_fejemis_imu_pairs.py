@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pairs of gyro and acceleration lines: whatever the reads and losses, both are of one sample."""
+"""Pairs of a gyro line and an acceleration line: both lines of a pair are of the same sample."""
 
 import itertools
 import math
@@ -17,12 +17,12 @@ from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
 
 LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
 KNOWN_S = 0.5
-"""Time in s after which the order of the lines is known, at reads of 100 ms at most."""
+"""Time in s after which the order of the lines is known, if reads are at most 100 ms apart."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line that the board sends at ``sent_s``; ``number``: its sample."""
+    """A line that the board sends at ``sent_s``; ``number`` is the number of its sample."""
 
     sent_s: float
     kind: str
@@ -31,9 +31,10 @@ class Line:
 
 @dataclass(frozen=True)
 class Layout:
-    """The order of a cycle's lines; ``apart_s``: between the two lines of a sample.
+    """The order of the lines in a cycle.
 
-    ``odd``: whether the lines that come every second cycle come with odd samples.
+    ``apart_s``: time between the two lines of a sample, in s. ``odd``: whether the lines that come
+    in every second cycle come with samples of odd number.
     """
 
     order: str
@@ -41,7 +42,7 @@ class Layout:
     odd: bool = False
 
     def lines(self, seconds: float) -> list[Line]:
-        """Return the lines of a stream without losses."""
+        """Return the lines that the board sends in ``seconds``."""
         kinds = {kind[0]: kind for kind in LENGTHS}
         lines = []
         for number in range(round(seconds * 100)):
@@ -71,13 +72,13 @@ Read = tuple[float, list[Line]]
 
 
 def damaged(lines: list[Line], chance: random.Random, lost: float, twice: float) -> list[Line]:
-    """Return the lines without the lost ones, and with some of them twice."""
+    """Return the lines without the lost ones (chance ``lost``); some come twice (``twice``)."""
     kept = [line for line in lines if chance.random() >= lost]
     return [line for line in kept for _ in range(1 + (chance.random() < twice))]
 
 
 def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) -> list[Read]:
-    """Return the reads, each with its time, of a reader that reads at these intervals."""
+    """Return the reads, each with its time, of a reader that reads every ``period_s``."""
 
     def read(line: Line) -> int:
         return math.floor((line.sent_s - phase_s) / period_s) + 1
@@ -86,7 +87,7 @@ def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) ->
 
 
 def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[float]) -> list[Read]:
-    """Return the reads of a slow line: pieces of 1 to 60 bytes with these pauses between them."""
+    """Return the reads of a slow connection: pieces of 1 to 60 bytes, with pauses in between."""
     reads: list[Read] = []
     now, due, sent = 0.0, 0, 0
     for line in lines:
@@ -122,16 +123,16 @@ def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -
 
 @dataclass(frozen=True)
 class Outcome:
-    """The sample numbers of both lines of each pair given, and the reads that brought them."""
+    """The pairs that were found; each is given by the sample numbers of its two lines."""
 
     given: list[tuple[int, int]]
     false: list[tuple[int, int]]
     excused: list[tuple[int, int]]
-    """False pairs that came late, in one read, without a pose after them in this read."""
+    """Pairs with lines of two samples that the stream does not show to be wrong."""
 
 
 def outcome(reads: list[Read]) -> Outcome:
-    """Pair the lines of these reads."""
+    """Pair the lines of the reads; return the pairs."""
     pairs, given = ImuPairs(), []
     for now, lines in reads:
         for line in lines:
@@ -156,7 +157,7 @@ def outcome(reads: list[Read]) -> Outcome:
 
 
 def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
-    """Return whether the stream shows that a pair has lines of two samples."""
+    """Return whether the stream shows that the lines of a wrong pair are of two samples."""
     wanted = {("gyro", pair[0]), ("acc", pair[1])}
     found = [(now, line) for now, lines in reads for line in lines]
     both = [
@@ -172,7 +173,7 @@ def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
 
 
 def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Read]) -> None:
-    """Check that each sample came once, after the order was known; the last may still wait."""
+    """Check that each sample after ``KNOWN_S`` came once; the last samples may still be missing."""
     assert result.false == []
     known = next(line.number for now, some in reads if now > KNOWN_S for line in some)
     wanted = range(known + 1, lines[-1].number - 3)
@@ -199,7 +200,7 @@ pauses = st.sampled_from([[0.001], [0.006], [0.001, 0.006], [0.0]])
 def test_every_sample_is_given_in_pieces(
     layout: Layout, chance: random.Random, pauses_s: list[float]
 ) -> None:
-    """The line may be slower than the board, so the pieces fall behind."""
+    """The connection may be slower than the board, so the pieces arrive later and later."""
     lines = layout.lines(3.0)
     reads = reads_of_pieces(lines, chance, pauses_s)
     assert_nothing_is_missing(outcome(reads), lines, reads)
@@ -233,9 +234,9 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Up to a tenth of the lines is lost or comes twice, at regular or at stalled reads.
+    """Up to a tenth of the lines are lost or come twice; reads are regular or stalled.
 
-    The exception cannot be decided: the lines came late, and the read has no later pose.
+    A wrong pair is tolerated only if its lines came late, and no pose follows them in their read.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

@@ -142,7 +142,7 @@ def test_what_no_board_sends_is_not_a_message(text: str) -> None:
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 @pytest.mark.parametrize("sums", [False, True])
 def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
-    """The same bytes are decoded at once, byte by byte and in random pieces."""
+    """The same bytes give the same messages at once, byte by byte and in random pieces."""
     of_each_kind = {text.split()[0]: (text, GOLDEN[text]) for text in GOLDEN}.values()
     texts = [text.encode() for text, _ in of_each_kind]
     lines = [with_sum(text) if sums else text for text in texts]
@@ -168,7 +168,7 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line that lost its end also damages the line that is joined to it, but not later lines."""
+    """A line that lost its end also spoils the line that is joined to it, but no later line."""
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
     assert feed(decoder, good[:9] + good + good) == [Gyro(1.0, 2.0, 3.0)]
@@ -189,7 +189,7 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
 
 
 def test_half_a_line_at_the_end_is_none() -> None:
-    """Text without a line end is not decoded, because it may be incomplete."""
+    """Text without a line end is not decoded, because the line may be incomplete."""
     decoder = FejemisDecoder()
     assert feed(decoder, b"gyro 1 2 3") == []
     assert decoder.flush(0.0) == []
@@ -201,7 +201,7 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 
 @pytest.mark.parametrize("sums", [False, True])
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
-    """After the first heartbeat, lines of the other kind (with or without sums) are discarded."""
+    """If the first heartbeat has a checksum, lines without one are discarded, and vice versa."""
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
     beat, gyro = (with_sum(t) if sums else t for t in (BEAT, b"gyro 1 2 3"))
@@ -214,7 +214,7 @@ def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> 
 
 
 def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None:
-    """A single heartbeat of the other kind may be damaged."""
+    """One heartbeat that lost or gained its checksum may be damaged; a second is believed."""
     decoder = FejemisDecoder("auto")
     feed(decoder, with_sum(BEAT) + b"\n")
     feed(decoder, BEAT + b"\n" + with_sum(BEAT) + b"\n" + BEAT + b"\n")
@@ -229,7 +229,7 @@ def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None
 def test_heartbeats_contradict_a_setting_but_do_not_overrule_it(
     setting: str, *, sums: bool
 ) -> None:
-    """A board that does not understand the driver's checksums may send heartbeats only."""
+    """Heartbeats that contradict the user's checksum setting do not change the setting."""
     decoder = FejemisDecoder(setting)  # type: ignore[arg-type]
     right, wrong = (with_sum(BEAT), BEAT) if sums else (BEAT, with_sum(BEAT))
     for beat in (wrong, wrong, right):
@@ -248,7 +248,7 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """Three lines in a row with other decimals are believed, as are decimals that always vary."""
+    """A new number of decimals is accepted after three lines, or at once if it always varies."""
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
     assert len(feed(decoder, b"gyro 1.0 2.0 3.0\n" * 5)) == 3
@@ -269,7 +269,7 @@ def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
 
 @given(st.text(alphabet="0123456789.-+eExX hbtfwlposevgyrac;#\r", max_size=60))
 def test_no_line_raises(text: str) -> None:
-    """The random text has the characters of real lines, so it often looks like one."""
+    """The random text consists of characters of real lines, so it often resembles a line."""
     parse(text)
     feed(FejemisDecoder(), b";07" + text.encode() + b"\n")
 

@@ -25,10 +25,11 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
-    """Return the motions that a board with sums takes from these bytes.
+    """Return the motions that a board with checksums reads from these bytes.
 
-    It reads numbers as C does, and is the most lenient reader: missing numbers are 0, further text
-    is ignored, and a sum may have one digit. ``keyword``, ``count``: of the lines to read.
+    The board reads numbers as C does, and is as lenient as possible: missing numbers are 0, further
+    text is ignored, and a checksum may have one digit. ``keyword``: first word of the lines to
+    read; ``count``: how many numbers follow it.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -87,7 +88,7 @@ def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
 
 
 def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
-    """Any one to four characters of the stop lines are removed."""
+    """No motion results if any one to four characters of the stop lines are removed."""
     data = line(STOP, sums=True)
     for count in range(1, 5):
         for lost in itertools.combinations(range(len(data)), count):
@@ -96,9 +97,10 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """``rc 2 0 0`` that lost its line end and the next ``;`` was ``rc 2 0 092``: 92 degrees/s.
+    """``rc 2 0 0`` and the next line must not become ``rc 2 0 092``, which is 92 degrees/s.
 
-    The characters that a sum of 02 or 92 adds to the line before it do not change that line's sum.
+    If the line end and the ``;`` of the next line are lost, the checksum of the next line extends
+    the last 0. A checksum of 02 or 92 leaves the sum of the line unchanged.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -108,7 +110,10 @@ def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) 
 
 
 def test_what_three_lost_characters_leave() -> None:
-    """Less than 1 % of the losses make another motion; see docs/boards/fejemis.md."""
+    """Less than 1 % of the lines that lost three characters command another motion.
+
+    The figures are in docs/boards/fejemis.md.
+    """
     passed = total = 0
     for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
         for text in (front_line(v, w, FRONT_M), drive_line(v, w)):
@@ -122,7 +127,7 @@ def test_what_three_lost_characters_leave() -> None:
 
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """The front wheel's angle is right within 0.02°, and so is a gentle curve within 1 %.
+    """The front wheel's angle is right within 0.02°, and a gentle curve within 1 %.
 
     The outer wheel's speed is right within 0.6 %.
     """
@@ -139,9 +144,9 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.8, -0.6)])
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
-    """Numbers without certain digits have gaps, but two numbers together reach every speed.
+    """The numbers v and w avoid certain digits, but together they reach every wheel speed.
 
-    With a minus sign there are fewer digits, and 0.0218 m/s came out 8 % slower.
+    Negative numbers have fewer digits; even so, the speed is right within 1.8 %.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.03**n for n in range(240))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -150,9 +155,9 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 
 @pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, 1.25])
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """The line's voltage is 60 to 100 % of the requested one, for at most the requested time.
+    """The lift line has 60 to 100 % of the requested voltage, and at most the requested time.
 
-    A damaged line stays within 12 V and that time.
+    If it is damaged, the voltage is at most 12 V, and the time at most the requested one.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -169,7 +174,7 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """The firmware of a related robot compares ``stop`` with the complete line.
+    """A related firmware compares the complete line with ``stop``, so nothing is appended.
 
     An empty line may precede it.
     """
@@ -178,12 +183,12 @@ def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
 
 
 def plain(data: bytes) -> list[tuple[float, ...]]:
-    """Return the motions that a board without sums takes from these bytes."""
+    """Return the motions that a board without checksums reads from these bytes."""
     return motions(data.replace(b";", b"?"))
 
 
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """A lost space or source shifts the numbers by one place, which commands a stop.
+    """Without checksums, a lost space or source number shifts the numbers, which commands a stop.
 
     Only damage within the speed itself can make the robot faster.
     """

@@ -86,7 +86,7 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
 
 
 def test_a_gap_is_settled_by_the_pose_after_it() -> None:
-    """No message arrives for 2 s, in which the robot drives a curve."""
+    """No message arrives while the robot drives a curve for 2 s; the next pose corrects that."""
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     drive.run(0.3, 0.2, 1.0)
@@ -119,7 +119,7 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 
 
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
-    """Another program has sent ``enc0``, which sets the board's pose to zero; odometry stays."""
+    """Another program sets the board's pose to zero (``enc0``); the pose of the odometry stays."""
     drive = Drive()
     drive.run(0.5, 0.2, 4.0)
     before = drive.out
@@ -133,7 +133,7 @@ def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
 
 @pytest.mark.slow
 def test_the_covariance_is_consistent_over_fifty_drives() -> None:
-    """With wheels of wrong sizes that slip, the normalised error squared averages about 3."""
+    """Wheels slip and have wrong sizes; the normalised squared error (NEES) is 3 on average."""
     noise = OdometryNoise(wheels=WHEELS)
     squares = []
     for seed in range(50):

@@ -27,7 +27,7 @@ from omnibot_driver.simulator.fejemis.help_text import DRIVE_HELP, FRONT_HELP
 class Row:
     """One command: a ``golden`` line, and its ``use``: a topic, service, parameter or key.
 
-    ``by`` is the command that the driver sends instead, or how it does the same by itself.
+    ``by`` is what the driver does instead, if it never sends the command.
     """
 
     golden: str
@@ -136,7 +136,7 @@ def listed(text: str) -> tuple[set[str], set[str]]:
 
 @pytest.mark.parametrize("text", [DRIVE_HELP, FRONT_HELP], ids=["drive", "front"])
 def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
-    """Each command has a row in the table SAID, each subscription one in HEARD."""
+    """Each command of the help has a row in the table SAID, each subscription one in HEARD."""
     said, heard = listed(text)
     assert said <= SAID.keys()
     assert heard <= HEARD.keys()
@@ -175,7 +175,7 @@ def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
 
 
 def said_by_the_driver() -> set[str]:
-    """Return all lines of a session in which everything is requested."""
+    """Return all lines that the driver sends in a session in which everything is requested."""
     written: dict[Written, tuple[float, ...]] = {
         Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
         Written.STEERING: (0.4, 0.42),

@@ -25,7 +25,7 @@ def bench() -> Bench:
 
 
 def assert_still_refused(bench: Bench) -> None:
-    """Check that the drive board counts down, and that nothing may move."""
+    """Check that the drive board still counts down to the power off, and that motion is refused."""
     assert bench.robot.drive.off_at_s is not None
     with pytest.raises(CommandRefused, match="call ~/start"):
         bench.drive()
@@ -36,7 +36,7 @@ def assert_still_refused(bench: Bench) -> None:
 
 
 def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
-    """The e-stop holds back ``start``, but not ``on``."""
+    """During an e-stop, a start sends only ``on``, which cancels the power off."""
     bench.estop(True)
     bench.session.request(Request.START, None, bench.now)
     bench.settle()
@@ -45,7 +45,7 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 
 def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> None:
-    """The board does not confirm ``on``, and a line may be damaged."""
+    """The board does not confirm ``on``, and one line may be lost, so three are sent."""
     mark = bench.now
     bench.hears = {FRONT}
     bench.session.request(Request.START, None, bench.now)
@@ -58,7 +58,7 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 
 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
-    """The remaining repetitions of ``on`` are dropped."""
+    """A power off that is requested after a start drops the remaining repetitions of ``on``."""
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -67,7 +67,7 @@ def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
 
 
 def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """The driver starts the board again by itself, which is not the user's ~/start."""
+    """After a silence the driver itself starts the board; only a ~/start cancels a power off."""
     mark = bench.now
     bench.speaks = set()
     bench.run(2.5)
@@ -91,7 +91,7 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
-    """Its time shows the restart, as the clock of a board outlives the connection."""
+    """The estimate of the board's clock is kept, so the time in its lines shows the restart."""
     bench.run(5.0)
     bench.close()
     bench.speaks = set()
@@ -106,7 +106,7 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 
 
 def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
-    """The drive board alone cuts the power, and it has not restarted."""
+    """Only the drive board cuts the power, so a restart of the front board does not matter."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -120,7 +120,7 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
 
 
 def test_a_power_off_without_an_answer_may_still_come() -> None:
-    """The board may have obeyed although its heartbeats were lost; only ~/start makes it sure."""
+    """The board may have obeyed ``off`` while its heartbeats were lost; ~/start cancels it."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()

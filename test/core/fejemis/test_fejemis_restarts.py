@@ -26,7 +26,7 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 
 
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
-    """Messages are handled one by one, so the pose is used before the restart resets its clock."""
+    """Messages are handled in order, so the start line resets the board's clock after the pose."""
     bench = nominal()
     drive = bench.robot.drive
     pose = with_sum(drive._pose().encode("ascii")) + b"\n"
@@ -44,7 +44,7 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
-    """Each read brings the lines of 20 ms, so poses before a restart come with its start line."""
+    """A read brings the lines of 20 ms, so it may have poses from before and after a restart."""
     bench = nominal(Simulated(boot_s=boot_s))
     bench.read_s = 0.02
     for phase in range(10):
@@ -69,7 +69,7 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """Without the start line, the board's time shows the restart; the robot then drives again."""
+    """If a board sends no start line, the time in its lines shows that it has restarted."""
     bench = nominal(Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)))
     bench.run(2.0)
     bench.read_s = read_s
@@ -88,9 +88,10 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 
 
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
-    """Restart a board while commands come; return the refusals of these commands.
+    """Restart a board while the robot is driven; return the reasons why commands were refused.
 
-    The robot must not be driven from the loss of the board's stream to its configuration.
+    Between the loss of the board's data and the end of its configuration, the robot must not be
+    driven.
     """
     robot, refusals = bench.robot, []
     bench.drive_on(0.3, 0.0, 0.5)
@@ -116,7 +117,7 @@ def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
 def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
     boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """Without the start line, only its heartbeats show that it has lost the user's settings."""
+    """Without a start line, only heartbeats show that the front board lost its settings."""
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
         FejemisSettings(written=FRONT_OFFSET),
@@ -129,7 +130,7 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """A late read may bring a heartbeat that the board sent before it restarted."""
+    """A late read may bring a heartbeat that the board sent before a restart."""
     bench = nominal()
     bench.run(2.0)
     half, front = bench.board._ports.halves[FRONT], bench.robot.front
@@ -148,7 +149,7 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:
-    """When the state is nominal again, the next command drives the robot."""
+    """After a pause the board may have restarted; its heartbeat has to rule that out."""
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}
     bench.run(pause_s)
@@ -162,7 +163,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 
 
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
-    """The answer decides at once; the board's own heartbeats come only every 0.4 s."""
+    """The reply shows at once whether the board restarted; its own heartbeats come every 0.4 s."""
     bench = nominal()
     bench.speaks = {DRIVE}
     bench.run_until(lambda: bench.board._ports.halves[FRONT].unsure)
@@ -177,7 +178,7 @@ def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
 
 @pytest.mark.parametrize("read_s", [0.001, 0.05])
 def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) -> None:
-    """For 10 s, one line in twenty from the boards is lost."""
+    """One line in twenty from the boards is lost for 10 s, without suspicion of a restart."""
     bench = nominal()
     chance = random.Random(3)
 
@@ -196,7 +197,7 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
 
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
 def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
-    """All lines of the stall come in one read; the next heartbeat ends the suspicion."""
+    """After a stall, the next heartbeat shows that the boards have not restarted."""
     bench = nominal()
     bench.run(2.0)
     read_s, bench.read_s = bench.read_s, stall_s

@@ -69,7 +69,7 @@ def lose(bench: Bench, word: bytes, times: int) -> None:
 
 
 def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
-    """The board does not confirm the command; unchanged offsets show that it may be lost."""
+    """The board does not confirm a calibration command; unchanged offsets show its loss."""
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
     lose(bench, b"gyroc", 1)
     assert ask(bench, Job.CALIBRATE_GYRO).success
@@ -81,7 +81,7 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
 )
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
-    """The noise of the sensors changes the offsets, so the board has probably not measured them."""
+    """Sensor noise changes the offsets at each calibration; unchanged offsets are a failure."""
     bench = nominal()
     lose(bench, word.encode(), 99)
     done = ask(bench, job)
@@ -100,7 +100,7 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
 
 
 def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets() -> None:
-    """The driver would write the parameter's offsets again, or report a false fault."""
+    """The parameter would undo the calibration, so the calibration is refused."""
     offsets = (0.1, 0.2, 0.3, 1.0, 1.0, 1.0)
     bench = nominal(settings=FejemisSettings(written={Written.ACCELEROMETER: offsets}))
     bench.run(2.0)
@@ -112,7 +112,7 @@ def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets(
 
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
-    """Only the loading of a configuration is accepted, because it stops the robot first."""
+    """While the robot is driven, only the loading of saved values is accepted: it stops first."""
     bench = nominal()
     bench.drive_on()
     if job is not Job.LOAD:
@@ -124,7 +124,7 @@ def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
 
 
 def test_a_job_that_nothing_confirms_fails() -> None:
-    """A job without confirmation fails within its time limit; a second one meanwhile is refused."""
+    """A job that no board confirms fails within its time limit; until then others are refused."""
     bench = nominal()
     bench.hears = {FRONT}
     token = object()
@@ -150,7 +150,7 @@ def test_a_job_is_answered_when_the_port_is_lost() -> None:
 
 
 def test_a_robot_that_rolls_is_not_calibrated() -> None:
-    """The robot is commanded to stop, but still rolls, so the calibration is refused."""
+    """A robot that was stopped but still rolls is not calibrated."""
     bench = nominal()
     bench.drive_on(0.5)
     bench.drive(0.0)
@@ -169,7 +169,7 @@ def test_a_configuration_is_saved_and_loaded() -> None:
 
 
 def test_power_off_is_called_back_by_a_start() -> None:
-    """Motion, brush and lift are refused between the request to power off and the start."""
+    """After a request to power off, motion, brush and lift are refused until a start cancels it."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
     done = ask(bench, Job.POWER_OFF)
     assert done.success
@@ -221,7 +221,7 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
 
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
-    """An offset that is measured in motion would be wrong, so motion is refused meanwhile."""
+    """A calibration in motion would measure a wrong offset, so motion is refused meanwhile."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -253,7 +253,7 @@ def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: s
 
 
 def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None:
-    """The boards may have loaded their saved values, although the job has failed."""
+    """An e-stop ends the job that loads saved values, but the boards may have loaded them."""
     bench = nominal(settings=FejemisSettings(written={Written.FRONT_WHEEL: (2.5, 0.0)}))
     bench.run(2.0)
     bench.board.services.ask(Job.LOAD, None, bench.now)
@@ -267,7 +267,7 @@ def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None
 
 
 def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_loading() -> None:
-    """The other board has obeyed ``eer`` as well."""
+    """``eer`` makes both boards load their saved values, also the board that does not restart."""
     wheels = (0.08, 0.08, 9.7, 48.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: wheels}))
     bench.run(2.0)
@@ -295,7 +295,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
-    """The restart cancels the power-off, so the robot may be driven again."""
+    """A restart of the drive board cancels the power off, so the robot may be driven again."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=100.0))
     assert ask(bench, Job.POWER_OFF).success
     with pytest.raises(CommandRefused, match="power"):
@@ -312,8 +312,8 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """If ``off 300`` loses its 3 and a 0, its sum still fits, and the power ends at once.
+    """If ``off 300`` loses its 3 and a 0, its checksum still fits, and the power is cut at once.
 
-    So the delay is increased to a number without such a pair.
+    So the driver increases the delay to a number that does not have two such digits.
     """
     assert whole_seconds(wanted_s) == seconds

@@ -54,7 +54,7 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """By the manual's equations, the body does not move with the v and w of an ``rc`` command."""
+    """By the manual's equations, ``rc`` does not give the body the v and w that it names."""
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
 
@@ -70,7 +70,7 @@ def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: fl
 
 @given(speeds, rates)
 def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
-    """The front wheel is at the angle to which the front board moves it."""
+    """The set points move the body as commanded once the front wheel is at its commanded angle."""
     assume(outer_mps(BodyTwist(v, 0.0, w), 0.4) > 1e-3 and v >= 0.0)
     factor = scale(BodyTwist(v, 0.0, w), 0.4)
     theta_rad = math.atan2(0.5 * factor * w, factor * v)
@@ -82,7 +82,7 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """While the wheel turns to its angle, an error of 5° in that angle is tolerated."""
+    """The limit allows for a wheel angle that is up to 5° off."""
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist
@@ -105,7 +105,7 @@ def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> N
 
 
 def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
-    """Without a current angle the board would compute with an old one, so the driver stops it."""
+    """Without a current angle, the drive board would compute with an old one, so it is stopped."""
     told = steer(BodyTwist(0.3, 0.0, 0.1), ROBOT, None, turning=False)
     assert told.part == 0.0
     assert told.speed_mps > 0.3
@@ -130,7 +130,7 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """Tolerances: 1.2 % of the outer wheel's speed, and 3 % of that speed over the track width."""
+    """The tolerance is 1.2 % of the outer wheel's speed, and 3 % of its speed per track width."""
     bench = nominal()
     bench.drive_on(v, w, 2.5)
     truth = bench.robot.truth
@@ -140,7 +140,7 @@ def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
 
 
 def test_the_digits_cost_less_than_one_per_cent() -> None:
-    """By the manual, the motion of the rounded lines differs by less than 1 % from the command."""
+    """The rounding of the numbers in the lines changes the motion by less than 1 %."""
     for v in (0.05, 0.1, 0.15, 0.25, 0.5, 1.0):
         for w in (-1.5, -0.3, 0.0, 0.1, 0.12, 0.8):
             factor = scale(BodyTwist(v, 0.0, w), 0.4)
@@ -154,7 +154,7 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 
 
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
-    """From straight ahead, ``rc 2 0 w`` to both boards would roll 0.17 m first."""
+    """If both boards got ``rc 2 0 w`` at once, the robot would roll 0.17 m before it turns."""
     bench = nominal()
     for _ in range(12):
         bench.drive(0.0, 1.0)
@@ -164,7 +164,7 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 
 
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
-    """The servo needs over 1 s for 180°; meanwhile the robot rests, and no fault is reported."""
+    """The front wheel needs over 1 s for 180°; the robot rests until then, without a fault."""
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)
     before_m = bench.robot.truth.x_m
@@ -176,9 +176,9 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int) -> None:
-    """At 95°, the drive board would turn its inner wheel at 1.45 times the outer one's speed.
+    """At 95°, the drive board would turn the inner wheel at 1.45 times the outer speed.
 
-    So at most 90° are relayed.
+    So the driver relays at most 90°.
     """
     bench = nominal()
     angles_deg = [60.0]
@@ -195,7 +195,7 @@ def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int
 
 @pytest.mark.parametrize(("v", "w"), [(-0.2, 0.0), (-0.2, 0.3), (-0.01, 0.5)])
 def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
-    """Reverse needs a parameter; without it the robot only turns, and one notice explains why."""
+    """If no parameter allows reverse, the robot only turns, and one notice explains why."""
     bench = nominal()
     bench.drive_on(v, w, 3.0)
     truth = bench.robot.truth
@@ -217,7 +217,7 @@ def test_a_mirrored_reverse_is_driven() -> None:
 
 
 def test_a_speed_of_nothing_that_is_negative_is_none() -> None:
-    """A speed of -1e-9 m/s, a controller's rounding error, must not be refused as reverse."""
+    """A speed of -1e-9 m/s, a controller's rounding error, is not refused as reverse."""
     bench = nominal()
     bench.drive_on(-1e-9, 0.5, 3.0)
     assert bench.robot.truth.yaw_rate_radps == pytest.approx(0.5, abs=0.02)

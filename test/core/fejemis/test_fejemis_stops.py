@@ -22,7 +22,7 @@ def without_relays(lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """The old command is set to zero before ``start``, since some firmware resumes it."""
+    """The command is set to zero before ``start``, as some firmware resumes the old command."""
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
     mark = bench.now
@@ -47,7 +47,7 @@ def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) 
 
 
 def test_the_stop_of_an_estop_is_a_word_alone() -> None:
-    """The e-stop sends ``stop`` without padding, which related firmware does not accept."""
+    """Some related firmware accepts only the bare word, so ``stop`` is sent without padding."""
     bench = nominal()
     mark = bench.now
     bench.estop(True)
@@ -72,7 +72,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The heartbeat names who stopped the board; the pause outlasts an e-stop, until a start."""
+    """The heartbeat tells what stopped the board; a pause lasts beyond an e-stop, until a start."""
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)
@@ -108,7 +108,7 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The time limit is sent with the voltage, so the lift stops even if the driver dies."""
+    """The lift voltage is sent with a time limit, so the lift stops even if the driver dies."""
     bench = nominal()
     lift_it(bench)
     bench.hears = {DRIVE}
@@ -131,9 +131,9 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """Each value is sent at most twenty times a second.
+    """Lift voltages and colours are sent at most twenty times a second, the newest ones last.
 
-    A stop is sent at once, and frequent values do not multiply the lines of the brush.
+    A stop is sent at once. The brush line is not sent more often because of them.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -154,9 +154,9 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """The time of a delayed voltage begins when the voltage is sent.
+    """The time limit of a lift voltage that is sent late begins when it is sent.
 
-    A stop before that discards it.
+    A stop before that discards the voltage.
     """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
@@ -209,7 +209,7 @@ def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]
 
 
 def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
-    """Brush and lift may always be switched off, but not on."""
+    """In an e-stop or a pause, brush and lift may be switched off, but not on."""
     bench = nominal()
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop"):
@@ -225,7 +225,7 @@ def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
 
 
 def test_a_command_that_expires_leaves_the_brush_on() -> None:
-    """A sweeping robot may stand still for a while, so only the wheels stop."""
+    """A command that expires stops only the wheels, because a robot that sweeps may stand still."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.drive_on()
@@ -246,7 +246,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The guard has lines for a stop and for a latched e-stop; the exit has lines of its own."""
+    """The guard sends different lines for a stop and for a latched e-stop, as does the exit."""
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
         bench.board.services.set_brush(True, bench.now)
@@ -266,7 +266,7 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
 
 @pytest.mark.parametrize("again", ["e-stop", "pause"])
 def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> None:
-    """After a release ``start`` is repeated for a second, unless a stop comes first."""
+    """After an e-stop, ``start`` is repeated for a second, unless another stop comes first."""
     bench = nominal()
     bench.estop(True)
     bench.run(0.5)
@@ -285,9 +285,9 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
 
 
 def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
-    """While the driver was stalled, the guard switched the brush off.
+    """The guard switches the brush off while the driver is stalled.
 
-    A brush that is on is repeated each second, so the driver must forget it.
+    The driver repeats ``brush 1`` each second, and must not do so after the stall.
     """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
@@ -304,7 +304,7 @@ def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
 
 
 def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
-    """The front board may have restarted while it was silent; its second heartbeat shows that."""
+    """A silent front board may have restarted, so its brush is switched off and stays off."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -319,7 +319,7 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
 
 @pytest.mark.parametrize("seconds", [0.7, 3.0])
 def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(seconds: float) -> None:
-    """A board that neither obeys nor sends for a time continues with its last commands."""
+    """A board that hangs for a time misses the stop and then continues with its last commands."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -333,7 +333,7 @@ def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(secon
 
 
 def test_the_brush_is_off_as_soon_as_the_driver_begins_to_end() -> None:
-    """The driver waits until the wheels stand still before it sends its last lines."""
+    """The brush is switched off at once, before the driver waits for the wheels to stop."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -348,7 +348,7 @@ def test_the_brush_is_off_as_soon_as_the_driver_begins_to_end() -> None:
 
 
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
-    """A single line may be lost, and the driver cannot repeat it after the exit."""
+    """Brush and lift are switched off with three copies of each line, as one may be lost."""
     bench = nominal()
     front = [data for channel, data in bench.board.switch_off() if channel == FRONT]
     assert b"".join(front).count(b"brush 0") == 3

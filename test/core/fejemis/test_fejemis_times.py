@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stamps of all readings: a Teensy's clock as the host sees it, and samples of the IMU."""
+"""Stamps of readings: a Teensy's clock as the host sees it, and the samples of the IMU."""
 
 import itertools
 import math
@@ -21,7 +21,7 @@ from omnibot_driver.simulator.fejemis import Firmware
 
 
 def late(chance: random.Random) -> float:
-    """Return the delay of a read in s: 0.36 ms on average, one in a hundred up to 20 ms more."""
+    """Return the delay of a read in s: 0.36 ms on average, and up to 20 ms more in one of 100."""
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
 
@@ -36,9 +36,9 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Poses are right within 0.05 ms; the IMU, whose lines carry no time, within 0.2 ms.
+    """Stamps of poses are right within 0.05 ms, and those of IMU samples within 0.2 ms.
 
-    If one character in a thousand is lost, so are three lines in a hundred.
+    The lines of the IMU carry no time. Up to three lines in a hundred are lost.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
@@ -73,7 +73,7 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
 
 
 def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """A damaged time has lost a digit; three or more that agree show that the board restarted."""
+    """A single implausible time is damaged; several that agree show that the board restarted."""
     clock = TeensyClock()
     assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
     assert not clock.see(10.98, 6.0)
@@ -86,7 +86,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
-    """The new times look like times that came less than a second late, but they go back."""
+    """Times after a restart could be old times that are read late, but they go back."""
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
     restarts = 0
@@ -98,7 +98,7 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """The artificial clock gives times that go back, and one after the time of the call."""
+    """A stamp that goes back is increased, and one in the future is set to the present time."""
     stamped = StampedReadings()
     stamped.begin()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -110,7 +110,7 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 
 def test_a_sample_has_si_units() -> None:
-    """The board sends degrees per second, and on some firmware g."""
+    """The board sends degrees per second, and on some firmware g; both are converted."""
     pair = Pair(Gyro(180.0, 0.0, -180.0), Acceleration(0.0, 0.0, 1.0), 1.0, 1.0, 0, doubtful=False)
     reading = ImuSamples("g").reading(pair)
     assert reading.angular_velocity == pytest.approx((math.pi, 0.0, -math.pi))
@@ -119,7 +119,7 @@ def test_a_sample_has_si_units() -> None:
 
 @pytest.mark.parametrize("sums", [True, False])
 def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
-    """A hundred samples a second have stamps 10 ms apart, within 1.5 ms."""
+    """The samples of the IMU, a hundred a second, have stamps 10 ms apart, within 1.5 ms."""
     bench = nominal(Simulated(firmware=Firmware(sums=sums)))
     bench.events.clear()
     bench.run(3.0)
@@ -131,7 +131,7 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
-    """The lines of 0.3 s arrive in one read; the front board's lines arrive as usual."""
+    """The drive board's lines of 0.3 s arrive in one read, the front board's lines as usual."""
     bench = nominal()
     bench.run(3.0)
     waiting = bytearray()
@@ -170,7 +170,7 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """A restarted board's time goes back; after lines that waited, the time only jumps ahead."""
+    """A restart sets the board's time back; lines that waited only make the time jump ahead."""
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
@@ -184,7 +184,7 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 
 
 def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
-    """Lines of a board that did not restart arrive all at once, but their times increase."""
+    """After a stall of the host, lines arrive all at once, but the times in them increase."""
     clock = TeensyClock()
     for n in range(100):
         assert clock.see(5.0 + 0.02 * n, 100.0 + 0.02 * n)
@@ -201,7 +201,7 @@ def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
 
 
 def numbered() -> Bench:
-    """Return a bench whose gyro and acceleration lines have the number of the cycle, in x."""
+    """Return a bench whose gyro and acceleration lines contain the number of their cycle, as x."""
     bench = nominal()
     drive = bench.robot.drive
     drive._items["gyro"] = lambda: f"gyro {drive._cycles % 20_000 / 1000:.3f} 0.100 0.200"
@@ -212,7 +212,7 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return the numbers of both lines of each published sample."""
+    """Return, for each published sample, the cycle numbers of its gyro and acceleration lines."""
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
         for e in bench.imu
@@ -239,7 +239,7 @@ def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
 
 @pytest.mark.parametrize("pause_s", [0.001, 0.006])
 def test_a_sample_whose_lines_come_in_pieces_is_published(pause_s: float) -> None:
-    """The pieces have 1 to 60 bytes, so the pause may come between the two lines of a sample."""
+    """The pieces have 1 to 60 bytes, so a pause may come between the two lines of a sample."""
     bench = numbered()
     chance = random.Random(7)
     unsent, sent_at = bytearray(), bench.now

@@ -30,9 +30,9 @@ HOST_GAINS = LoisEcuSettings(
         Setting.RIGHT_TD: 0.60868,
     },
 )
-"""Settings with gains for the controllers.
+"""Settings with gains for the speed controllers.
 
-With the gains that the public firmware boots with, the right wheel swings before it rests.
+With the boot gains of the public firmware, the right wheel's speed would oscillate.
 """
 REPEAT_S = 0.05
 
@@ -57,7 +57,7 @@ CLASSES: dict[str, Program] = {
 
 
 MOTIONS = ("straight", "curve", "in place", "reverse", "reverse curve", "jerky", "left", "right")
-"""Motions of ``test/integrity/lois_odometry.py``; the last two are squares."""
+"""Motions of ``test/integrity/lois_odometry.py``; "left" and "right" are squares."""
 
 
 VARIED = (
@@ -69,12 +69,14 @@ VARIED = (
     "straight back",
     "curve back",
 )
-"""Motions of ``test/integrity/lois_odometry.py`` over 5 m, or a turn by 80° to 400°; the seed gives
-the speed."""
+"""Motions of ``test/integrity/lois_odometry.py``: a way of 5 m, or a turn by 80° to 400°.
+
+The seed gives the speed.
+"""
 
 
 def varied(name: str, seed: int) -> Program:
-    """Return the program of one of ``VARIED``, with a speed that the seed gives."""
+    """Return the program of one of ``VARIED``; its speed is random, by the seed."""
     random = Random(f"varied {name} {seed}")
     if name.startswith("place"):
         rpm, angle_rad = random.uniform(7, 20), math.radians(random.uniform(80, 400))
@@ -104,8 +106,8 @@ def jerky(seed: int, seconds: float = 20.0) -> Program:
 class Drive:
     """The outcome of a drive.
 
-    ``true``: true pose at the time of the last estimate, relative to the start of the odometry.
-    ``way_m``, ``turned_rad``: true length of the way, and sum of all turns.
+    ``true``: true pose at the time of the last estimate. ``way_m``: true length of the way, in m.
+    ``turned_rad``: sum of the absolute values of all true turns, in rad.
     """
 
     true: Pose
@@ -140,7 +142,7 @@ class Drive:
 
     @property
     def sigmas(self) -> float:
-        """Largest error along one axis, in standard deviations."""
+        """Largest error of x, y or yaw, in its standard deviations."""
         c, e = self.last.covariance, self.error
         pairs = ((e.x_m, c.xx), (e.y_m, c.yy), (e.yaw_rad, c.yaw_yaw))
         return max(abs(error) / math.sqrt(variance) for error, variance in pairs)
@@ -152,7 +154,7 @@ def nominal(firmware: Firmware, seed: int = 0) -> LoisSettings:
 
 
 def wrong(firmware: Firmware, seed: int) -> LoisSettings:
-    """Return settings with slip, load, and wheel sizes off by 1 % (standard deviation)."""
+    """Return settings with slip and load, and with wheel sizes that are wrong by about 1 %."""
     random = Random(f"wrong {seed}")
     return LoisSettings(
         quirks=QUIRKS[firmware],
@@ -166,8 +168,8 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 class Rig:
     """A simulated board and the driver that talks to it, by default with ``HOST_GAINS``.
 
-    ``estimates``: all estimates of the odometry, each with the true pose at that time. ``loss``:
-    chance that a byte is lost, in both directions.
+    ``estimates``: all estimates of the odometry, each with the true pose at its time. ``loss``:
+    chance that a byte is lost, in either direction.
     """
 
     def __init__(
@@ -202,7 +204,7 @@ class Rig:
         self.driver.wrote(data, self.now)
 
     def run(self, seconds: float) -> None:
-        """Run the board for some time; the driver writes what is due and reads what arrives."""
+        """Run the board for ``seconds``; the driver writes what is due and reads what arrives."""
         for _ in range(round(seconds / self.board.tick_s)):
             if self.now >= self.driver.wake_at:
                 self.say(self.driver.due(self.now))
@@ -218,7 +220,7 @@ class Rig:
                     self.estimates.append((reading, self.place))
 
     def order(self, left_rpm: float, right_rpm: float, seconds: float) -> None:
-        """Repeat set-points in RPM every ``REPEAT_S`` for ``seconds``; zeros are a Stop."""
+        """Send set points in RPM every ``REPEAT_S`` for ``seconds``; two zeros are a Stop."""
         for _ in range(round(seconds / REPEAT_S)):
             unit = math.tau / 60
             self.say(self.driver.wheels((left_rpm * unit, right_rpm * unit)))
@@ -232,7 +234,7 @@ class Rig:
         return self.outcome()
 
     def outcome(self) -> Drive:
-        """Return the outcome of the drive, judged by the last estimate."""
+        """Return the outcome of the drive, by the last estimate of the odometry."""
         last, true = self.estimates[-1]
         return Drive(true, self.way_m, self.turned_rad, last, self.driver)
 
@@ -264,7 +266,10 @@ class Rig:
 def motion(
     settings: LoisSettings, name: str, ours: LoisEcuSettings | None = None, *, side_m: float = 5.0
 ) -> Drive:
-    """Drive one of ``MOTIONS`` or ``VARIED``; encoders begin anywhere between two ticks."""
+    """Drive one of ``MOTIONS`` or ``VARIED``; return the outcome.
+
+    The encoders begin at random positions between two ticks.
+    """
     rig = Rig(settings, ours)
     random = Random(f"encoders {settings.seed}")
     for encoder in rig.board._vehicle.encoders:
@@ -280,7 +285,7 @@ def motion(
 
 
 def drive(settings: LoisSettings, program: Program, *, loss: float = 0.0) -> Drive:
-    """Drive a program and stop; each byte is lost with the chance ``loss``, in both directions."""
+    """Drive a program and stop; each byte is lost with chance ``loss``, in either direction."""
     return Rig(settings, loss=loss).drive(program)
 
 

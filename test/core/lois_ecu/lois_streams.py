@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Streams of a LOIS ECU that drives, as timed pieces, and the reports that are in them."""
+"""Streams of a LOIS ECU that drives: its reports, and the timed pieces that encode them."""
 
 import math
 import struct
@@ -22,7 +22,7 @@ Piece = tuple[float, bytes]
 
 
 def float32(number: float) -> float:
-    """Return the number rounded to 32 bits, as it is when decoded from a line."""
+    """Return the number rounded to a 32-bit float, as a decoder of the lines returns it."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", number))
     return float(rounded)
 
@@ -53,7 +53,7 @@ def reports(seconds: float, *, firmware: bool) -> list[tuple[float, Report]]:
 
 
 def pieces(said: list[tuple[float, Report]]) -> list[Piece]:
-    """Return the lines of each report, as the board sends them."""
+    """Return the pieces of bytes in which the board sends these reports, each with its time."""
     return [(at, encode_report(report)) for at, report in said]
 
 
@@ -68,5 +68,5 @@ def decoded(given: list[Piece], *, sum_required: bool = True) -> tuple[list[Repo
 
 
 def lossy(given: list[Piece], chance: float, random: Random) -> list[Piece]:
-    """Return the pieces without the lost bytes; each byte is lost with this chance."""
+    """Return the pieces without the lost bytes; each byte is lost with chance ``chance``."""
     return [(at, bytes(byte for byte in data if random.random() >= chance)) for at, data in given]

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How far odometry of a LOIS robot is off after a drive, on both kinds of firmware.
+"""The error of a LOIS robot's odometry after a drive, on both kinds of firmware.
 
-``test/integrity/lois_odometry.py`` prints the figures of many drives; a few of them run here.
+``test/integrity/lois_odometry.py`` prints the figures of many drives; a few of them are run here.
 """
 
 import math
@@ -20,7 +20,7 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @BOTH
 @pytest.mark.parametrize("name", ["straight", "curve"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
-    """The limits are the accuracy that is promised for wheels of the right size."""
+    """The limits are the accuracy promised for a forward drive with wheels of the right size."""
     one = driven(firmware, name)
     assert one.way_m > 5.0
     assert off_m(one) < max(0.02, 0.02 * one.way_m)
@@ -29,7 +29,7 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
 
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
-    """One wheel turns backward, and the public firmware does not count its ticks."""
+    """In a turn one wheel turns backward, and the public firmware does not count its ticks."""
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
     assert abs(one.error.yaw_rad) < 0.03 * one.turned_rad
@@ -38,23 +38,23 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place", "reverse", "jerky"])
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
-    """Wheels of wrong sizes slip on uneven ground; by chance, one drive in 10,000 exceeds 21.1.
+    """Wheels of wrong sizes slip on uneven ground; one drive in 10,000 exceeds the limit by chance.
 
-    ``test/integrity/lois_odometry.py`` judges by the mean of many drives.
+    ``test/integrity/lois_odometry.py`` checks the mean of many drives.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
 
 @pytest.mark.parametrize("name", ["left", "right"])
 def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -> None:
-    """In each turn one wheel turns backward, and the public firmware does not count its ticks."""
+    """In a turn one wheel turns backward, and the public firmware does not count its ticks."""
     one = motion(nominal("firmware", 1000), name, side_m=1.0)
     assert off_m(one) < 0.15
     assert one.sigmas < 3.0
 
 
 def test_hard_steering_to_both_sides_is_followed() -> None:
-    """Wheels reverse several times a second; a documented board reports each tick."""
+    """The wheels reverse several times a second; documented firmware reports each tick."""
     one = motion(nominal("documented", 1001), "jerky")
     assert off_m(one) < 0.05
     assert abs(one.error.yaw_rad) < math.radians(5.0)
@@ -65,7 +65,7 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """Three of five groups are lost, but the counters in the others show the missed ticks."""
+    """If 1 % of the bytes are lost, so are 60 % of the groups; counters show the missed ticks."""
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)
     assert abs(one.error.yaw_rad) < math.radians(10.0)

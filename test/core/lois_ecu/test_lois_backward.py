@@ -21,10 +21,9 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """The public firmware counts no ticks and reports integer RPM, so the heading drifts.
+    """The public firmware counts no ticks backward and reports integer RPM, so the heading drifts.
 
-    Eight drives are off by 4.9 % of the way on average. The first of these three is the worst of
-    them, with 13 %.
+    Its mean error of position is 4.9 % of the way in eight drives, and 13 % in the worst of them.
     """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
@@ -38,9 +37,9 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the boot gains the firmware's right wheel swings, rests, and keeps its last speed.
+    """With the boot gains, the right wheel oscillates, comes to rest, and keeps its last speed.
 
-    The normalized squared error of half of the drives is below 2.4 if the covariance is right; a
+    The normalized squared error of half of all drives is below 2.4 if the covariance is right; a
     few of these drives are far above.
     """
     seeds = range(1000, 1005)
@@ -53,16 +52,20 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> Non
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again(
     seed: int,
 ) -> None:
-    """The wheel falls from 41 to 20 RPM at a set-point of -19. When this was not noticed, odometry
-    turned by 600° in 15 s."""
+    """A wheel with set point -19 falls from 41 to 20 RPM and stops, but 20 RPM is still reported.
+
+    An odometry that believed the report would turn by 600° in 15 s.
+    """
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
     assert one.sigmas < 3.5
 
 
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
-    """The board keeps reporting 12 RPM at a set-point of -7, which is too fast for a wheel that
-    rolls: it is at rest."""
+    """A wheel with set point -7 is at rest if the board keeps reporting 12 RPM.
+
+    A wheel that rolled would become slower.
+    """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
     assert one.sigmas < 3.5
@@ -72,8 +75,7 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     ("name", "seed"), [("straight back", 9001), ("straight back", 9025), ("curve back", 9013)]
 )
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
-    """The drives have a wheel that rolls at 46 RPM instead of 34, and wheels that overshoot and
-    then roll at a steady speed."""
+    """In some drives a wheel rolls at 46 RPM instead of 34, in others it overshoots at first."""
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
     assert one.sigmas < 3.0
@@ -81,7 +83,7 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """The feed-forward is too large for the motor; ticks do not show that, but report 0x20 does."""
+    """Too much feed-forward makes the wheels fast; no ticks count it, but report 0x20 shows it."""
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
     assert one.way_m > 11.0
@@ -90,7 +92,7 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ticks come so soon after each other that the firmware gives some of them no speed."""
+    """At 62 RPM the firmware loses ticks from its measured speed, as they come too fast."""
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Delay with which ticks were read, estimated from the board's time in them."""
+"""The delay with which ticks are read, estimated from the board's time in them."""
 
 from random import Random
 
@@ -13,7 +13,7 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 
 @pytest.mark.parametrize("lost", [0.0, 0.067], ids=["goes on", "stands while it sends"])
 def test_a_read_that_is_late_is_told(lost: float) -> None:
-    """Every 0.2 s the board sends eleven lines of 1.2 ms; its clock may stop while it sends."""
+    """The estimate finds late reads, although the board's clock may stop while the board sends."""
     board = BoardTime()
     found = []
     for step in range(60):
@@ -40,7 +40,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """Random read delays of up to 30 ms give the estimate a standard deviation of half of that."""
+    """If reads are up to 30 ms late at random, the estimated delay has half that sigma."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -49,7 +49,7 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """Without a known clock the delay is 0, with a standard deviation of 12 ms."""
+    """While the unit of the board's clock is unknown, the delay is 0, with a sigma of 12 ms."""
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
     for step in range(20):

@@ -33,7 +33,7 @@ RPM = math.tau / 60
 
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
-    """Low pass, periods and the user's gains arrive although single lines are lost."""
+    """Low pass, periods and the user's gains arrive at the board although single lines are lost."""
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
     rig.run(5.0)
@@ -66,7 +66,7 @@ def test_a_restarted_board_is_configured_again() -> None:
 
 
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
-    """A board that boots at once is hardly silent, but its ticks begin at zero."""
+    """A board that restarts within a moment is noticed because its tick counters begin at zero."""
     rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
     rig.run(5.0)
     rig.order(20, 20, 6.0)
@@ -85,7 +85,7 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
 def test_a_board_that_was_left_in_another_mode_is_fetched_back(
     firmware: Firmware, before: TerminalMode
 ) -> None:
-    """A program before the driver may have set any mode, even commands without checksums."""
+    """A previous program may have set any mode of the board, even commands without checksums."""
     rig = Rig(nominal(firmware))
     rig.run(2.1)
     for _ in range(6):
@@ -102,7 +102,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """Value 4 of command 0x11 selects lines without checksum.
 
-    It overwrites the left short correction, which the driver then restores.
+    The command overwrites the left short correction, which the driver then restores.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     for _ in range(140):
@@ -116,7 +116,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 
 @BOTH
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
-    """The public firmware does not count ticks after backward motion, so nothing proves rest."""
+    """The public firmware counts no ticks backward, so after a backward drive rest is unproved."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 4.0)
@@ -150,7 +150,7 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """For this reason RPM 0/0 precedes the set-points after a Stop.
+    """Without RPM 0/0 after a Stop, the public firmware does not start a wheel at a lower speed.
 
     The test is without feed-forward.
     """
@@ -168,7 +168,7 @@ def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
 @pytest.mark.slow
 @BOTH
 def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
-    """The board itself cuts the motors; the session latches the e-stop on the published event."""
+    """The e-stop button makes the board cut the motors, and the driver publishes the press."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -182,7 +182,7 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """The record arrives while the wheels turn; the board's clock gives its time unit."""
+    """The record arrives while the wheels turn; its unit of time follows from the board's clock."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -223,7 +223,7 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """One notice names the likely cause, and the first valid line clears the notice."""
+    """A notice names the likely sender of the foreign data; the first valid line clears it."""
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []
     assert ecu.advice is not None
@@ -235,7 +235,7 @@ def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -
 
 
 def test_the_number_of_damaged_groups_survives_a_new_connection() -> None:
-    """The faults of the diagnostics are counted over all connections."""
+    """Damaged groups are counted over all connections, not from the last one on."""
     ecu = LoisConversation(LoisEcuSettings())
     groups = [encode_report(Ticks(1000 + 200 * i, 5 + i, 7 + i)) for i in range(3)]
     last_line_at = 3 * len(groups[0]) // 4

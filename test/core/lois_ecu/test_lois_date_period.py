@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The period of the GPS date, beside the single dates that confirm the settings."""
+"""The period of the GPS date, and the requests of a single date that confirm the settings."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench
@@ -11,7 +11,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 class DeafBench(Bench):
-    """A bench whose robot does not hear the line ``lost`` when it is sent for the nth time."""
+    """A bench whose robot does not receive copy ``nth`` of ``lost``, the line with the period."""
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
         self.lost = encode_command(SetPeriod(Stream.GPS_DATE, period_ms))
@@ -30,7 +30,7 @@ class DeafBench(Bench):
 
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """The request of a single date replaces the period, so a line with the period follows it."""
+    """A request of a single date replaces the period, so the period is sent again after it."""
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
         bench = DeafBench(firmware, 500, nth)
@@ -40,7 +40,7 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """Each line with the period restarts it, so no periodic date comes while rounds continue."""
+    """Each copy of the line restarts the period, so requested dates confirm the settings."""
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)
     assert bench.session.board._ecu.confirmed

@@ -31,7 +31,7 @@ GROUPS: dict[str, list[Report]] = {"0x20": [*ODOMETRY], "0x12": [*TICKS], "0x0d"
 
 
 def rounded(found: list[Report]) -> list[bytes]:
-    """Encode reports to lines, so that they can be compared although floats are rounded."""
+    """Return the lines of the reports; the lines are equal even if floats were rounded."""
     return [encode_report(report) for report in found]
 
 
@@ -55,7 +55,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 
 
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
-    """From the second group of a kind on, a plausible group is returned with its last byte."""
+    """After the first group of a kind, a plausible group is returned with its last byte."""
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
         for group in (odometry, ticks):
@@ -69,7 +69,10 @@ def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() 
 
 
 def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -> None:
-    """Equal lines may be one line received twice; the next line or 50 ms of silence decides."""
+    """A group that ends with two equal lines waits for the next line, or for 50 ms of silence.
+
+    The equal lines might be one line that was received twice.
+    """
     alike = encode_report(Ticks(1000, 5, 5))
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Ticks(600, 4, 3)), 0.0) == []
@@ -92,11 +95,9 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     ],
 )
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """Any line may be damaged; a group stays valid if only its last line arrives a second time.
+    """A group with a damaged line is discarded, unless its last line arrives twice.
 
-    A GPS fix is different: it waits for the next line, and a second copy of its last line discards
-    it. A line of another odometry group in place of one of this group could not be noticed. Damage
-    does not move lines, so this is not tested.
+    A GPS fix is discarded even then, since it waits for the next line.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -127,7 +128,7 @@ def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damag
 
 
 def test_a_doubled_marker_costs_nothing() -> None:
-    """Between the two markers is an empty group, which is counted as damaged."""
+    """Two markers enclose an empty group, which counts as damaged; the next group is returned."""
     marker, *values = encode_report(TICKS[0]).splitlines(keepends=True)
     decoder = LoisDecoder()
     found = decoder.feed(marker + marker + b"".join(values), 0.0) + decoder.flush(0.0)
@@ -137,7 +138,7 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """Only the group that lost the line is discarded, not the other one (odometry or ticks)."""
+    """If a line of ticks is lost, the odometry after the ticks is still decoded, and vice versa."""
     decoder = LoisDecoder()
     found: list[Report] = []
     sent: list[bytes] = []
@@ -184,14 +185,14 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 
 
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
-    """Without a request the record's length is unknown, so lost lines could not be detected."""
+    """A record that was not requested has an unknown length, so lost lines could not be noticed."""
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
     assert decoder.group_statistics.damaged_groups == 1
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """A single jump is an error; two groups that agree show a restart, and one is discarded."""
+    """One group of ticks that jumps is an error; two that agree show that the board restarted."""
     decoder = LoisDecoder()
     said = [
         Ticks(400, 1000, 1001),
@@ -221,7 +222,7 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """A line out of range or of unknown kind gives no report in spite of its correct checksum."""
+    """A line of unknown kind or with a value out of range is counted and gives no report."""
     total = 0
     for character in line[:11]:
         total ^= character
@@ -232,14 +233,14 @@ def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
 
 @pytest.mark.parametrize("unit", ["ms", "ns"])
 def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
-    """The manual says ns, the public firmware sends ms."""
+    """The board's clock counts ns in the manual, but ms in the public firmware."""
     said = reports(4.0, firmware=unit == "ms")
     _, decoder = decoded(pieces(said))
     assert decoder.clock_unit == unit
 
 
 def test_a_line_that_lost_its_end_costs_no_other() -> None:
-    """The decoder begins a new line at the next colon."""
+    """A line without its line end is ended by the colon of the next line, which is decoded."""
     heading = encode_report(Heading(5))
     decoder = LoisDecoder()
     assert decoder.feed(b"x:\xff:12" + heading[:9] + heading, 0.0) == [Heading(5)]

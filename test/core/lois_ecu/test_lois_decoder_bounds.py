@@ -77,7 +77,7 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A torque sample of 0/0 looks like the end, under 0x17 (manual) and 0x04 (public firmware)."""
+    """A torque sample of 0/0 looks like the end of the record, under either command number."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)
     zero, some = b":" + code + b"00000000", b":" + code + b"00010002"

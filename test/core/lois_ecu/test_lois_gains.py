@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Notice about controller gains that are not set, so that the board uses its own."""
+"""The notice about controller gains that the user has not set, for which the board uses its own."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def opened(settings: LoisEcuSettings) -> AnyBench:
 
 
 def told(bench: AnyBench) -> list[str]:
-    """Return the notices about the board's own gains."""
+    """Return the notices about gains that are not set."""
     notices = [event.text for event in bench.events if isinstance(event, Notice)]
     return [sentence for sentence in notices if "board's own" in sentence]
 

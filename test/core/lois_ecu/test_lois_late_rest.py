@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Groups of lines whose rest is read late, and groups whose rest is lost."""
+"""Groups of lines whose last lines are read late or are lost."""
 
 import itertools
 
@@ -22,7 +22,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "
 
 
 def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
-    """Decode the pieces; return also the groups that silence completes between them."""
+    """Return the reports of the pieces, even those that only silence completes."""
     decoder, found = LoisDecoder(), list[Report]()
     for at, data in given:
         if decoder.resolves_at <= at:
@@ -70,9 +70,10 @@ def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject,
 @pytest.mark.parametrize("step_s", [0.1, 0.2, 0.4, 2.0])
 @pytest.mark.parametrize("kind", ["ticks", "ticks and odometry", "odometry", "position"])
 def test_lines_of_two_groups_never_make_one_group(kind: str, step_s: float) -> None:
-    """The end of one burst and the beginning of the next are lost, each at any line.
+    """The end of one burst and the beginning of the next are lost.
 
-    The board sends nothing else, so only time shows that lines were lost where their number fits.
+    If the number of the remaining lines is that of a group, only the time between them shows the
+    loss.
     """
     groups: list[list[Report]] = []
     for n in range(1, 7):

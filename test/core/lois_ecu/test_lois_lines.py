@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every message of the manual's table, against lines that are typed by hand."""
+"""Every message of the manual's table is compared with lines typed by hand."""
 
 import math
 from contextlib import suppress
@@ -102,7 +102,7 @@ def sum_in_capitals(lines: bytes) -> bytes:
 
 @pytest.mark.parametrize(("line", "command"), COMMANDS, ids=lambda value: str(value)[:32])
 def test_a_command_is_its_line_both_ways(line: bytes, command: Command) -> None:
-    """The manual's lines are encoded and decoded; upper case and a carriage return are valid."""
+    """The manual's lines are encoded and decoded; upper case and a carriage return are accepted."""
     assert encode_command(command) == line
     for form in (line, in_capitals(line), sum_in_capitals(line), line[:-1] + b"\r\n"):
         decoded = decode_command(form)
@@ -136,7 +136,7 @@ def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
 
 
 def test_odometry_behind_ticks_is_told_by_its_length() -> None:
-    """Under 0x12 the public firmware sends 3 lines of ticks, or 6 with odometry behind them."""
+    """Message 0x12 of the public firmware has 3 lines of ticks, or 6 lines with odometry."""
     decoder = LoisDecoder()
     ticks = b":12ffffffff39\n:120000019031\n:120000000a68\n:120000000930\n"
     odometry = encode_report(BoardOdometry(0.5, 0.25, 0.125, 0.0, 0.0, 0.0, appended=True))
@@ -148,7 +148,7 @@ def test_odometry_behind_ticks_is_told_by_its_length() -> None:
 
 
 def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
-    """The velocity is reported as missing; the pose in the same report stays valid."""
+    """A velocity of NaN is reported as missing; the pose in the same report stays valid."""
     decoder = LoisDecoder()
     lines = encode_report(BoardOdometry(1.0, 2.0, 3.0, math.nan, math.inf, -math.inf))
     (report,) = decoder.feed(lines, 0.0) + decoder.flush(0.0)
@@ -159,7 +159,7 @@ def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """The board pads the shorter channel with 10; this padding is removed."""
+    """Zeros end a record of tick times; the padding of 10 on the shorter channel is removed."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 2, 1)
     data = b":04000a000b3d\n" + encode_report(Record(RecordKind.RPM, (10, 12), (11,)))[14:]
@@ -178,7 +178,7 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 
 
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
-    """Two paddings of 362° end the record; a third fills up an odd number of headings."""
+    """Two values of 362° end a record of headings; a third makes the number of values even."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)
     data = b":0c0005fffb68\n:0c0003016a3c\n:0c016a016a69\n"
@@ -201,7 +201,7 @@ def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
     ids=str,
 )
 def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
-    """Period 0 would make the board deaf; a record of over 1024 samples never completes."""
+    """A period of 0 makes the board deaf; a record of over 1024 samples never completes."""
     with pytest.raises(FrameError):
         encode_command(command)
 

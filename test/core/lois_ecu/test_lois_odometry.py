@@ -37,7 +37,7 @@ def settled(firmware: Firmware) -> Rig:
 
 
 def test_the_boards_own_odometry_would_be_wrong() -> None:
-    """The board's odometry misses more than 15 % of a straight drive, so it is not passed on."""
+    """The odometry that the board sends misses over 15 % of a straight drive, so it is not used."""
     rig = settled("firmware")
     rig.order(20, 20, 8.0)
     board = rig.board.odometry.pose
@@ -49,7 +49,7 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The public firmware counts no ticks backward, so commands and heading replace them there."""
+    """The public firmware counts no ticks backward; commands and heading are then used instead."""
     rig = settled(firmware)
     rig.order(20, 20, 4.0)
     assert rig.estimates[-1][0].source == "ticks"
@@ -82,7 +82,10 @@ def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
 
 @BOTH
 def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
-    """At 20 Hz between groups, their covariance grows and their mean error is below 3 cm."""
+    """Predictions between two estimates are wrong by less than 3 cm on average.
+
+    Their covariance grows.
+    """
     rig = settled(firmware)
     rig.order(20, 24, 6.0)
     misses = []
@@ -107,7 +110,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The displacements add up to the distance, and each step stays below 1 m/s plus 3 cm."""
+    """The wheels' displacements add up to the distance; each step is at most 1 m/s plus 3 cm."""
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
     rig.order(*STOP, 2.0)
@@ -119,7 +122,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 
 
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
-    """The counters restart at zero, which is not motion; rolling out adds at most 5 cm."""
+    """A restart sets the counters to zero, which is not motion; the roll-out adds at most 5 cm."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
     for step in range(1, 11):
@@ -138,7 +141,7 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
 def test_a_board_that_restarts_ends_the_motion_in_odom(
     firmware: Firmware, pair: tuple[int, int]
 ) -> None:
-    """Set-points that continue during the restart move the pose no further than the robot."""
+    """Set points that are sent during a restart must not move the pose further than the robot."""
     rig = settled(firmware)
     rig.order(*pair, 4.0)
     first = rig.driver.predicted(rig.now)
@@ -161,7 +164,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
-    """The distance until then is not scaled again."""
+    """A new wheel radius scales only later distances, not the distance driven before the change."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -181,7 +184,7 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
-    """Part of the ticks of the next group are those of a way that was predicted already."""
+    """When a setting changes, part of the next group's ticks is a way that was predicted before."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -199,10 +202,9 @@ def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
 
 
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
-    """Ticks after a silence of half a second correct a prediction that was too far ahead.
+    """After half a second of silence, the ticks show that the wheels did not roll on as predicted.
 
-    The wheels should have rolled on in that time. How far they roll after they are stopped is not
-    counted.
+    The prediction was too far ahead. How far the wheels roll after their stop is not counted.
     """
     ours = LoisEcuSettings()
     odometry = LoisOdometry(ours)
@@ -221,7 +223,7 @@ def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_sa
 
 
 def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
-    """The velocity is ignored, and the heading in the same report is used."""
+    """A velocity of NaN is ignored; the heading in the same report is used."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(-20, -20), 0.0)
     found: list[FusedOdometry] = []
@@ -237,7 +239,7 @@ def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """The estimate is poor, and its standard deviation exceeds 20 % of the distance."""
+    """Backward by duty, only commands are known: sigma exceeds 20 % of the distance."""
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
     found: list[FusedOdometry] = []
@@ -251,7 +253,10 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
 
 @BOTH
 def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
-    """The board's left wheel is the robot's right one; the estimate is still right."""
+    """On an inverted board, the board's left wheel is the robot's right one.
+
+    The estimate is still right.
+    """
     rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
     rig.run(4.0)
     rig.order(15, 20, 5.0)
@@ -264,10 +269,10 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
 def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the boot gains a wheel swings for good, and nothing shows how between two groups."""
+    """With the boot gains a wheel's speed oscillates, and no report shows it between two groups."""
 
     def variance() -> float:
-        """Return the variance in (m/s)² that is predicted after four ticks too many."""
+        """Return the variance in (m/s)² of a speed predicted after a group with 4 extra ticks."""
         odometry, ticks = LoisOdometry(LoisEcuSettings()), 0
         odometry.wrote(SetRpm(20, 20), 0.0)
         for step in range(52):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When a LOIS ECU's board publishes odometry: at ``odom_rate_hz``."""
+"""The rate ``odom_rate_hz`` at which the driver of a LOIS ECU publishes odometry."""
 
 import pytest
 from any_board import TICK_S, LoisRobot
@@ -14,7 +14,7 @@ PERIOD_S = 0.05
 
 
 def published(board: LoisEcuBoard, now: float) -> bool:
-    """Elapse until ``now``; return whether the board published odometry."""
+    """Let the time pass until ``now``; return whether the board published odometry."""
     return any(isinstance(reading, OdometryReading) for reading in board.elapse(now))
 
 
@@ -23,7 +23,7 @@ def published(board: LoisEcuBoard, now: float) -> bool:
 def test_odometry_that_is_late_is_not_published_twice_at_once(
     firmware: str, delay_s: float
 ) -> None:
-    """After a short delay the grid of times is kept; after a longer one a new grid begins."""
+    """After a short delay the times of publication stay; after a long one they begin anew."""
     bench = Bench(firmware)
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -37,7 +37,7 @@ def test_odometry_that_is_late_is_not_published_twice_at_once(
 
 @FIRMWARE
 def test_the_first_odometry_is_published_once(firmware: str) -> None:
-    """The second one follows a period later."""
+    """The second odometry is published one period after the first."""
     lois = LoisRobot(firmware)
     board, now, times = LoisEcuBoard(LoisEcuSettings()), 1000.0, []
     board.connect()

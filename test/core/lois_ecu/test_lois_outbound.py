@@ -41,14 +41,14 @@ TALKS: dict[str, list[Command]] = {
 
 
 def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]]:
-    """Return command number and payload of each line that the firmware accepts from bytes."""
+    """Return the command number and the payload of each line that the firmware accepts."""
     reader = LineReader(lenient=lenient)
     reader.checks = with_sum
     return list(reader.take_all(data))
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """Yield all sets of at most ``most`` positions out of ``length`` positions."""
+    """Yield all sets of at most ``most`` out of ``length`` positions."""
     for count in range(most + 1):
         yield from combinations(range(length), count)
 
@@ -84,7 +84,10 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """The driver sends set-points 18 ms apart, since the board may be deaf for 13 ms at once."""
+    """A loss of exactly one line's length may join two set points, so they are sent 18 ms apart.
+
+    The board may be deaf for 13 ms at once.
+    """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
     assert heard(joined, with_sum=True, lenient=False) == [(2, 17 << 16)]
@@ -94,7 +97,7 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """The driver sends the LED's line 15 ms after a motion; the reverse order needs no pause."""
+    """The LED's line is sent 15 ms after a motion line; a motion line may follow it at once."""
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)
     led = encode_command(SetLed(True), with_sum=with_sum)

@@ -54,7 +54,7 @@ def happen(odometry: LoisOdometry, what: object, now: float) -> None:
 
 @given(st.lists(st.tuples(WAITS_S, HAPPENINGS), max_size=30))
 def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, object]]) -> None:
-    """The pose is finite for reports, commands, restarts and connections in any order."""
+    """The pose stays finite after any reports, commands, restarts and connections."""
     odometry, now = LoisOdometry(LoisEcuSettings()), 1000.0
     for wait_s, what in events:
         now += wait_s
@@ -67,7 +67,10 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """Between two groups of 0x20 the robot starts backward, and the covariance stays finite."""
+    """The robot starts backward between the first two groups after a reconnect.
+
+    The covariance stays finite.
+    """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.1, 0.1, 0.3, 0.0, 0.0, 0.0, appended=True)
     odometry.heard_ticks(Ticks(0, 16, 35), 9.1)
@@ -85,8 +88,11 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """500 ticks in 12 s are a speed that wheels may have, and a clock in ns wraps every 4.3 s. But
-    it contradicts the silence if the board restarted behind an adapter that kept its power."""
+    """After a silence of 12 s, the board's clock tells a restart from wheels that rolled back.
+
+    The 500 ticks alone do not: wheels may have that speed, and a clock in ns wraps every 4.3 s. The
+    clock of a board that restarted does not fit the length of the silence.
+    """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []
 

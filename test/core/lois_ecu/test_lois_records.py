@@ -19,7 +19,7 @@ def read(path: Path, record: Record, count_s: float | None = 1e-4) -> str:
 
 
 def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
-    """At 20 RPM, 60 ticks a turn are 50 ms apart; 65535 is an overflow and its cell stays empty."""
+    """At 20 RPM, 60 ticks a turn are 50 ms apart; for an overflow (65535) the cells stay empty."""
     assert read(tmp_path / "new" / "rpm.csv", RPM).splitlines() == [
         "sample,left_tick_s,right_tick_s,left_rpm,right_rpm,left_counts,right_counts",
         "0,0.0500000,0.0250000,20.00,40.00,500,250",
@@ -51,7 +51,7 @@ def test_torque_and_headings_have_their_columns(tmp_path: Path) -> None:
 
 
 def test_a_record_that_nobody_waits_for_leaves_no_file(tmp_path: Path) -> None:
-    """A file is neither left after a record is abandoned, nor after a write that fails."""
+    """No file is left after a record is abandoned, or after a write that fails."""
     assert not save(RecordReading(RPM, 1e-4, 60), tmp_path / "rpm.csv", lambda: False)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OSError, match="taken"):
@@ -60,5 +60,5 @@ def test_a_record_that_nobody_waits_for_leaves_no_file(tmp_path: Path) -> None:
 
 
 def test_names_tell_what_and_when() -> None:
-    """A file's name has the kind of record and the UTC time, to the microsecond."""
+    """The name of a record's file has the kind of record and the UTC time, to the microsecond."""
     assert file_name(RecordKind.TORQUE, 0.25) == "torque_19700101T000000_250000.csv"

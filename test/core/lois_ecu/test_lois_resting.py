@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a wheel at rest for which the public firmware keeps reporting the same speed."""
+"""Detection of a wheel at rest whose last speed the public firmware still reports."""
 
 import pytest
 
@@ -10,7 +10,7 @@ GROUP_S = 0.1
 
 
 def told(*speeds_rpm: float, tuned: bool = False) -> RestingWheel:
-    """Return an estimator to which these speeds were reported, one in each group."""
+    """Return an estimator that has received these speeds, one in each group."""
     wheel = RestingWheel()
     for rpm in speeds_rpm:
         wheel.tell(rpm, GROUP_S, tuned=tuned)
@@ -18,14 +18,14 @@ def told(*speeds_rpm: float, tuned: bool = False) -> RestingWheel:
 
 
 def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands() -> None:
-    """With the boot gains a wheel falls from 31 to 12 RPM, and then its ticks end."""
+    """With the boot gains a wheel falls from 31 to 12 RPM and stops; 12 RPM is then repeated."""
     assert told(31, 28, 19, 12).chance == 0.0
     assert 0.0 < told(31, 28, 19, 12, 12).chance < 1.0
     assert told(31, 28, 19, 12, 12, 12).chance == 1.0
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """The tested wheel falls from 41 to 20 RPM within 0.4 s, and then its ticks end."""
+    """A wheel that falls from 41 to 20 RPM is at rest only after one more repetition of 20 RPM."""
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
     assert 0.0 < told(43, 41, 29, 20, 20, 20).chance < 1.0
@@ -33,23 +33,23 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
-    """Wheels with other gains overshoot, then roll steadily; they rarely rest without a stop."""
+    """With the user's gains, wheels overshoot and then roll steadily; few stop by themselves."""
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """The number of repetitions does not change the result."""
+    """A speed that was constant from the beginning may be repeated any number of times."""
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """The tick after the late one seems to be early, so the board reports a high speed once."""
+    """The tick after a late one seems early, so the board once reports a high speed: 27 RPM."""
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 
 @pytest.mark.parametrize("rpm", [1, 3, 25, 40])
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
-    """The last speed before a rest is between 4.5 and 23.5 RPM."""
+    """A wheel comes to rest by itself only from 4.5 to 23.5 RPM."""
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
 
@@ -59,7 +59,7 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels have the same speed the board reports none; estimates replace it."""
+    """While both wheels have the same speed, the board reports none, and estimates are used."""
     wheel = told(12)
     for rpm in (30.0, 28.0):
         wheel.note(rpm, GROUP_S)

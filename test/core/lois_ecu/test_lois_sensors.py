@@ -22,7 +22,7 @@ from omnibot_driver.simulator.lois_ecu import DOCUMENTED, LoisSettings
 
 
 def test_gps_and_compass_come_in_si_units_and_enu() -> None:
-    """East is yaw 0; the GPS time needs a date, and position 0/0 is not regarded as a fix."""
+    """East is yaw 0; a GPS time needs a date; the position 0/0 is not a fix."""
     rig = Rig(
         LoisSettings(quirks=DOCUMENTED),
         LoisEcuSettings(periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000}),
@@ -101,8 +101,11 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """They were compared with the yaw before the reset. So 120 degrees, which the firmware may
-    report at north, was refused for good by a robot that had turned by 120 degrees."""
+    """The yaw is reset with the odometry, so later headings are compared with the new yaw.
+
+    Otherwise a reported heading of 120 degrees, which the firmware may send at north, would be
+    refused for good after a turn of 120 degrees.
+    """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)
     assert ecu.receive(headings, 0.0)

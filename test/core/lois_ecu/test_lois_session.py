@@ -19,7 +19,7 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The driver refuses to release the e-stop; the board itself would obey set-points."""
+    """While the button is held, the driver does not release the e-stop; the board itself would."""
     bench = Bench(firmware)
     bench.drive_on()
     bench.presses(True)
@@ -36,7 +36,7 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """Advice names this board's parameters, and the e-stop release, since it lacks ~/start."""
+    """A LOIS ECU has no ~/start: advice names its own parameters, and the release of the e-stop."""
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
         with pytest.raises(CommandRefused, match="motion monitor"):
@@ -58,7 +58,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """The few ticks of a drive of 1.2 s are enough if the wheels are at rest at the reset."""
+    """The few ticks of a drive of 1.2 s prove a reset if the wheels are at rest when it is sent."""
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
     bench.run(3.0)
@@ -71,7 +71,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """Counters were zero before: the reset is sent at least twice and stays unconfirmed."""
+    """If the tick counters were zero before, no report can prove the reset, so it is sent twice."""
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
@@ -102,7 +102,7 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
-    """The counters are zero since the first reset, and the second one does not arrive."""
+    """The first reset has set the counters to zero, so zeros do not prove the lost second one."""
     bench = Bench(firmware)
     bench.drive_on(0.2, 6.0)
     bench.run(3.0)
@@ -115,7 +115,7 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
-    """Only the record arrives for 1.2 s, and the robot is driven meanwhile."""
+    """For 1.2 s the board sends nothing but the record, while the robot is driven."""
     bench = Bench(firmware)
     bench.drive_on(0.6, 2.0)
     board = bench.session.board
@@ -131,7 +131,7 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
 
 
 def test_a_long_record_is_not_taken_for_damage() -> None:
-    """The record's lines are valid though not reports, so no advice about damage appears."""
+    """Lines of a record are valid although they are not reports, so no damage is reported."""
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -145,7 +145,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The driver reports missing data; half a line does not lead to advice on the baud rate."""
+    """Half a line before a silence is reported as missing data, without advice on the baud rate."""
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)
@@ -159,10 +159,10 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 
 @pytest.mark.parametrize("count", range(1, 13))
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
-    """Each of the five rounds writes the settings in another order.
+    """Each of the five rounds writes the settings in a different order.
 
-    A round may take as long as the board takes from one group to the next. In a fixed order, the
-    board would then be deaf for the same line in every round.
+    A round can take as long as the time between two groups. In a fixed order, the board would then
+    be deaf for the same line in every round.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
@@ -194,7 +194,7 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
 
 @FIRMWARE
 def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
-    """The repetition of settings, which follows a connection, ends with the final Stop."""
+    """After a connection the driver repeats its settings, but no longer after the final Stop."""
     bench = Bench(firmware)
     bench.close()
     bench.open()
@@ -208,7 +208,7 @@ def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
-    """The model of the motion goes on where it was when the board was reset."""
+    """A reset of the board's counters during a drive does not move the odometry."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 4.0)
     before_m = bench.odometry[-1].pose.x_m - bench.robot.way_m

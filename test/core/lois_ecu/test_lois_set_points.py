@@ -18,7 +18,7 @@ RPM = math.tau / 60
 
 
 def started(settings: LoisEcuSettings | None = None) -> LoisConversation:
-    """Return a conversation that has already sent the RPM 0/0 (three times) due after a Stop."""
+    """Return a conversation that has already sent the three RPM 0/0 due after a Stop."""
     ecu = LoisConversation(LoisEcuSettings() if settings is None else settings)
     ecu.wrote(CLEAR * 3, 0.0)
     return ecu
@@ -43,7 +43,7 @@ def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
     ],
 )
 def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: bytes) -> None:
-    """Both wheels are slowed by the same factor; rates that all round to zero become a Stop."""
+    """Above 50 RPM both wheels are slowed by the same factor; rates that round to 0 are a Stop."""
     ecu = started()
     total = 0
     for character in line[:11]:
@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """20 RPM are 0.2723 m/s; ``meaning`` returns the twist of a written line, up to rounding."""
+    """20 RPM are 0.2723 m/s; ``meaning`` turns the line back into the twist, up to rounding."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -65,7 +65,7 @@ def test_a_twist_is_said_and_understood() -> None:
 
 
 def test_an_inverted_board_has_its_wheels_exchanged() -> None:
-    """The wheels are exchanged when a twist is encoded and when a line is decoded."""
+    """On an inverted board, the wheels are exchanged in encoded and in decoded lines."""
     ecu = started(LoisEcuSettings(inverted=True))
     left = ecu.velocity(BodyTwist(0.0, 0.0, 0.5))
     assert left == started().velocity(BodyTwist(0.0, 0.0, -0.5))
@@ -73,7 +73,7 @@ def test_an_inverted_board_has_its_wheels_exchanged() -> None:
 
 
 def test_duty_is_limited() -> None:
-    """Duty is in percent; above the limit both wheels are slowed by the same factor."""
+    """Duty is in percent; above the limit, both duties are reduced by the same factor."""
     ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
     percent_radps = 1 / (130.0 * 0.13)
     assert ecu.wheels([50 * percent_radps] * 2) == b":01003200323b\n"
@@ -88,7 +88,7 @@ def encode_command_duty(left: int, right: int) -> bytes:
 
 
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
-    """A wheel at rest might never start without RPM 0/0; three lines are sent in case of loss."""
+    """After a Stop, RPM 0/0 is sent three times; without it a wheel at rest might never start."""
     ecu = started()
     drive = b":020014001438\n"
     for now in (1.0, 1.1):
@@ -118,7 +118,7 @@ def test_a_record_that_cannot_complete_is_refused() -> None:
     ],
 )
 def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
-    """A line may be lost; all three go out within 0.3 s, as each makes the board start anew."""
+    """The request is sent three times within 0.3 s, since each copy makes the board start again."""
     ecu = started()
     ecu.record(kind, samples)
     sent = b"".join(ecu.due(0.01 * step) for step in range(100))

@@ -11,7 +11,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def variance(settings: LoisEcuSettings, holds_s: float) -> float:
-    """Return the yaw variance in rad² after three changes of sign, ``holds_s`` apart."""
+    """Return the yaw variance in rad² after three changes of sign at intervals of ``holds_s``."""
     odometry = LoisOdometry(settings)
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     now, rpm, turned_s = 0.0, 20, 1.0
@@ -29,7 +29,7 @@ def variance(settings: LoisEcuSettings, holds_s: float) -> float:
 
 
 def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own_gains() -> None:
-    """With the public firmware's own gains a wheel still swings when the sign changes again."""
+    """With the boot gains, a wheel still oscillates when the set point changes its sign again."""
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 
 
@@ -37,7 +37,7 @@ def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own
 def test_a_wheel_that_has_settled_is_not_doubted(
     settings: LoisEcuSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A change of sign adds an error only if it comes soon after another one."""
+    """A sign change of the set points adds an error only if it comes soon after another one."""
     soon, late = variance(settings, 0.6), variance(settings, 15.0)
     monkeypatch.setattr(motion_filter, "UNSETTLED_S", (0.0, 0.0))
     assert soon > 1.02 * variance(settings, 0.6)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Loss of the line while a LOIS robot drives: without a watchdog its wheels keep turning."""
+"""Loss of the connection while a LOIS robot drives: without a watchdog the wheels keep turning."""
 
 import math
 
@@ -11,7 +11,7 @@ FIRMWARES = ("lois_ecu", "lois_ecu as documented")
 
 
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
-    """Return a bench whose line was lost for ``seconds`` in both directions during a drive.
+    """Return a bench whose connection was lost for ``seconds``, in both directions, during a drive.
 
     ``reopened``: the port was closed and opened again. The robot is at rest at the end.
     """
@@ -31,7 +31,7 @@ def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> An
 
 
 def off_by(bench: AnyBench) -> tuple[float, float]:
-    """Return the error of the estimated position in m, and the standard deviation of it."""
+    """Return the error of the estimated position, and its standard deviation, in m."""
     estimate, truth = bench.odometry[-1], bench.robot.board.truth  # type: ignore[attr-defined]
     error_m = math.hypot(estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m)
     return error_m, math.sqrt(estimate.covariance.xx + estimate.covariance.yy)
@@ -55,7 +55,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """Ticks count forward motion in the outage: the error is at most a tenth of the distance."""
+    """After an outage, the ticks tell the way forward within a tenth of the distance."""
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)
     assert error_m <= 0.1 * bench.robot.way_m
@@ -63,7 +63,7 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
-    """The covariance grows by the speed at which the robot may still be driving."""
+    """While the board is silent, the robot may still be driving, so the covariance grows."""
     bench = nominal(firmware)
     bench.drive_on(0.3, 4.0)
     bench.speaks = bench.hears = False

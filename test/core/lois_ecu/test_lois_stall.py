@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a commanded wheel that stands still, as the public firmware may hold it."""
+"""Detection of a commanded wheel that stands still: the public firmware may fail to start it."""
 
 import math
 
@@ -28,9 +28,9 @@ def pose(x_m: float) -> BoardOdometry:
 
 
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
-    """Return the times in s, out of six seconds, at which a wheel looked stalled.
+    """Return the times in s, within six seconds, at which a wheel looked stalled.
 
-    ``ticks``, ``ways_m``: ticks of both wheels, and distance in m by 0x20, for every 0.2 s.
+    ``ticks``: ticks of both wheels in each 0.2 s; ``ways_m``: distance in m that report 0x20 adds.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -56,7 +56,7 @@ def test_wheels_that_tick_do_not() -> None:
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """The public firmware does not count ticks of a wheel that turns backward."""
+    """The public firmware counts no ticks of a wheel that turns backward, so the pose is used."""
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
 
@@ -68,7 +68,7 @@ def looks_stalled(
     resting: tuple[bool, bool] = (False, False),
     settings: LoisEcuSettings | None = None,
 ) -> bool:
-    """Return whether a wheel with these set-points stalls at these speeds, one pair in 0.2 s."""
+    """Return whether a wheel looks stalled if these pairs of speeds are reported, every 0.2 s."""
     watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
     found = False
@@ -85,21 +85,24 @@ def looks_stalled(
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The pose proves nothing: the firmware integrates the speed that the left wheel had."""
+    """A left wheel whose reported speed never changes stands, even if the reported pose moves.
+
+    The firmware computes the pose from the last speed.
+    """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """The controller gives the wheel no power, so a wheel that rolled would slow down."""
+    """Above its set point a wheel gets no power; if it rolled, its reported speed would fall."""
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, the wheel has power even at its set-point.
+    """With feed-forward, a wheel gets power even above its set point, so its speed may be constant.
 
-    A changing speed of the other wheel still shows a rest.
+    If the other wheel's speed changes, a constant speed still shows a wheel at rest.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -107,7 +110,7 @@ def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> 
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
-    """A wheel that rolls backward is up to 10 % too fast, and integer speeds repeat."""
+    """Backward, a wheel is up to 10 % too fast, and its integer speeds repeat without a stall."""
     assert not looks_stalled([(-9, 9)] * 14)
     assert not looks_stalled([(-10, 9)] * 14)
 
@@ -119,33 +122,32 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """The board kept reporting a speed near the set-point when the wheel came to rest, so the wheel
-    gets no power."""
+    """If odometry finds a wheel at rest, a reported speed near the set point gives it no power."""
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
     assert not looks_stalled(still, targets=(-19, -19))
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """The controller gives the wheel power, so the wheel starts again by itself."""
+    """If the reported speed is below the set point, the wheel has power and starts by itself."""
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
 
 
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    """Return the velocity in the earth frame, by the speeds of both rims, in m/s."""
+    """Return the velocity in the earth frame, in m/s, for these speeds of the wheel rims."""
     speed = (left + right) / 2
     return speed * math.cos(yaw_rad), speed * math.sin(yaw_rad)
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
-    """A wheel may well stand still below 2 RPM, and duty bypasses the controller."""
+    """Below 2 RPM a wheel may stand still, and duty commands bypass the speed controller."""
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []
 
 
 def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
-    """A controller that was saturated keeps 68 RPM at a set-point of -31 until RPM 0/0."""
+    """A saturated controller keeps a wheel at 68 RPM, with a set point of -31, until RPM 0/0."""
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
     for step in range(30):
@@ -171,9 +173,9 @@ def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
-    """The robot has driven 1.5 m forward; then its wheels are blocked.
+    """Wheels that are blocked after a drive forward do not move the pose back.
 
-    ``reset``: the odometry is reset in between.
+    ``reset``: the odometry is reset before the wheels are commanded backward.
     """
     driver, ticks, places = LoisConversation(LoisEcuSettings()), 0, []
     for step in range(50):

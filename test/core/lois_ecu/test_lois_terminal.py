@@ -18,7 +18,7 @@ COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
 
 @FIRMWARE
 def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
-    """The mode is set once the robot is at rest; from then on the sensor's lines are passed on."""
+    """A terminal mode is set once the robot is at rest; then the sensor's lines are passed on."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
     begun = len(bench.written)
@@ -43,7 +43,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The end is reported once, even if the first lines that end the mode are lost."""
+    """The end of a terminal mode is reported once, even if its first lines are lost."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -63,7 +63,7 @@ def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown
 
 
 def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
-    """After the restart, settings are written first, then the terminal mode."""
+    """After a restart of the board, settings are written first, and then the terminal mode."""
     bench = Bench("firmware", GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
     bench.run(1.0)
@@ -79,7 +79,7 @@ def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
 def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
     firmware: str, settings: LoisEcuSettings
 ) -> None:
-    """The board reports no motion in this mode, so a pose would not be measured."""
+    """In a terminal mode the board reports no motion, so no pose is published."""
     bench = Bench(firmware)
     configure(bench, settings)
     bench.run_until(lambda: bool(told(bench, TerminalLine)))
@@ -97,7 +97,7 @@ def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
 
 @FIRMWARE
 def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
-    """The e-stop is latched as usual, and its release does not allow motion in this mode."""
+    """In a terminal mode the e-stop is latched as usual; its release does not allow motion."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -111,7 +111,7 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 
 @FIRMWARE
 def test_another_drive_mode_stops_first(firmware: str) -> None:
-    """Motion is refused until the robot is at rest; after that, motion is commanded as duty."""
+    """Until the robot is at rest, motion is refused; then the new drive mode (duty) is used."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
     configure(bench, LoisEcuSettings(drive_mode="duty"))
@@ -127,7 +127,7 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 
 
 def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
-    """The present command was given in percent by the old scale."""
+    """A duty in percent depends on the duty scale, so a new scale stops the robot first."""
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
     bench.drive_on(0.3, 3.0)
     configure(bench, LoisEcuSettings(drive_mode="duty", duty_scale=500.0))
@@ -137,7 +137,7 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 
 
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
-    """The public firmware reads only as fast as the compass, at 4800 baud, so only Stop is sent."""
+    """In compass mode the public firmware reads only 4800 baud, so the e-stop sends only Stop."""
     bench = Bench("firmware")
     configure(bench, COMPASS)
     bench.run_until(lambda: bench.board.terminal_mode == 2)
@@ -151,7 +151,7 @@ def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass()
 
 
 def test_a_terminal_mode_ends_a_record() -> None:
-    """A record that is under way would never arrive in this mode, so it is abandoned."""
+    """No record arrives in a terminal mode, so a record that is under way is abandoned."""
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)

@@ -27,10 +27,10 @@ WORKS = pytest.mark.parametrize(
 
 
 class GpsRig(Rig):
-    """A robot with a GPS that has no date until ``dated`` is set; ``sent``: lines and their times.
+    """A robot whose GPS has no date until ``dated`` is set; ``sent``: lines and their times.
 
-    ``requests``: the times of the requests of a date. ``unknown``: the date that the GPS sends
-    while it has none.
+    ``requests``: times of the requests of a date; ``unknown``: what the GPS sends instead of a
+    date.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class GpsRig(Rig):
         return [at for at, line in self.sent if line == REQUEST]
 
     def fixes(self) -> list[bool]:
-        """Return whether each position since the last call is a fix."""
+        """Return, for each position since the last call, whether it is a fix."""
         found = [reading.valid for reading in self.readings if isinstance(reading, FixReading)]
         self.readings.clear()
         return found
@@ -70,9 +70,9 @@ class GpsRig(Rig):
 def test_a_position_without_a_date_is_not_a_fix(
     quirks: Quirks, unknown: tuple[int, int, int]
 ) -> None:
-    """The GPS reports a position, and zeros or the start of its calendar as its date.
+    """A position is a fix only if the GPS also reports a date.
 
-    Then it reports a date, too.
+    Zeros and the start of the calendar are not a date.
     """
     rig = GpsRig(quirks, unknown=unknown)
     rig.run(8.0)
@@ -89,7 +89,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 
 @WORKS
 def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Quirks) -> None:
-    """A zero date ends the rounds of settings, but not the requests."""
+    """The date is requested until it is known; a zero date only ends the rounds of settings."""
     rig = GpsRig(quirks)
     rig.run(5.0)
     rig.sent.clear()
@@ -104,7 +104,7 @@ def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Q
 
 @WORKS
 def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
-    """The date is requested while the robot drives, at least 15 ms after a motion."""
+    """While the robot drives, the date is requested at least 15 ms after a motion line."""
     rig = GpsRig(quirks)
     rig.run(5.0)
     rig.sent.clear()
@@ -118,7 +118,7 @@ def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
 
 @WORKS
 def test_past_midnight_positions_are_fixes_and_the_time_comes_back(quirks: Quirks) -> None:
-    """The date of the new day is requested at once; the GPS has a date all the time."""
+    """After midnight the new date is requested at once, and positions remain fixes."""
     rig = GpsRig(quirks, utc_s=UTC_S + DAY_S - 10, dated=True)
     rig.run(5.0)
     rig.fixes()
@@ -133,7 +133,7 @@ def test_past_midnight_positions_are_fixes_and_the_time_comes_back(quirks: Quirk
 
 
 def test_no_date_is_requested_from_a_board_that_ignores_its_gps() -> None:
-    """The public firmware sends zeros as position, time and date."""
+    """The public firmware sends zeros as position, time and date, so no date is requested."""
     rig = GpsRig(FIRMWARE, dated=True)
     rig.run(5.0)
     rig.sent.clear()
@@ -142,7 +142,7 @@ def test_no_date_is_requested_from_a_board_that_ignores_its_gps() -> None:
 
 
 def test_no_date_is_requested_where_dates_come_periodically() -> None:
-    """A request would replace the period that the user has set."""
+    """A request of a date would replace the period that the user has set."""
     rig = GpsRig(DOCUMENTED)
     rig.driver.settings = LoisEcuSettings(
         periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000, Stream.GPS_POSITION: 1000}

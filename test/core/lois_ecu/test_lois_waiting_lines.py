@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to a LOIS ECU that wait or pass while the robot drives: settings, and the LED's line."""
+"""Lines to a LOIS ECU while the robot drives: settings wait, and the LED's line does not."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure
@@ -20,7 +20,7 @@ def switch_led(bench: Bench, on: bool) -> None:
 
 
 def drive_and_require_sleep(bench: Bench, seconds: float) -> None:
-    """Drive on, and require at each step that the session is not due again at once."""
+    """Drive for ``seconds``; require at each step that the session is not due again at once."""
     for step in range(round(seconds / 0.01)):
         if step % 10 == 0:
             bench.drive()
@@ -42,7 +42,7 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a date the rounds of settings continue, but they wait while the robot drives."""
+    """If no date confirms the settings, their rounds continue, but not while the robot drives."""
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
     bench.drive_on(0.3, 1.0)
@@ -51,7 +51,7 @@ def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
 
 @FIRMWARE
 def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> None:
-    """The board does not hear the first of the LED's lines; later ones are still sent."""
+    """A change of settings does not discard the copies of the LED's line that are not sent yet."""
     bench = Bench(firmware)
     bench.hears = False
     switch_led(bench, on=True)
@@ -62,7 +62,7 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 
 
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
-    """If both were lost in part by one pause of 13 ms, their rests could be another motion."""
+    """A pause of 13 ms could cut both lines, and what is left of them could be another motion."""
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)
     switch_led(bench, on=True)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Foreign data on the port of a LOIS ECU: one sentence of advice, no motion, recovery."""
+"""Foreign data on the port of a LOIS ECU leads to one notice; the board is then found again."""
 
 from random import Random
 
@@ -29,7 +29,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("data", "sentence"), WRONG.values(), ids=WRONG)
 def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, sentence: str) -> None:
-    """One notice names the foreign device; once the board is there, the robot can be driven."""
+    """One notice names the foreign device; once the LOIS ECU is there, the robot can be driven."""
     board, robot = MAKERS["lois_ecu"]()
     bench = AnyBench(board, robot)
     bench.speaks = False
