@@ -35,7 +35,7 @@ MOTIONS = 6
 
 
 def nees(bench: MartBench) -> float:
-    """Return the NEES of the last published pose against the present true pose."""
+    """Return the normalised error squared of the last published pose, against the true pose."""
     told, truth = bench.odometry[-1], bench.truth
     yaw_rad = math.remainder(told.pose.yaw_rad - truth.yaw_rad, math.tau)
     error = np.array([told.pose.x_m - truth.x_m, told.pose.y_m - truth.y_m, yaw_rad])
@@ -45,7 +45,7 @@ def nees(bench: MartBench) -> float:
 
 
 def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[float]:
-    """Yield the NEES during a random drive; the last value is that at its end."""
+    """Yield the normalised error squared again and again during a random drive, and at its end."""
     random = Random(seed)
     unequal = random.uniform(-0.04, 0.04)
     bench = MartBench(FIRMWARES[seed % 3], faults, seed=seed, motor_inequality=unequal).ready()
@@ -73,7 +73,7 @@ def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[
 
 
 def main() -> None:
-    """Print one row for each network, without and with goals."""
+    """Print a row of figures for each kind of network, without and with goals."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print(
         "| Network | Motions | Mean at the end | Mean | Median | Beyond 16.3 |\n" + "|---" * 6 + "|"

@@ -55,7 +55,7 @@ class NetworkRobot(MartRobot):
 
 
 def sleeps(board: SimulatedMart) -> bool:
-    """Return whether nothing happens in the next five ticks; if so, skip them."""
+    """Return whether nothing is due in the next five ticks; if so, skip these ticks."""
     if board.server.wake_at <= (board.ticks + 5) * TICK_S:
         return False
     board.ticks += 5
@@ -83,7 +83,7 @@ class MartBench(AnyBench):
         self._wake_s = -math.inf
 
     def ready(self) -> "MartBench":
-        """Connect, until the session is nominal and the robot is seen to stand still."""
+        """Connect, and wait until the session is nominal and the robot is known to stand still."""
         self.open()
         self.run_until(lambda: self.session.state == "nominal", 30.0)
         self.run(2.0)
@@ -101,7 +101,7 @@ class MartBench(AnyBench):
         self._wake_s = self.session.wake_at
 
     def run(self, seconds: float) -> None:
-        """Let the time pass, and call the session only when it has something to do."""
+        """Advance by ``seconds``; the session is called only when it has something to do."""
         for _ in range(round(seconds / BENCH_TICK_S)):
             self.now += BENCH_TICK_S
             packets = self.robot.advance()
@@ -114,13 +114,13 @@ class MartBench(AnyBench):
                 self.settle()
 
     def command(self, vx: float, yaw_rate: float, seconds: float) -> None:
-        """Command the twist ten times a second; ignore refusals."""
+        """Command the twist ten times a second for ``seconds``; ignore refusals."""
         for _ in range(round(seconds / 0.1)):
             self.try_command(vx, yaw_rate)
             self.run(0.1)
 
     def try_command(self, vx: float, yaw_rate: float) -> str:
-        """Command the twist once; return why it was refused, or empty."""
+        """Command the twist once; return the reason of a refusal, or an empty text."""
         try:
             self.session.command_twist(BodyTwist(vx, 0.0, yaw_rate), self.now)
         except CommandRefused as error:
@@ -130,7 +130,7 @@ class MartBench(AnyBench):
         return ""
 
     def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
-        """Command the goal pose, again every 0.1 s while it is refused."""
+        """Command the goal pose; repeat the command every 0.1 s while it is refused."""
         for _ in range(50):
             try:
                 self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
@@ -158,7 +158,7 @@ class MartBench(AnyBench):
         return self.odometry[-1].pose - self.truth
 
     def said(self, since: int = 0) -> list[bytes]:
-        """Return the datagrams sent so far, from index ``since`` on, without polls."""
+        """Return the datagrams of ``written`` from index ``since`` on, without polls."""
         return [data for _, data in self.written[since:] if data not in POLLS]
 
     def job(self, job: Job, *arguments: object, limit_s: float = 95.0) -> JobDone:
@@ -181,7 +181,7 @@ class MartBench(AnyBench):
 
 
 def steer_along(bench: MartBench, corners: list[tuple[float, float]], near_m: float = 0.04) -> None:
-    """Steer along the corners by odometry, as a ROS program would, turning at each corner."""
+    """Steer from corner to corner by odometry, as a ROS program would, and turn at each corner."""
     for x_m, y_m in corners:
         for _ in range(600):
             way = bench.odometry[-1].pose.way_to(Pose(x_m, y_m, 0.0))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random drives on networks of all kinds, in simulated time: is the robot at rest at the end?
+"""Random drives on networks of all kinds, in simulated time; the robot must be at rest at the end.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60`` makes 60 drives for each
 network; docs/boards/mart.md has the figures.
@@ -44,7 +44,7 @@ class Outcome(NamedTuple):
 
 
 def drive(faults: NetworkFaults, seed: int) -> Outcome:
-    """Make random motions, goals, e-stops and stalls of the driver, then shut it down."""
+    """Make a random drive with goals, e-stops and stalls of the driver, then shut it down."""
     random = Random(seed)
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     longest_s = 0.0
@@ -75,7 +75,7 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
 
 
 def main() -> None:
-    """Print one row for each network."""
+    """Print a row of figures for each kind of network."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print("| Network | Robot stood, server answers | Longest stop | Mean way |\n|---|---|---|---|")
     for name, faults in NETWORKS.items():

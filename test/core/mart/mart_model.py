@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A search model of any driver that obeys the tables of ``states``, and of a MART server.
+"""A search model of a MART server, and of any driver that obeys the tables of ``states``.
 
 The modelled driver sends whatever the tables allow, in any order, so it does more than the real
-driver ever does. Each datagram may arrive, be lost, be late, or come twice; the IMU may die at any
-step. All reachable states are searched, so the number of commands from the user is unlimited. Time
-is abstract: a late copy is on its way until it arrives, or is lost, or the network delay is over. A
-command that waits for that delay is allowed only when such copies have arrived or are lost.
+driver. Each datagram may arrive, be lost, be late, or come twice; the IMU may die at any step. All
+reachable states are searched, so the number of commands from the user is unlimited. Time is
+abstract: a late copy arrives at some later step or is lost. A command that the real driver sends
+only after the network delay is allowed only when no such copy is on its way.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,11 +28,11 @@ from omnibot_driver.core.mart.words import WORDS, Kind
 
 BY_TEXT: Final = {("CHECK" if word.kind is Kind.CHECK else word.text): word for word in WORDS}
 COPIED: Final = frozenset(SAID)
-"""Commands of which a copy may come late; copies of all others change nothing here."""
+"""Commands of which a late copy is modelled; copies of the others do not change the server."""
 MOVES: Final = ("TF", "MCR")
 MOST_COPIES: Final = 2
 UNANSWERED: Final = 3
-"""Number of unanswered stops after which the stop port is used as the last resort."""
+"""Number of unanswered stops after which the driver uses the stop port, its last resort."""
 
 
 class Driver(NamedTuple):
@@ -40,8 +40,8 @@ class Driver(NamedTuple):
 
     ``proved``: the IMU was just proved alive. ``pending``: the command that awaits a reply.
     ``unanswered``: number of stops without an answer. ``moved``: the last motion was a controlled
-    move. ``counted``: the encoder was read since the robot stands still, and since a harmful copy
-    can no longer come. ``greeted``: the server has been stopped once.
+    move. ``counted``: the encoder was read after the robot stopped, and after the last harmful copy
+    could arrive. ``greeted``: the server has been stopped once.
     """
 
     state: State = State.UNKNOWN
@@ -57,7 +57,8 @@ class Driver(NamedTuple):
 class World(NamedTuple):
     """One state of server, driver and network.
 
-    ``copies``: late commands that are on their way; ``replies``: late replies that are on theirs.
+    ``copies``: late commands that have not arrived yet. ``replies``: late replies that have not
+    arrived yet.
     """
 
     server: Server = Server()
@@ -71,7 +72,7 @@ Step = tuple[str, World]
 
 
 def allowed(world: World, word: str, rules: Rules) -> bool:
-    """Return whether the tables, and the rules about time, let the driver send ``word`` now."""
+    """Return whether the tables and the rules about time let the driver send ``word`` now."""
     driver = world.driver
     row = BY_TEXT[word]
     if not rules(driver.state, word, driver.motion):
@@ -96,12 +97,12 @@ def allowed(world: World, word: str, rules: Rules) -> bool:
 
 
 def table(state: State, word: str, motion: Motion) -> bool:
-    """Return whether the rules of the real driver allow ``word``."""
+    """Return whether the tables of the real driver allow ``word`` in this state and motion."""
     return may_say(state, BY_TEXT[word], motion)
 
 
 def steps(world: World, rules: Rules = table) -> Iterator[Step]:
-    """Yield everything that may happen next, each with the world after it."""
+    """Yield every step that is possible in this world, each with the world after it."""
     server, driver = world.server, world.driver
     if server.imu:
         yield "the IMU dies", world._replace(server=server._replace(imu=False))
@@ -132,8 +133,8 @@ def steps(world: World, rules: Rules = table) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the ways in which a controlled move ends.
 
-    The move took longer than a copy of its command can be late. So a copy has been lost, or is
-    in the server's queue and begins at once.
+    The move takes longer than a copy of its command can be late. So when the move ends, such a copy
+    has been lost, or it is in the server's queue and begins at once.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -179,17 +180,17 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Return whether the stop port was used, but the driver never knew the motion."""
+    """Return whether a driver that has never known the server's motion used the stop port."""
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
 
 
 def _asked(world: World) -> Step:
-    """Return the step in which the driver, after the stop port, asks the server what moves.
+    """Return the step in which the driver, after it used the stop port, asks the server what moves.
 
-    The server returns its name, so earlier datagrams have arrived or are lost. Then the driver asks
-    whether a motion is in progress, and reads the encoder to see whether the robot moves. Lost
-    replies change nothing.
+    The server first returns its name, so earlier datagrams have arrived or are lost. Then the
+    driver asks whether a motion is in progress, and reads the encoder to see whether the robot
+    moves. If a reply is lost, nothing changes.
     """
     _, reply = execute(world.server, "CHECK")
     driver = Driver(State.STOPPING, Motion.UNKNOWN)
@@ -246,7 +247,7 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield what the driver concludes from a reply that it receives.
 
-    A check and a move take longer than any reply can be late.
+    Checks and controlled moves take so long that no late reply can be taken for theirs.
     """
     driver = world.driver
     state = driver.state

@@ -18,7 +18,7 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 
 
 def trouble(world: World) -> str:
-    """Return what must never occur; empty if nothing is wrong.
+    """Return what is wrong in this world and must never occur; the text is empty if nothing is.
 
     With a dead IMU, or a driver that has given up, only a crash of the server is wrong.
     """
@@ -41,7 +41,7 @@ def trouble(world: World) -> str:
 
 
 def _can_stop(world: World) -> bool:
-    """Return whether the stops that the driver would send, if they arrive, stop the robot."""
+    """Return whether the robot stops if all stops that the driver would send arrive."""
     server, driver = world.server, world.driver
     if driver.state is State.STILL:
         motion = Motion.UNKNOWN
@@ -65,8 +65,8 @@ def _can_stop(world: World) -> bool:
 class Found(NamedTuple):
     """The result of a search.
 
-    ``worlds``: number of reachable worlds; ``steps``: number of steps between them; ``bad``: the
-    steps to the first world that must not occur, and the reason; empty if none was found.
+    ``worlds``: number of reachable worlds. ``steps``: number of steps between them. ``bad``: the
+    steps to the first world that must not occur, and the reason; empty if no such world was found.
     """
 
     worlds: int
@@ -83,7 +83,7 @@ FOUND_MOVING: Final = (
 
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
-    """Search everything that can happen, breadth first, up to the first failure."""
+    """Search all reachable worlds, breadth first, up to the first that must not occur."""
     row = [World(server) for server in FOUND_MOVING]
     came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
     count = 0

@@ -2,7 +2,7 @@
 
 """A small model of the MART server: the effect of each command in each state of motion.
 
-``test_mart_search`` replays each transition on the simulated firmware.
+``test_mart_search`` compares each transition with the simulated firmware.
 """
 
 from typing import Final, NamedTuple
@@ -25,9 +25,9 @@ KIND: Final = {
 class Server(NamedTuple):
     """The state of the server.
 
-    ``port``: the command port is free, busy (a controlled move runs), waits (for a dead IMU) or
+    ``port``: the command port is free, busy (with a controlled move), waiting (for a dead IMU) or
     hung. ``released``: the stop port has stopped an uncontrolled motion, but the server still
-    regards that motion as in progress.
+    regards this motion as in progress.
     """
 
     motion: Motion = Motion.NONE
@@ -42,7 +42,7 @@ Reply = str | None
 
 
 def execute(server: Server, word: str) -> tuple[Server, Reply]:
-    """Let one datagram arrive, on its port; return the new state of the server and its reply."""
+    """Execute one datagram; return the new state of the server and its reply."""
     if server.crashed:
         return server, None
     if word in ("SL", "SS"):
@@ -101,7 +101,7 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 
 
 def servers() -> dict[Server, tuple[str, ...]]:
-    """Return all states of a server that receives every datagram, and the steps to each."""
+    """Return all reachable states of a server, each with the steps to it; no datagram is lost."""
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}
     while row:

@@ -1,15 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A bounded search that runs the real pilot and conversation against the simulated firmware.
+"""A bounded search that runs the real driver against the simulated firmware.
 
-``mart_model`` searches without a bound, but models the driver. Here the real driver runs. There are
-three sets of trials. ``pairs``: every pair of wishes (what a user may want, such as "forward").
-``eights``: rows of eight wishes in which each wish follows each other one. In both sets, one
-datagram of either direction is lost, late or duplicated, or the IMU is dead from that datagram on;
-each datagram has its turn. ``beginnings``: a driver starts while the robot may already be in a
-motion, and the network is away for various times.
-
-``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all of them.
+``mart_model`` searches without a bound, but its driver is a model. There are three sets of trials.
+``pairs``: every pair of wishes (what a user may want, such as "forward"). ``eights``: sequences of
+eight wishes, in which each wish follows each wish. In both sets, one datagram of either direction
+is lost, late or duplicated, or the IMU is dead from that datagram on; there is a trial for each
+datagram. ``beginnings``: a driver starts while the robot may already be in a motion, and the
+network is away for various times. ``PYTHONPATH=.:test:test/core python
+test/core/mart/real_search.py`` runs all of them.
 """
 
 import copy
@@ -43,30 +42,30 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""Most datagrams per wish in each direction that meet a fate, without polls.
+"""At most this many datagrams per wish have a fate, in each direction; polls are not counted.
 
-Those that follow belong to an e-stop, which is repeated.
+Later datagrams are only the repeated stops of an e-stop.
 """
 PROOF_S: Final = 0.25
-"""Time in s after the death of the IMU from which a motion that begins was not proved."""
+"""A motion that begins later than this, in s, after the death of the IMU was not proved."""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 """Commands that the server may be obeying when a driver starts."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Times in s after which the network comes back."""
+"""Times in s, from the start of the driver, after which the network comes back."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times in s after which the network is away again, for 1 s."""
+"""Times in s, from the return of the network, after which it is away again for 1 s."""
 ENDS_S, SETTLED_S = 16.0, 1.5
 
 
 class Trial(NamedTuple):
-    """One run of the search.
+    """One run of the search: either wishes with one disturbed datagram, or a driver that starts.
 
-    Either ``wishes``, and the datagram that meets a ``fate``: number ``number`` (from 0, without
-    polls) in the direction ``way`` (0: to the server, 1: from it). Or a driver that starts: ``met``
-    is the command that the server obeys at that time; the network is away until ``away_s``, and
-    again for 1 s after a further ``back_s``, in the directions ``ways``.
+    ``wishes``: in this order; ``number``: of the datagram (from 0, without polls) that has the
+    ``fate`` in direction ``way`` (0: to the server, 1: from it). ``met``: the command that the
+    server obeys when the driver starts; the network is away until ``away_s``, and again for 1 s
+    after a further ``back_s``, in the directions ``ways``.
     """
 
     wishes: tuple[str, ...] = ()
@@ -80,7 +79,7 @@ class Trial(NamedTuple):
 
 
 class Carrier:
-    """A network that replaces the robot's, and treats each datagram as the trial prescribes."""
+    """A network in place of the robot's own, which treats each datagram as the trial prescribes."""
 
     def __init__(self, bench: MartBench, trial: Trial) -> None:
         self.bench, self.robot, self.trial = bench, bench.robot, trial
@@ -148,20 +147,20 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Yield every pair of wishes, and for each datagram each fate: lost, late, duplicated."""
+    """Yield the trials of every pair of wishes: each fate of each datagram."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 
 
 def eights() -> Iterator[Trial]:
-    """Yield rows of eight wishes, one for each step from wish to wish, with each fate."""
+    """Yield trials of eight wishes, in which each wish follows each other one, with each fate."""
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield a trial for each fate of each datagram that a run without faults carries."""
+    """Yield a trial for each fate of each datagram that these wishes send without a fault."""
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
         for n, fate in product(range(most), FATES):

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of replies, and of which request each belongs to.
+"""Tests of replies, and of the request to which each reply is attributed.
 
-The reply texts are those that the running server was seen to send.
+The reply texts are those of a running server.
 """
 
 import math
@@ -40,13 +40,13 @@ GOLDEN = {
 
 @pytest.mark.parametrize("data", GOLDEN)
 def test_a_reply_is_read(data: bytes) -> None:
-    """Each text is parsed to the form of reply that it has."""
+    """Each text of a reply is parsed to a message of its form."""
     assert parse(data) == GOLDEN[data]
 
 
 @given(st.binary(max_size=600))
 def test_no_datagram_raises(data: bytes) -> None:
-    """Any bytes give one message; an empty datagram gives none."""
+    """Any bytes give one message, and an empty datagram gives none."""
     assert len(MartDecoder().feed(data, 0.0)) == bool(data)
 
 
@@ -64,7 +64,7 @@ def conversation() -> Conversation:
 
 
 def test_a_reply_answers_the_pending_request() -> None:
-    """The answer contains the command and the time from request to reply."""
+    """The answer contains the command, and the time from the request to the reply."""
     talk = conversation()
     assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
     answer = talk.hear(parse(b"ok 123"), 1.01)
@@ -87,7 +87,7 @@ def test_a_reply_answers_the_pending_request() -> None:
     ],
 )
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
-    """A late reply is recognised by another form, or a failure that this command never returns."""
+    """A late reply has the wrong form, or a failure that the pending command never returns."""
     talk = conversation()
     talk.ask(word.request(), 1.0)
     assert talk.hear(parse(late), 1.4) is None
@@ -96,7 +96,7 @@ def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, la
 
 
 def test_no_late_ok_proves_the_imu() -> None:
-    """The check takes at least 0.32 s, but a reply to an earlier command is at most 0.3 s late."""
+    """A check takes at least 0.32 s, and a reply to an earlier command is at most 0.3 s late."""
     talk = conversation()
     talk.ask(words.CHECK.request(0), 1.0)
     assert talk.hear(parse(b"ok"), 1.3) is None
@@ -105,9 +105,10 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """RST IMU answers too soon to distinguish its reply from a late one by time.
+    """The reply to RST IMU comes too soon to be told from a late ``ok`` by its time.
 
-    A copy of the last ``ok``, or the reply that was given up, is at most 0.3 s late.
+    So RST IMU waits until a late copy of the last ``ok``, or a reply that was given up, must have
+    come.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -122,7 +123,10 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """A query that driving needs, as ENC, is sent at once, but its answer is marked doubtful."""
+    """After a lost reply, ENC, which driving needs, is sent at once; its answer is then doubtful.
+
+    Other queries whose replies have the same form wait until the lost reply can no longer come.
+    """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
     assert talk.overdue(1.1) is None
@@ -140,7 +144,7 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 
 
 def test_every_motion_is_stopped_by_its_own_word() -> None:
-    """Each motion is stopped by its own command alone; the stop port is for controlled moves."""
+    """Each motion is stopped by its own command only; the stop port is for controlled moves."""
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
         Motion.NONE: [],
@@ -161,7 +165,7 @@ def stopping(motion: Motion, *, started_s: float = 0.0, owed: int = 0) -> Stoppi
 
 
 def test_a_stop_is_repeated_until_it_is_answered() -> None:
-    """The repeated stop fails with "no motion", which proves the stop as well as an ok."""
+    """If a repeated stop fails with "no motion", that proves the stop as well as an ok does."""
     stop = stopping(Motion.REFERENCE)
     assert stop.due(10.0) == (words.SRM,)
     assert stop.due(10.1) == ()
@@ -170,9 +174,9 @@ def test_a_stop_is_repeated_until_it_is_answered() -> None:
 
 
 def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
-    """The start was sent 0.1 s before the stop, so it may still arrive later.
+    """The start is sent only 0.1 s before the stop, so it may arrive after the stop.
 
-    Only a reply to a later stop proves that the robot is stopped.
+    Only the reply to a later stop proves that the robot is stopped.
     """
     stop = stopping(Motion.REFERENCE, started_s=9.9)
     assert stop.due(10.0) == (words.SRM,)
@@ -182,9 +186,9 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """Both replies are a bare ok, which may come twice.
+    """The replies to the start and to the first stop are both a bare ok, and may come twice.
 
-    The second stop brings an unambiguous reply.
+    The reply to the second stop, "no motion", is unambiguous.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -194,9 +198,9 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """Both copies may answer the first stop, which the start may have overtaken.
+    """Two equal replies may both be of the first stop, which may have arrived before the start.
 
-    A copy comes at most 0.6 s after that stop was sent.
+    A copy comes at most 0.6 s after the first stop was sent.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -207,7 +211,7 @@ def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
 
 
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
-    """The stop port is used after three stops and the longest time that their answers may take."""
+    """After three stops, and the longest time that an answer may take, the stop port is used."""
     stop = stopping(Motion.REVERSE)
     said = [word for tick in range(60) for word in stop.due(10.0 + 0.1 * tick)]
     before = said.index(words.SL)
@@ -227,7 +231,7 @@ def at(at_s: float, spread_s: float = 0.01) -> Moment:
 
 
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
-    """The distance is continued from the last plausible count."""
+    """An impossible encoder count is ignored; the next possible one continues from the last one."""
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
@@ -236,7 +240,7 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 
 
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
-    """A count from before the motion is a late reply, or the server did not receive the start."""
+    """A count that is as before the motion is late, or the server has not received the start."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -253,7 +257,7 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 
 @pytest.mark.parametrize("stale", [300, 0, -1])
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
-    """The network is known to delay and duplicate, so a smaller count is an old one."""
+    """The network may delay and duplicate replies, so a smaller count in a motion is an old one."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -263,7 +267,7 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """A reported turn of 3° contradicts the wheel, as the number was a late count, not an angle."""
+    """A reported turn of 3° was a late count, as the wheel shows; the odometry uses the wheel."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)
@@ -275,7 +279,7 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """RM sets the heading to zero, so an unchanged heading is a late reply from before RM."""
+    """RM sets the heading to zero, so a heading that is still the old one is a late reply."""
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -288,7 +292,7 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """A missing IMU, or an unknown command, is reported sooner than a check can succeed."""
+    """A check that fails because of a missing IMU or an unknown command is answered at once."""
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)
     assert talk.hear(parse(f"fail {reason}".encode()), 1.001) is not None

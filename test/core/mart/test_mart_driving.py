@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     volts: float, unequal: float, firmware: Firmware
 ) -> None:
-    """The means over the two seconds after the start are compared with the command."""
+    """From two seconds after each new command on, the mean speeds are compared with the command."""
     bench = MartBench(firmware, volts=volts, motor_inequality=unequal).ready()
     for vx, yaw_rate in STEPS:
         if firmware == "documented" and not vx:
@@ -50,7 +50,7 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
 
 @pytest.mark.parametrize("dead_units", [0.0, 2.0, 6.0])
 def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: float) -> None:
-    """The inner wheel turns at 0.01 m/s to 0.02 m/s; a dead zone uses up most of its motor command.
+    """The inner wheel turns at 0.01 m/s to 0.02 m/s, which is near the dead zone of the motors.
 
     The last curve leads backward, where the heading is unknown.
     """
@@ -75,9 +75,10 @@ def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: flo
 def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
     dead_units: float, firmware: Firmware
 ) -> None:
-    """Nothing is known of the motors yet: without a new start the rate would be 25 % to 40 % off.
+    """The motors are not known yet, so the first turn would be 25 % to 40 % too slow.
 
-    Two seconds after the command it is right. A second start is not worth its pause.
+    The turn is begun again, and is right two seconds after the command. It is not begun a third
+    time.
     """
     bench = MartBench(firmware, dead_zone_units=dead_units).ready()
     bench.command(0.0, 0.5, 2.0)
@@ -96,7 +97,7 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """Something brakes the robot for a second, as a door sill or a foot."""
+    """A door sill, for example, brakes the robot for a second while it turns on the spot."""
     bench = MartBench("source").ready()
     if learned:
         bench.command(0.0, 0.5, 4.0)
@@ -117,7 +118,10 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
-    """It shows the mean speed of both motors; a straight drive backward follows."""
+    """A turn on the spot shows only the mean speed of the motors, not their balance.
+
+    So a straight drive backward after such turns is as straight as before.
+    """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench(
         "source", settings=settings, volts=23.3, motor_inequality=unequal, dead_zone_units=4.0
@@ -134,7 +138,7 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 @pytest.mark.parametrize("dead_units", [0.0, 3.0])
 def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units: float) -> None:
-    """The server cannot change the rate of a turn, so none is begun with a lower one."""
+    """The server cannot change the rate of a turn, so the turn begins only at its final rate."""
     bench = MartBench(dead_zone_units=dead_units).ready()
     ramp = SessionSettings(
         limits=SpeedLimits(angular_radps2=0.3),
@@ -148,7 +152,7 @@ def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units:
 
 
 def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
-    """The first units do not turn the motors, which teaches how many they need."""
+    """At the first low rates the motors do not turn, which shows the units that they need."""
     bench = MartBench(dead_zone_units=3.0).ready()
     for step in range(60):
         bench.command(0.0, min(0.5, 0.03 * step), 0.1)
@@ -157,7 +161,7 @@ def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
 
 
 def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
-    """With none, RM would end; the robot must not keep its former speed either."""
+    """A speed of 0 units would end RM, so a low speed is driven with one unit."""
     fast = 0.05
     bench = MartBench(
         settings=MartSettings(speed_per_unit=fast), speed_mps_per_unit=fast, volts=25.0
@@ -169,7 +173,10 @@ def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: float) -> None:
-    """The heading is not reported in B, and nothing was driven forward before."""
+    """The server reports no heading in B, and no drive forward has shown the balance before.
+
+    So the balance of the motors comes from the user's setting.
+    """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench("source", settings=settings, motor_inequality=unequal).ready()
     bench.command(-0.25, 0.2, 2.0)
@@ -179,7 +186,7 @@ def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: floa
 
 
 def test_the_balance_of_the_motors_is_shown_once_it_is_measured() -> None:
-    """A drive forward shows it; `motor_balance` can then be set to it."""
+    """A drive forward shows the balance of the motors; the user can set `motor_balance` to it."""
     bench = MartBench("source", motor_inequality=0.05).ready()
     bench.command(0.0, 0.5, 3.0)
     assert bench.board.figures.own["Motor balance"] == "unknown"
@@ -188,14 +195,14 @@ def test_the_balance_of_the_motors_is_shown_once_it_is_measured() -> None:
 
 
 def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> None:
-    """For its own predictions, the driver assumes at most 8 %."""
+    """The measured balance is shown even beyond 8 %, the most that the driver itself assumes."""
     bench = MartBench("source", motor_inequality=0.18).ready()
     bench.command(0.3, 0.0, 6.0)
     assert float(bench.board.figures.own["Motor balance"]) == pytest.approx(1.198, abs=0.02)
 
 
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
-    """Only a rate that was commanded for a while is corrected."""
+    """A turn is begun again only if its commanded rate stays the same for a while."""
     bench = MartBench("source", dead_zone_units=4.0).ready()
     for tick in range(20):
         bench.command(0.0, 0.5 - 0.008 * tick, 0.1)
@@ -209,7 +216,7 @@ def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_st
 def test_a_scale_that_is_changed_while_the_robot_is_at_rest_leaves_its_speed_as_it_was(
     change: dict[str, float],
 ) -> None:
-    """What was learned about the motors is kept, in the new units."""
+    """A change of a scale converts what was learned about the motors to the new units."""
     bench = MartBench("source", dead_zone_units=3.0).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.1, 0.0), (0.0, 0.5)):
         bench.command(vx, yaw_rate, 3.0)
@@ -226,7 +233,7 @@ def test_a_scale_that_is_changed_while_the_robot_is_at_rest_leaves_its_speed_as_
 
 @pytest.mark.parametrize(("left", "firmware"), [(True, "source"), (False, "firmware")])
 def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmware) -> None:
-    """The robot returns to within 5 % of the side, to the left as to the right.
+    """The robot returns to within 5 % of the side, whether it turns to the left or to the right.
 
     The odometry is off by less than 6 cm after 8 m.
     """
@@ -241,9 +248,10 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
-    """A heading that does not change for long is a sign of a dead IMU.
+    """A heading that does not change for a while is a sign of a dead IMU.
 
-    On a straight drive without gyro noise, it changes only because the driver steers a little.
+    On a straight drive without gyro noise, the heading changes only because the driver steers a
+    little.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -272,7 +280,7 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """The age is computed from the requests that the server received.
+    """A proof of the IMU that is less than 0.2 s old precedes every start that the server receives.
 
     The network is slow and loses datagrams.
     """
@@ -294,9 +302,9 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """The lost RM did not set the relative heading to zero.
+    """A lost RM does not set the relative heading to zero.
 
-    So the heading still belongs to the motion before, and must not turn the odometry.
+    The heading that is still reported belongs to the motion before, and must not turn the odometry.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -321,9 +329,9 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The first sample of RM may lead the heading to its value before RM, by chance.
+    """By chance, the first heading of RM may equal the last heading before RM.
 
-    It then looks as if RM were lost, until the encoder shows that the robot moves.
+    RM then seems to be lost, until the encoder shows that the robot moves.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -338,7 +346,7 @@ def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
 
 
 def test_a_goal_and_a_job_show_how_far_they_are() -> None:
-    """The progress is shown in /diagnostics, under "Goal" and "Job"."""
+    """The progress of goals and jobs is shown in /diagnostics, under "Goal" and "Job"."""
     bench = MartBench().ready()
     shown = set()
     bench.go_to(0.6, 0.4, 0.0)
@@ -376,7 +384,7 @@ def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
 
 
 def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> None:
-    """The server is silent during a controlled move, so the encoder is unknown until its end."""
+    """During a controlled move the server does not answer, so the covariance must be large."""
     bench = MartBench().ready()
     bench.go_to(1.5, 0.0, 0.0)
     bench.run_until(lambda: bench.server.chassis.x_m > 0.6, 15.0)
@@ -388,7 +396,7 @@ def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> Non
 
 
 def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() -> None:
-    """A sonar query takes 55 ms, which driving cannot spare; infinity means nothing is near."""
+    """A sonar query takes 55 ms, so it is sent only at rest; infinity means nothing is near."""
     bench = MartBench(front_m=3.0).ready()
     seen = len(bench.odometry)
     bench.run(2.0)
@@ -407,7 +415,7 @@ def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() ->
 
 
 def test_inverted_encoder_and_gyro_are_parameters() -> None:
-    """With a negative ``metres_per_count``, an encoder that counts down drives forward."""
+    """A negative ``metres_per_count`` is for an encoder that counts down in forward motion."""
     settings = MartSettings(metres_per_count=-0.0004)
     bench = MartBench("source", settings=settings, encoder_sign=-1).ready()
     bench.command(0.3, 0.2, 3.0)

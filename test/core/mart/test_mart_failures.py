@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of failures: with a dead IMU, an obstacle or a stuck motor, each motion is stopped."""
+"""Tests of failures: a dead IMU, an obstacle, a stuck motor; the robot is stopped each time."""
 
 import pytest
 from honesty import nees
@@ -19,10 +19,10 @@ pytestmark = pytest.mark.slow
 def test_a_dead_imu_refuses_motion_until_it_is_back(
     firmware: Firmware, wish: tuple[float, float] | str
 ) -> None:
-    """Commands that would start the motors are not sent, and the log gives the reason.
+    """With a dead IMU, commands that would start the motors are not sent, and the log says why.
 
-    A server with RST IMU is checked again by itself; one without it stays refused, as its check may
-    move the robot.
+    A server that has RST IMU is checked again without a command. On a server without it, motion
+    stays refused, as the check may move the robot.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
@@ -43,7 +43,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 
 
 def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
-    """A failed RST IMU leaves the IMU closed, so it is repeated; the third failure is accepted."""
+    """A failed RST IMU leaves the IMU closed, so it is repeated; a third failure is accepted."""
     bench = MartBench("source").ready()
     bench.server.imu.alive = False
     bench.try_command(0.3, 0.0)
@@ -56,7 +56,7 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
 
 
 def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
-    """After a stop of 0.56 s to 0.6 s the server's sample count makes the next RM fail at once."""
+    """After a stop of 0.56 s to 0.6 s the server's next RM fails at once, and is sent again."""
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
     bench.command(0.3, 0.0, 4.0)
@@ -68,7 +68,7 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """The stop before the second RM is short, as the reply shows that the first RM has arrived."""
+    """The failure shows that the first RM has arrived, so the stop before the next RM is short."""
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 3.0)
     bench.command(0.0, 0.0, 1.0)
@@ -81,7 +81,10 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The robot is pushed within three seconds of the RM that failed, after one that did not."""
+    """An RM that succeeds after one that failed shows that the server has no defect.
+
+    So a robot that moves without a command within three seconds of the failure is only reported.
+    """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
     bench.command(0.3, 0.0, 1.4)
@@ -94,7 +97,7 @@ def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> 
 
 
 def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None:
-    """The next start gets more units, but the drive is soon as fast as commanded."""
+    """After a slow drive was blocked, the next slow drive is soon as fast as commanded."""
     bench = MartBench("source").ready()
     bench.command(0.06, 0.0, 3.0)
     bench.server.chassis.change(stuck="both")
@@ -110,7 +113,7 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server gives the reason of the last B; the front sonar does not see an obstacle."""
+    """The server gives the reason for which the last B ended; the front sonar shows no obstacle."""
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -132,10 +135,10 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The constant heading shows the dead IMU within half a second, plus the time of a stop.
+    """A dead IMU is found by its constant heading within half a second, and the robot is stopped.
 
-    In the public source the heading changes during RM only, so other motions cannot show it
-    there.
+    In the public source the heading changes only during RM, so a dead IMU is not found in this way
+    in other motions.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -155,7 +158,7 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 
 
 def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
-    """The controller stops by itself without a report; backward motion remains possible."""
+    """The controller stops at an obstacle without a report; the robot may still drive backward."""
     bench = MartBench(front_m=1.4).ready()
     bench.command(0.3, 0.0, 6.0)
     assert bench.robot.stands
@@ -184,10 +187,10 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     driving: bool, stuck: Stuck, firmware: Firmware
 ) -> None:
-    """Both motors are off, and stay so although the command goes on. The next command drives.
+    """If a motor is stuck, both motors are switched off until a new command is given after a stop.
 
-    A stuck right wheel lets the other wheel turn the robot until the start has failed, which
-    nothing measures, but the covariance includes it.
+    If the right wheel is stuck, the left one turns the robot until the start has failed. Nothing
+    measures this turn, but the covariance includes it.
     """
     bench = MartBench(firmware).ready()
     if driving:
@@ -207,7 +210,10 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """SRM finds no motion to stop, so a controlled turn takes over the motors, and ends."""
+    """RM fails although the robot moves, and SRM finds no motion that it could stop.
+
+    So the driver begins a controlled turn, which takes over the motors and then ends.
+    """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)
     assert bench.robot.stands
@@ -218,7 +224,10 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """A server that answers ``fail`` although it moves shows this at once."""
+    """A server that moves although its RM failed does so at once, not seconds later.
+
+    So a later push of the robot is not regarded as a defect of the server.
+    """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
     bench.command(0.3, 0.0, 0.3)
@@ -233,7 +242,7 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
-    """RMCS fails then, as the server knows of no motion."""
+    """If another program has stopped the robot, RMCS fails, as the server knows of no motion."""
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 2.0)
     bench.server.receive(b"SRM", 0, None, bench.robot.board.now_s)
@@ -247,7 +256,10 @@ def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> 
 def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_command(
     firmware: Firmware,
 ) -> None:
-    """The server reports the failure at once, while the wheels still turn."""
+    """The server reports a failed move at once, while the wheels still roll out.
+
+    The roll-out is not a motion without a command.
+    """
     bench = MartBench(firmware, motor_lag_s=0.12).ready()
     bench.go_to(1.5, 0.0, 0.0)
     bench.run(2.4)
@@ -263,7 +275,10 @@ def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_comm
 def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_failed(
     twist: tuple[float, float], dead_units: float, firmware: Firmware
 ) -> None:
-    """The first start is too weak, as nothing is known of the motors yet. The IMU is not blamed."""
+    """Before the motors are known, the first start is too weak; the next one is stronger.
+
+    Neither a stuck motor nor the IMU is blamed.
+    """
     bench = MartBench(firmware, dead_zone_units=dead_units).ready()
     bench.command(*twist, 6.0)
     assert not bench.robot.stands
@@ -282,7 +297,10 @@ def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_fa
 def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
     encoder_sign: int, settings: MartSettings, parameter: str
 ) -> None:
-    """With an inverted heading the robot turns more and more before it is stopped."""
+    """A wrong sign or scale stops the robot, and a notice names its parameter.
+
+    With an inverted heading the robot turns more and more before it is stopped.
+    """
     bench = MartBench(settings=settings, encoder_sign=encoder_sign, motor_inequality=0.03).ready()
     bench.command(0.3, 0.0, 6.0)
     assert bench.robot.stands

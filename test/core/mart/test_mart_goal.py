@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Goals are reached although controlled moves go beyond what was requested."""
+"""Goals are reached although controlled moves of the server go beyond the requested distance."""
 
 import math
 from random import Random
@@ -19,7 +19,7 @@ from omnibot_driver.simulator.mart import Firmware
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """A turn by 1° that turns the robot by 7° is not repeated until no moves are left."""
+    """A requested turn of 1° turns the robot by 7°; it is not repeated until no moves are left."""
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
         goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
@@ -52,7 +52,7 @@ def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, s
 def test_a_move_is_slow_if_the_normal_one_is_faster_than_the_limits(
     limits: dict[str, float], turn: bytes, way: bytes
 ) -> None:
-    """NORMAL is 30 units: 0.26 m/s, and 1.3 rad/s on the spot."""
+    """The server's speed NORMAL is 30 units: 0.26 m/s, and 1.3 rad/s on the spot."""
     settings, surplus = MartSettings(**limits), Surplus()
     to_the_left = next_move(Move(Pose(0.0, 1.0, 0.0)), Pose(), settings, surplus)
     ahead = next_move(Move(Pose(30 * INCH_M * STRETCH, 0.0, 0.0)), Pose(), settings, surplus)
@@ -74,7 +74,7 @@ def end(bench: MartBench) -> None:
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
 def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
-    """The encoder count of a move is often the same as that of the move before."""
+    """Equal moves often end with equal encoder counts, and each of them is counted."""
     bench, goal = MartBench(firmware).ready(), Pose()
     for _ in range(10):
         goal = goal.moved(step)
@@ -106,7 +106,7 @@ def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: flo
 def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
     firmware: Firmware,
 ) -> None:
-    """The move's own reply shows that it has stopped; the server was not restarted."""
+    """The reply to the first move shows that it has stopped; the server was not restarted."""
     bench = MartBench(firmware).ready()
     assert bench.job(Job.LOG).success
     bench.go_to(2.0, 0.0, 0.0)
@@ -133,7 +133,7 @@ def first_distance(bench: MartBench, x_m: float) -> int:
 
 
 def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> None:
-    """It was cut short, so its distance does not show how far the robot drives by an inch."""
+    """A move that an obstacle cuts short does not show how far the robot drives per inch."""
     bench = MartBench(front_m=0.7).ready()
     first_distance(bench, 2.0)
     bench.run_until(lambda: any("clearance" in notice for notice in bench.notices), 10.0)
@@ -144,7 +144,7 @@ def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> Non
 
 
 def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
-    """The next goal is behind; its straight move is that of a driver that has never docked."""
+    """A move that the dock ends teaches nothing: the next goal, behind, has the usual distance."""
     bench = MartBench(dock_m=0.2).ready()
     assert bench.job(Job.DOCK, "DOCK", 40).success
     bench.run(2.0)

@@ -20,7 +20,7 @@ from omnibot_driver.simulator.mart import Firmware
 
 
 def test_the_gyro_is_calibrated_at_rest() -> None:
-    """The job sends SB, and succeeds with its reply."""
+    """The calibration sends SB, and succeeds with the reply to SB."""
     done = MartBench().ready().job(Job.BIAS)
     assert (done.token, done.success) == ("token", True)
 
@@ -38,7 +38,7 @@ def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
 
 
 def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
-    """The job sends TF DOCK; an e-stop meanwhile cancels it."""
+    """The docking job sends TF DOCK; an e-stop cancels the job."""
     bench = MartBench(dock_m=0.3).ready()
     assert bench.job(Job.DOCK, "DOCK", 20).success
     bench.run(2.0)
@@ -57,7 +57,10 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
 
 @pytest.mark.parametrize("longest_m", [0.2, 0.5, 1.0, 3.0])
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
-    """The server drives further than requested, and no obstacle stops a docking move."""
+    """The server drives beyond the requested distance, so the driver requests less.
+
+    No obstacle would stop a docking move.
+    """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))
     bench.run(2.0)
@@ -65,7 +68,7 @@ def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
 
 
 def test_a_robot_that_must_not_move_does_not_dock() -> None:
-    """The motor board reports a trip: TF is not sent, and the answer names the trip."""
+    """If the motor board reports a trip, TF is not sent, and the answer names the trip."""
     bench = MartBench(motor_status=4).ready()
     done = bench.job(Job.DOCK, "DOCK", 20)
     assert not done.success
@@ -74,7 +77,7 @@ def test_a_robot_that_must_not_move_does_not_dock() -> None:
 
 
 def test_docking_ends_with_the_stop_of_its_move() -> None:
-    """The reply to TF is lost: the driver stops the robot, and other services are free again."""
+    """If the reply to TF is lost, the driver stops the robot, and the next job is accepted."""
     bench = MartBench().ready()
     inner = bench.robot.advance
 
@@ -92,7 +95,7 @@ def test_docking_ends_with_the_stop_of_its_move() -> None:
 
 
 def test_a_missing_reply_to_a_cancelled_job_does_not_end_the_next_one() -> None:
-    """The second download is sent and done, although the first one's reply was lost."""
+    """A download whose reply was lost is cancelled, and the next download succeeds."""
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 2.0)
     bench.run(3.0)
@@ -121,7 +124,7 @@ def test_the_last_move_and_turn_are_downloaded_whole() -> None:
 
 
 def test_nothing_to_download_is_told() -> None:
-    """The job fails with the controller's own reason."""
+    """The job fails with the reason that the controller gives."""
     done = MartBench().ready().job(Job.LAST_MOVE)
     assert not done.success
     assert "no file available" in done.message
@@ -129,7 +132,7 @@ def test_nothing_to_download_is_told() -> None:
 
 @pytest.mark.parametrize("spoil", ["lose", "double"])
 def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None:
-    """The job reports the damage and returns a failure instead of a damaged file."""
+    """The job reports the damaged file as a failure and does not return it."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -151,7 +154,7 @@ def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None
 
 
 def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
-    """It is the only piece whose place is known, as it is shorter than the others."""
+    """The last piece of a file is shorter than the others, so it alone shows a wrong order."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -168,7 +171,7 @@ def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
 
 @pytest.mark.parametrize("job", [Job.BIAS, Job.LAST_MOVE])
 def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
-    """Its caller gets an answer, even if the port does not come back."""
+    """The caller of a job gets an answer, even if the port does not come back."""
     bench = MartBench().ready()
     bench.board.ask(job, "token", bench.now)
     bench.run(0.02)
@@ -179,7 +182,10 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A second call would not get the file: the controller must be started again."""
+    """EXIT has ended the server, so a second call would not get the file.
+
+    The controller must be started again.
+    """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
     bench.board.ask(Job.LOG_FILE, "token", bench.now)
@@ -193,7 +199,7 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
-    """The heading of a straight drive is often exactly zero, as after a restart."""
+    """After a straight drive the heading is often exactly zero, as it is after a restart."""
     for seed in range(6):
         bench = MartBench(firmware, seed=seed).ready()
         assert bench.job(Job.LOG).success
@@ -221,7 +227,7 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 
 
 def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
-    """EXIT would end the server without an answer, as its log was not started again."""
+    """A restarted server has no log, so EXIT would end it without an answer."""
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
     bench.server.restart(1.0)
@@ -232,9 +238,10 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 
 
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
-    """The repeated stop finds no motion, as after a restart. The heading shows that there is none.
+    """The reply to a stop is lost, and the repeated stop finds no motion, as after a restart.
 
-    A second ``~/start_log`` on a restarted server would delete the file.
+    The heading shows that the server was not restarted. Otherwise the driver would ask the user for
+    another ``~/start_log``, which deletes the file.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -254,7 +261,7 @@ def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
 
 
 def test_the_setting_of_the_clock_gives_way_to_the_users_first_job() -> None:
-    """It waits, as a server that has just appeared may not be complete yet."""
+    """A server that has just appeared gets its clock set later; a user's job does not wait."""
     bench = MartBench()
     bench.open()
     bench.run_until(lambda: bench.board.resting, 30.0)
@@ -276,7 +283,10 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 
 @given(st.floats(0.0, 4e9))
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
-    """The server ignores the seconds. The datagram may take 1 s to it."""
+    """After a drive the clock is set only if it is not set back.
+
+    The server ignores the seconds, and the datagram may take 1 s.
+    """
     fields = clock_fields(now_s, may_set_back=False)
     assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))
     if fields is not None:
@@ -286,12 +296,12 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 
 
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
-    """Month, day, year, hour, minute, second, in UTC."""
+    """The fields are month, day, year, hour, minute and second, in UTC."""
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """The heading of the second RM is about 1e15 degrees, so it is stopped and begun again."""
+    """A clock that is set back makes the next RM's heading about 1e15 degrees; RM is sent again."""
     bench = MartBench("source").ready()
     assert bench.board.is_fresh
     bench.command(0.3, 0.3, 2.0)
@@ -308,7 +318,7 @@ def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
 
 
 def test_another_server_is_refused_by_its_name() -> None:
-    """The other server answers HELLO with a name that is not this controller's."""
+    """Another server answers HELLO with a different name, which a notice gives."""
     bench = MartBench()
     bench.open()
     bench.run(0.5)
@@ -320,7 +330,7 @@ def test_another_server_is_refused_by_its_name() -> None:
 
 
 def test_nobody_answers() -> None:
-    """The silence is reported once, and motion is refused."""
+    """A controller that never answers is reported once, and motion is refused."""
     bench = MartBench()
     bench.speaks = False
     bench.open()

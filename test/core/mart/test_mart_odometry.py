@@ -33,9 +33,9 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     twist: tuple[float, float], quiet_s: float
 ) -> None:
-    """Two equal motions end with equal counts, and all replies to the second were lost.
+    """Two equal motions end with equal counts, and all replies to the second motion are lost.
 
-    The equal count must not be read as a sign that the start was lost.
+    The equal count must not be read as a sign that the second start was lost.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     for _ in range(2):
@@ -57,10 +57,10 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The ok of RST IMU comes twice; L and all queries after it are lost.
+    """The ok of RST IMU comes twice; L, which begins a turn, and all queries after it are lost.
 
-    The copy seems to acknowledge L, but the count is still that of the motion before: the robot did
-    not turn.
+    The second ok seems to acknowledge L, but the encoder count is still that of the motion before:
+    the robot has not turned.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
@@ -89,9 +89,9 @@ def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
 
 
 def reversed_by_1000() -> MartOdometry:
-    """Return odometry that has reversed by 1000 counts and begun another motion.
+    """Return odometry of a robot that reversed by 1000 counts and then began a second motion.
 
-    The encoder still reports the first motion.
+    The encoder count is still that of the first motion.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -106,7 +106,7 @@ def reversed_by_1000() -> MartOdometry:
 
 
 def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
-    """The stop was answered by "no motion", so the unchanged count is certain."""
+    """The server answers the stop with "no motion", so the unchanged count adds no variance."""
     odometry = reversed_by_1000()
     before = odometry.doubt.total([]).xx
     odometry.wheel.refused()
@@ -118,9 +118,9 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """The unchanged count may also come from an equal second motion.
+    """An unchanged count means that the start was lost, or that an equal motion has ended.
 
-    The covariance includes that motion before the end is counted for certain, and afterwards.
+    The covariance includes the equal motion, also after a count that is certain.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -132,7 +132,7 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 
 
 def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
-    """The acknowledgement of the start was a copy of another ok."""
+    """An ok seems to acknowledge the start, but the count stays: it was a copy of another ok."""
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
     for at_s in (5.2, 5.3, 5.4):
@@ -145,7 +145,7 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether a motion had begun, by the replies to its stops; None if unknown.
+    """Return whether the replies to two stops show that the motion had begun; None if unknown.
 
     The start was sent at 8 s, the stops at 10 s and 10.3 s.
     """
@@ -159,9 +159,9 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 
 
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """The result is unknown if the reply may answer the second stop.
+    """A reply that may belong to the second stop does not tell whether the motion had begun.
 
-    The reply to the first stop may then have been lost.
+    The first stop may have ended the motion, and its reply may have been lost.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
@@ -177,7 +177,7 @@ def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: flo
 
 
 def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
-    """A copy of the count is not regarded as the range, and the range is not marked doubtful."""
+    """A copy of the encoder count is not taken for the range that a sonar query returns."""
     talk = Conversation(0.3)
     asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
     asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
@@ -189,7 +189,7 @@ def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
 
 
 def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
-    """Two queries are answered by 0: by a robot that has not moved, and a board without a fault."""
+    """MCSTAT and ENC may both be answered by 0 each time: neither answer is a copy of the other."""
     talk = Conversation(0.3)
     for n in range(3):
         asked(talk, words.MCSTAT, b"ok 0", 1.0 + 0.1 * n, 0.01)
@@ -197,7 +197,7 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """RMCS returns the same angle that RMRA has just returned, so it is not a copy."""
+    """RMCS returns the angle that RMRA has just returned; the reply is not a copy."""
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)
     asked(talk, words.RMRA, b"ok 2.00", 1.0, 0.01)
@@ -205,7 +205,7 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """The missing reply may still come, so a query with the same form of reply still waits."""
+    """A copy is not the missing reply, so a query with the same form of reply still waits."""
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
     talk.ask(words.SFC.request(), 1.1)
@@ -217,7 +217,7 @@ def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
 
 
 def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
-    """Both sonars report -1 if nothing is near, so a copy could not be recognised by its value."""
+    """Both sonars report -1 if nothing is near, so equal values do not show a copy."""
     polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
     for tick in range(1000):
         now = tick * 0.01
@@ -230,7 +230,7 @@ def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -
 
 
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
-    """A doubtful count may be the reply of a sonar; the third one in a row is accepted."""
+    """A doubtful count may be the reply of a sonar; the third doubtful one in a row is accepted."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(1167, at(1.0))
     assert odometry.counted(152, at(1.1, doubtful=True)) is None
@@ -242,7 +242,7 @@ def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
 
 
 def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
-    """A count comes after 1.2 s of a curve, the heading of that curve only with the next one."""
+    """In a curve of 1.2 s the count is known, but the heading only later, with the next count."""
     settings = MartSettings()
     odometry = MartOdometry(settings)
     odometry.counted(0, at(0.9))
@@ -262,7 +262,7 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """A change that came twice is learned as a gain, although the motors do not differ so far."""
+    """A change that arrives twice looks like unequal motors; at most 8 % is believed."""
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)
     for tick in range(100):
@@ -272,7 +272,7 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 
 
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
-    """The count at the end of the move covers the part before the reset, too."""
+    """The encoder count at the end of a move includes the part before the reset."""
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)
     bench.run_until(lambda: bench.truth.x_m > 0.5, 10.0)
@@ -287,7 +287,7 @@ def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
 
 
 def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
-    """Before the first measured speed, the covariance includes the speed the robot may have."""
+    """Before the first speed is measured, the covariance allows for the commanded speed."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)
@@ -301,7 +301,7 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """A change that arrives twice acts twice, and the heading can show that.
+    """A speed change that arrives twice acts twice; only the heading can show that.
 
     In B the heading may be unknown, so there a change is at most 5 units instead of 15.
     """

@@ -12,7 +12,7 @@ PAGE = Path(__file__).parents[3] / "docs/boards/mart.md"
 
 
 def test_every_command_has_its_row() -> None:
-    """The rows include commands that are never sent; of the others, only TD is marked "never"."""
+    """Every command has a row, and of those that the driver sends, only TD is marked "never"."""
     section = PAGE.read_text(encoding="utf-8").split("## Every command")[1].split("\n## ")[0]
     rows = re.findall(r"^\| ([A-Z][A-Z ,]*) \| (.+) \|$", section, re.MULTILINE)
     listed = {name: ("never" in used) for names, used in rows for name in names.split(", ")}

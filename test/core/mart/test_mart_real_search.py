@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(12))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """The datagram may be any one in the run of any pair of wishes."""
+    """The datagram that is lost, late or doubled may be any one of any pair of wishes."""
     trial = Random(seed).choice(list(real_search.pairs()))
     assert trouble(trial) == ""
 
@@ -35,7 +35,7 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """SL ends RM; an SRM after SL would hang the server, so it is not sent."""
+    """SL on the stop port ends RM; a later SRM would hang the server, so SRM is not sent."""
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
 
@@ -98,7 +98,7 @@ TRAPS = {
 def test_a_trap_that_is_planted_in_the_pilot_is_found(
     trap: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The search finds such defects: without the trap the same trial ends well."""
+    """The search finds a planted defect in a trial that ends well without the defect."""
     plant, trial, found = TRAPS[trap]
     assert trouble(trial) == ""
     plant(monkeypatch.setattr)

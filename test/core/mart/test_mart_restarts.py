@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of absences: a server that is restarted or lost gets no motion before it is ready."""
+"""Tests of a server that is restarted or lost: it gets no motion before it is ready."""
 
 import pytest
 from mart_bench import MartBench
@@ -19,10 +19,10 @@ pytestmark = pytest.mark.slow
 def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     motion: tuple[float, float], firmware: Firmware, boot_s: float
 ) -> None:
-    """Its IMU is back, so it ends the old motion, but its stop port still awaits that end.
+    """When the IMU is back, the server ends the old motion, but its stop port stays hung.
 
-    The next RM would never be answered, and nothing would stop it. A restart shows by a heading of
-    zero, or by a long silence.
+    The next RM would never be answered, and nothing would stop it. Only a heading of zero, or a
+    long silence, shows that the server was restarted.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -48,9 +48,9 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
     wanted: tuple[float, float], boot_s: float
 ) -> None:
-    """Voltage queries and motions would crash the server.
+    """Voltage queries and motions would crash a server that starts up.
 
-    The robot, whose motors the restart did not stop, is stopped.
+    The robot, whose motors still run after the restart, is stopped.
     """
     for offset_s in (0.0, 0.23, 0.46, 0.71):
         bench = MartBench().ready()
@@ -80,7 +80,7 @@ def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(se
 def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_soon(
     after_s: float,
 ) -> None:
-    """The check is not answered. The absence shows that the server was restarted."""
+    """The check of the IMU is not answered; the server's absence shows that it was restarted."""
     bench = MartBench().ready()
     bench.run_until(lambda: bench.try_command(0.0, 0.5) or b"RST IMU" in bench.said()[-1:], 2.0)
     bench.run(after_s)
@@ -96,7 +96,10 @@ def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_s
 def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
     boot_s: float, x_m: float, y_m: float, firmware: Firmware
 ) -> None:
-    """The motors keep their last command. A move of 3 m would be awaited for a minute."""
+    """After a restart the motors keep their last command, so the robot must be stopped soon.
+
+    The driver would wait a minute for the end of a controlled move of 3 m.
+    """
     bench = MartBench(firmware).ready()
     bench.go_to(x_m, y_m, 0.0)
     bench.run_until(lambda: not bench.robot.stands, 5.0)
@@ -118,7 +121,7 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,
 ) -> None:
-    """The restart erased the speed set by SSP, and L without a speed never starts."""
+    """A restart erases the speed that SSP has set, and without it L never starts."""
     bench = MartBench(firmware).ready()
     for _ in range(3):
         bench.command(0.0, 0.5, 3.0)

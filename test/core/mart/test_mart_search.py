@@ -17,7 +17,7 @@ from omnibot_driver.simulator.mart import FIRMWARE, Kind, MartServer, MartSettin
 pytestmark = pytest.mark.slow
 
 SETTLES_S: Final = 0.9
-"""Time in s that is longer than any reply takes, except those of the (long) controlled moves."""
+"""Time in s that is longer than any reply takes; only controlled moves take longer."""
 ON_THE_WIRE: Final = {
     "RM": b"RM 30",
     "TF": b"TF 200",
@@ -38,7 +38,7 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """Up to two copies and a late reply are on their way, and the IMU may die at any step."""
+    """Up to two copies and one reply may be late, and the IMU may die at any step."""
     found = search()
     assert found.bad == ()
     assert found.worlds > 10_000
@@ -62,7 +62,7 @@ TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
 
 @pytest.mark.parametrize("trap", TRAPS)
 def test_a_planted_trap_is_found(trap: str) -> None:
-    """The search must find a failure if a table allows one command too many."""
+    """If a table allows one command too many, the search finds a failure."""
     more, trouble = TRAPS[trap]
     found = search(lambda *asked: model.table(*asked) or more(*asked))
     assert trouble in found.bad[-1]
@@ -72,7 +72,7 @@ def test_a_planted_trap_is_found(trap: str) -> None:
 def test_a_driver_that_does_not_wait_for_late_copies_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Without the commands in HARMFUL_LATE, a late copy of one does harm."""
+    """If no command is in HARMFUL_LATE, the driver does not wait, and a late copy does harm."""
     monkeypatch.setattr(model, "HARMFUL_LATE", frozenset())
     assert search().bad
 
@@ -80,7 +80,7 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A driver that does not ask what moves ends RM by SL, and SRM then hangs the server."""
+    """A driver that does not ask what moves would send SRM after SL, which hangs the server."""
 
     def sweeps(world: World) -> model.Step:
         return "sweeps", world._replace(driver=model.Driver(State.STOPPING))
@@ -117,7 +117,7 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """Return what is visible of the state: a port that is silent for good hides the reason."""
+    """Return the visible part of the server's state; a silent port hides the rest."""
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
     return server
@@ -125,7 +125,7 @@ def compared(server: Server) -> Server:
 
 @pytest.mark.parametrize("word", [*SAID, "the IMU dies"])
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
-    """Every state in which the server answers is compared.
+    """Model and simulated firmware are compared in every state in which the server answers.
 
     A busy server queues commands, so there only the stop port is compared.
     """

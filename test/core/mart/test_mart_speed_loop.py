@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what is learned about motors that do not have a speed regulator."""
+"""Tests of what the driver learns about motors without a speed regulator."""
 
 from random import Random
 
@@ -23,7 +23,7 @@ def test_before_anything_is_measured_a_motor_is_taken_for_ideal() -> None:
 
 @given(SLOPES, DEAD)
 def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
-    """Two speeds, as of a drive and of a turn, determine the motor's line."""
+    """Two measured speeds determine the line that gives the motor's units for any speed."""
     line = MotorLine()
     for units in (40.0, 40.0, 16.0, 40.0, 16.0):
         line.learn(units, slope * (units - dead))
@@ -54,7 +54,7 @@ def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
 def test_whatever_is_measured_the_units_rise_with_the_speed(
     measured: list[tuple[float, float]],
 ) -> None:
-    """The motor units stay positive and below 200, too."""
+    """The units rise with the speed, and stay positive and below 200."""
     line = MotorLine()
     for units, speed in measured:
         line.learn(units, speed)
@@ -65,7 +65,7 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """Noise at one speed says nothing about another speed, however long it lasts."""
+    """Noise at one speed, however long it is driven, does not change the other speeds."""
     random, line = Random(seed), MotorLine()
     for units in (40.0, 12.0, 40.0, 12.0):
         line.learn(units, slope * max(0.0, units - dead))
@@ -75,7 +75,7 @@ def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
 
 
 def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
-    """The wheel does not turn at 6 units. In a second, it gets enough units to turn."""
+    """A wheel that does not turn at 6 units gets enough units within a second."""
     loop, now = SpeedLoop(MartSettings()), 0.0
     loop.begin(4, False, now)
     loop.changed(30, 2, now)
@@ -88,7 +88,7 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 
 
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
-    """It stays so for later starts; 20 units or more do not show that the motors need more."""
+    """A start that moves nothing triples the units of later starts, to at most 20 units."""
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4
     for units, then in ((4, 12), (12, 20), (30, 20)):

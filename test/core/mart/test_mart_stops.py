@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every motion of the simulated controller is stopped, whatever has started it, on any network."""
+"""Every motion of the simulated controller can be stopped, on any network."""
 
 import math
 
@@ -66,7 +66,7 @@ def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
 def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
     faults: NetworkFaults, seed: int
 ) -> None:
-    """Motions of all kinds follow each other directly, then the driver shuts down."""
+    """Motions of all kinds follow each other without a pause; then the driver shuts down."""
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.1), (0.2, -0.4)):
         bench.command(vx, yaw_rate, 2.5)
@@ -84,7 +84,7 @@ def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
 
 
 def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
-    """The driver believes that the robot stands still, so only its polls show the motion."""
+    """The driver believes that the robot stands still; only its polls show the motion."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -97,7 +97,7 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """The copy keeps the command port silent; it has no other sign."""
+    """A late copy of a controlled move only shows in a command port that does not answer."""
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
     bench.run_until(lambda: b"TF" in bench.server.executed[-1].encode(), 10.0)
@@ -113,7 +113,7 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
 def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """HELLO is answered after the move, and its reply may overtake that of the move by 0.3 s."""
+    """The server answers HELLO after the move, but the move's reply may come up to 0.3 s later."""
     bench = MartBench().ready()
     receive = bench.session.inbound.receive
     late: list[bytes] = []
@@ -139,7 +139,7 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The server answers a stop of a turn with an angle, and the late count looks like one."""
+    """A stop of a turn is answered with an angle, and a late encoder count looks like an angle."""
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
     lost: list[bytes] = []
@@ -169,7 +169,7 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
     start: bytes, twist: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reply to the start comes late, 0.4 s after it, and twice; the stop is sent in between."""
+    """The ok of the start is 0.4 s late and comes twice; the lost stop is sent in between."""
     bench = MartBench().ready()
     while not bench.said()[-1].startswith(start):
         bench.try_command(*twist)
@@ -192,7 +192,7 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
     firmware: Firmware,
 ) -> None:
-    """The reply to a stop comes so soon after a count or an ``ok`` that it may be a copy.
+    """An ok soon after a count or another ``ok`` may be a copy, so the stop is repeated.
 
     The server then knows of no motion to stop, which must not be taken for a restart of the server.
     """
@@ -212,7 +212,10 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
-    """The stop is sent ten times a second, which also stops a motion of another program soon."""
+    """While the e-stop is latched, the stop is sent ten times a second.
+
+    So a motion that another program starts is stopped soon.
+    """
     bench = MartBench(firmware).ready()
     bench.estop(True)
     bench.run(1.0)
@@ -229,7 +232,7 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """Directly after SM or SRM, a stop on the stop port would race with them and hang a port."""
+    """A stop on the stop port directly after SM or SRM might hang a port, so the driver waits."""
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)
     bench.server.imu.alive = False
@@ -242,7 +245,7 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 
 
 def test_a_restarted_driver_stops_what_it_meets() -> None:
-    """The server runs an uncontrolled motion, or a controlled move, which keeps the port silent."""
+    """A driver that starts stops the robot, even in a controlled move, which is not answered."""
     for begun in (b"RM 30", b"B SLOW", b"L SLOW", b"TF 200", b"MCR 300"):
         bench = MartBench()
         bench.server.receive(begun, 0, None, 0.0)
@@ -258,7 +261,7 @@ def test_a_restarted_driver_stops_what_it_meets() -> None:
 def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops_the_robot(
     wish: str,
 ) -> None:
-    """In every state, the guard repeats the stops that the driver gave it last, for a second."""
+    """If the driver is killed, the guard repeats the driver's last stops for a second."""
     twists = {"forward": (0.3, 0.2), "backward": (-0.2, 0.0), "left": (0.0, 0.5)}
     seen = set()
     for tenths in [*range(2, 16), 25, 40]:
@@ -283,7 +286,7 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
 
 
 def test_a_robot_that_is_pushed_under_the_estop_gets_stops_only() -> None:
-    """It was at rest, so its motors are off; somebody may be near it."""
+    """A robot at rest has its motors off, so a push needs no commands other than stops."""
     bench = MartBench().ready()
     bench.estop(True)
     bench.run(1.0)
@@ -296,7 +299,7 @@ def test_a_robot_that_is_pushed_under_the_estop_gets_stops_only() -> None:
 
 @pytest.mark.parametrize("motion", ["twist", "goal"])
 def test_a_network_that_is_cut_while_a_command_waits_is_reported(motion: str) -> None:
-    """The check of the IMU before the start is not answered, however often it is repeated."""
+    """The check of the IMU before a start is repeated, but never answered."""
     bench = MartBench().ready()
     bench.robot.receive = lambda *_: None  # type: ignore[method-assign]
     if motion == "goal":
