@@ -30,7 +30,7 @@ def simulator(
 def toy(
     name: str, *arguments: str, stdin: int | IO[str] = subprocess.PIPE
 ) -> AbstractContextManager[subprocess.Popen[str]]:
-    """Run the simulator with a board that is a module of the tests."""
+    """Run the simulator with a toy board: a module of the tests, by its name."""
     return _running(["-c", RUN_MODULE, name, *arguments], stdin)
 
 

@@ -18,7 +18,7 @@ from omnibot_driver.simulator.__main__ import boards, main, run
 
 
 def test_the_console_helps_and_says_what_it_does_not_know() -> None:
-    """Both texts go to stderr, because stdout is for answers only."""
+    """The help and the message on an unknown word go to stderr, as stdout is for answers only."""
     with toy("toy_udp") as process:
         line(process)
         out, err = process.communicate("help\nfly\nquit\n", timeout=PATIENCE_S)
@@ -29,7 +29,7 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
-    """The exit code is 0, without traceback, and links are removed.
+    """After a signal, the exit code is 0, no traceback is printed, and links are removed.
 
     A closed stdin does not end the program.
     """
@@ -47,7 +47,7 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
 def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The sentence names the unknown board and lists those that exist."""
+    """The error message names the unknown board and lists the boards that exist."""
     assert main(["--board", "zeppelin", "--wings", "2"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
@@ -56,14 +56,14 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 
 
 def test_the_boards_are_the_packages_beside_what_they_share() -> None:
-    """A new package is found without being added to a list."""
+    """A package with a new board is found without being added to a list."""
     folder = Path(simulators.__file__).parent
     packages = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert {*boards(), "common"} == packages
 
 
 def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
-    """A single ``--link`` makes a link for each line.
+    """For a board with two lines, a single ``--link`` makes a link for each line.
 
     The hint has all port parameters of the driver.
     """
@@ -78,7 +78,7 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
 
 
 def test_a_board_on_the_network_prints_its_address() -> None:
-    """The simulator has options for network faults, and rejects ``--link`` and ``--flip``."""
+    """A board on the network has options for network faults, and rejects ``--link``, ``--flip``."""
     with toy("toy_udp", "--lose", "0.1", "--duplicate", "0.1", "--delay", "0.2") as process:
         address = line(process)
         assert re.fullmatch(r"udp://127\.0\.0\.1:\d+", address)
@@ -94,7 +94,10 @@ def test_a_board_on_the_network_prints_its_address() -> None:
 def test_a_link_that_cannot_be_made_is_one_sentence_and_code_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A mistake in the arguments gives no traceback, and the signal handlers are restored."""
+    """An impossible link gives one line on stderr, without traceback, and exit code 1.
+
+    The signal handlers are restored.
+    """
     taken = tmp_path / "taken"
     taken.write_text("data")
     handler = signal.getsignal(signal.SIGTERM)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated toy board that answers requests over UDP and executes one blocking move at a time.
+"""A simulated toy board that answers requests over UDP and executes one move at a time.
 
-The reply to ``odo`` is ``ok X`` (m). ``move X`` drives X m at 0.5 m/s, and its reply ``ok X`` comes
-at the end. ``stop`` ends the move: the move fails, and the stop is acknowledged. During a move,
-another one fails.
+The reply to ``odo`` is ``ok X`` (m). ``move X`` drives X m at 0.5 m/s; its reply ``ok X`` comes at
+the end of the move. ``stop`` ends the move, which is then answered as failed, and ``stop`` is
+acknowledged. A second ``move`` during a move fails.
 """
 
 import argparse
@@ -16,7 +16,7 @@ CHANNELS = (Channel(datagrams=True),)
 
 
 class ToyServer:
-    """The toy board; ``requests`` are all datagrams received, in order."""
+    """A server that executes one move at a time; ``requests`` holds all datagrams received."""
 
     channels, tick_s = CHANNELS, 0.01
 

@@ -148,7 +148,7 @@ def _ends(world: World) -> Iterator[Step]:
 
 
 def _waits(world: World) -> Iterator[Step]:
-    """Yield what happens without a command: a stop is requested, a wait ends, a poll comes back."""
+    """Yield what needs no command: a stop is requested, a wait ends, a poll is answered."""
     server, driver = world.server, world.driver
     state = driver.state
     if state in (State.STARTING, State.DRIVING, State.REVERSING, State.TURNING, State.MOVING):

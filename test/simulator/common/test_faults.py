@@ -19,7 +19,7 @@ def bits(value: int) -> int:
 
 
 def test_a_line_without_faults_changes_nothing() -> None:
-    """The line's fault counters stay at zero, too."""
+    """On a line without faults, the fault counters stay at zero."""
     line = FaultyLine(LineFaults())
     assert line.carry(SENT) == SENT
     assert (line.lost, line.flipped) == (0, 0)
@@ -29,7 +29,7 @@ def test_a_line_without_faults_changes_nothing() -> None:
 def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
     cuts: list[int], seed: int
 ) -> None:
-    """A burst of losses continues from one chunk to the next."""
+    """The fate of a byte is the same in chunks of any size, even within a burst of losses."""
     faults, data = LineFaults(lose=0.01, burst=0.005, flip=0.01), SENT[:2000]
     line = FaultyLine(faults, seed)
     parts = [
@@ -64,7 +64,7 @@ def test_a_flip_changes_one_bit_and_no_length() -> None:
 
 @pytest.mark.parametrize("rate", ["-0.1", "1.1", "nan", "often"])
 def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
-    """The error message gives the range before anything starts."""
+    """A rate outside 0 to 1 is refused before anything starts, and the message gives the range."""
     for name, toy in (("lose", toy_lines), ("flip", toy_lines), ("duplicate", toy_udp)):
         with pytest.raises(options.OptionError, match="give a number from 0 to 1"):
             options.from_words([f"--{name}={rate}"], toy)
@@ -72,6 +72,6 @@ def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
 
 @pytest.mark.parametrize("delay", ["-0.1", "61", "nan", "long"])
 def test_a_delay_that_nobody_waits_for_is_refused(delay: str) -> None:
-    """The longest delay is 60 s."""
+    """A delay of more than 60 s is refused."""
     with pytest.raises(options.OptionError, match="give seconds from 0 to 60"):
         options.from_words([f"--delay={delay}"], toy_udp)

@@ -31,7 +31,7 @@ def test_a_good_network_hands_over_at_once_and_in_order() -> None:
 
 
 def test_datagrams_are_lost_at_the_given_rate() -> None:
-    """Losses in one direction are independent of those in the other."""
+    """Losses toward the board are independent of losses from the board."""
     network = FaultyNetwork(NetworkFaults(lose=0.1))
     there, back = through(network.to_board), through(network.from_board)
     assert set(there) <= set(SENT)
@@ -41,7 +41,7 @@ def test_datagrams_are_lost_at_the_given_rate() -> None:
 
 
 def test_datagrams_come_twice_at_the_given_rate() -> None:
-    """Without a delay, the copy directly follows the original."""
+    """If there is no delay, a copy of a datagram directly follows the original."""
     path = NetworkPath(NetworkFaults(duplicate=0.1), "seed")
     arrived = through(path)
     assert len(arrived) - len(SENT) == path.duplicated == pytest.approx(500, rel=0.2)
@@ -62,7 +62,7 @@ def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
 
 @given(st.integers(0, 5))
 def test_equal_seeds_meet_equal_fates(seed: int) -> None:
-    """Another seed gives other faults."""
+    """Equal seeds give equal faults, and another seed gives other faults."""
     faults = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.1)
     first = through(FaultyNetwork(faults, seed).to_board)
     assert first == through(FaultyNetwork(faults, seed).to_board)

@@ -18,7 +18,7 @@ PATIENCE_S = 20.0
 
 
 class Ticker:
-    """A board that sends its tick number in each tick, as 26 bytes; ``sent`` is all of them."""
+    """A board that sends its tick number in each tick, as 26 bytes; ``sent`` holds all bytes."""
 
     channels, tick_s = (Channel(),), 0.01
 
@@ -51,7 +51,7 @@ def all_of(port: int) -> Iterator[bytes]:
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """The board continues; the terminal holds the oldest bytes, up to its limit."""
+    """If no program reads, the board continues; the terminal keeps only the oldest bytes."""
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -102,7 +102,7 @@ class Clock:
 def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With ticks that take 3 ms, and each 50th 25 ms, the 999th tick is at 9.99 s."""
+    """Ticks take 3 ms, and every 50th takes 25 ms; the 999th tick is still at 9.99 s."""
     clock = Clock(monkeypatch)
     board = clock.board(lambda tick: 0.025 if tick % 50 == 0 else 0.003)
     with PtyBoard(board) as pty:
@@ -119,13 +119,13 @@ def test_a_long_standstill_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_waiting_for_what_does_not_come_ends_with_false() -> None:
-    """The predicate is never true, so the timeout of 0.05 s ends the wait."""
+    """A wait for a condition that is never true returns False after its timeout of 0.05 s."""
     with PtyBoard(Ticker()) as pty:
         assert not pty.wait_for(lambda board: False, 0.05)
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """An exception in the thread is not lost: it is the cause of the RuntimeError raised."""
+    """An exception in the thread of a board is the cause of the RuntimeError that is raised."""
 
     class BrokenBoard(Ticker):
         def advance(self) -> list[Packet]:
@@ -143,13 +143,13 @@ def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
 
 @pytest.mark.usefixtures("nothing_left_behind")
 def test_no_thread_and_no_descriptor_is_left_behind() -> None:
-    """After the exit, the process has the threads and descriptors that it had before."""
+    """After its end, a board has left no thread and no file descriptor in the process."""
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: board.tick > 2, PATIENCE_S)
 
 
 def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
-    """The symbolic link exists exactly while the board runs."""
+    """The symbolic link to the terminal exists exactly while the board runs."""
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)) as pty:
         assert os.readlink(link) == pty.path
@@ -157,7 +157,7 @@ def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
 
 
 def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
-    """A link that a killed simulator left behind does not prevent a new start."""
+    """A link that a killed simulator left behind is replaced at the next start."""
     link = tmp_path / "board"
     link.symlink_to("/dev/pts/no-such-terminal")
     with PtyBoard(Ticker(), str(link)) as pty:
@@ -178,7 +178,7 @@ def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "link to a file"])
 def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> None:
-    """The error message says what to do, and no descriptor stays open."""
+    """A file at the link's path is kept; the message gives advice, and no descriptor is left."""
     precious = tmp_path / "precious"
     precious.write_text("data")
     link = precious
@@ -196,7 +196,7 @@ def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> N
 
 
 def test_a_link_that_cannot_be_made_is_named_with_what_to_do(tmp_path: Path) -> None:
-    """Here the folder of the link does not exist."""
+    """If the folder of the link does not exist, the error message names the link and what to do."""
     with (
         pytest.raises(FileNotFoundError, match=r"nowhere/board .*choose a folder that exists"),
         PtyBoard(Ticker(), tmp_path / "nowhere/board"),

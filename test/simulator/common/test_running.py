@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The thread of a simulated board on a computer that lets it run late."""
+"""The thread of a simulated board on a computer that is too busy to run it in time."""
 
 import time
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ LATE_S = 0.7
 
 
 class Motor:
-    """A board that is driven until it receives a stop; ``driven`` counts the ticks of that."""
+    """A board that is driven until it receives a stop; ``driven`` counts its ticks until then."""
 
     channels, tick_s = (Channel(),), 0.01
 
@@ -37,7 +37,7 @@ class Motor:
 
 
 class LateBoard(RunningBoard[Motor]):
-    """Its thread stands still for ``LATE_S`` after a wait; the stop comes in that time."""
+    """A board whose thread stands still for ``LATE_S``, in which time a stop arrives."""
 
     def __init__(self) -> None:
         super().__init__(Motor())
@@ -59,7 +59,10 @@ class LateBoard(RunningBoard[Motor]):
 def test_what_came_while_the_thread_was_late_precedes_the_ticks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A real board would not have driven on for the time in which its computer was busy."""
+    """A stop that arrives while the thread is late acts before the late ticks.
+
+    A real board would not drive on while its computer is busy.
+    """
     board = LateBoard()
     monkeypatch.setattr(time, "monotonic", lambda: board.now_s)
     board._run()

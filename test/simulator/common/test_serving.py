@@ -24,7 +24,7 @@ TWO_PORTS = (Channel("command", datagrams=True), Channel("stop", "", datagrams=T
 
 @pytest.fixture
 def client() -> Iterator[socket.socket]:
-    """UDP socket of a program on the same computer."""
+    """Yield the UDP socket of a program on the same computer."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         client.settimeout(PATIENCE_S)
         yield client
@@ -38,7 +38,7 @@ def place(address: str) -> tuple[str, int]:
 
 
 def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
-    """Commands and reports of one channel do not appear on the other."""
+    """Commands and reports of one serial channel do not appear on the other channel."""
     with ServedBoard(ToyLines()) as served, ExitStack() as stack:
         ports = [os.open(path, os.O_RDWR | os.O_NOCTTY) for path in served.addresses]
         for port in ports:
@@ -52,7 +52,7 @@ def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
 
 
 def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> None:
-    """A hyphen and the channel's name are appended; all links are removed with the board."""
+    """The name of each link ends in a hyphen and the channel; the links are removed at the end."""
     with ServedBoard(ToyLines(), links=[tmp_path / "board"]) as served:
         assert served.names == [str(tmp_path / "board-drive"), str(tmp_path / "board-front")]
         assert [os.readlink(name) for name in served.names] == served.addresses
@@ -60,14 +60,14 @@ def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> N
 
 
 def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
-    """The links are in the order of the channels."""
+    """If several links are given, they are for the channels, in this order."""
     links = [tmp_path / "a", tmp_path / "b"]
     with ServedBoard(ToyLines(), links=links) as served:
         assert [os.readlink(link) for link in links] == served.addresses
 
 
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
-    """Too many links, a second link whose path exists, and a link for a UDP socket."""
+    """Refused are too many links, a link whose path exists, and a link for a UDP socket."""
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
         open_carriers(ToyLines.channels, three)
@@ -80,7 +80,7 @@ def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path
 
 
 def test_a_datagram_is_answered_to_its_sender(client: socket.socket) -> None:
-    """Each reply is one datagram; a second program gets the replies to its own requests."""
+    """A reply is one datagram, and goes to the program that has sent the request."""
     with ServedBoard(ToyServer()) as served:
         client.sendto(b"odo", place(served.addresses[0]))
         assert client.recv(100) == b"ok 0.000"
@@ -91,7 +91,7 @@ def test_a_datagram_is_answered_to_its_sender(client: socket.socket) -> None:
 
 
 def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -> None:
-    """Datagrams that wait together are neither joined nor dropped."""
+    """Datagrams that wait at the same time, even empty ones, are neither joined nor dropped."""
     with ServedBoard(ToyServer()) as served:
         with served.lock:  # they wait in the socket
             for data in (b"odo", b"", b"odo"):
@@ -100,7 +100,7 @@ def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -
 
 
 def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
-    """A board that sends before any request does not know where to send to."""
+    """A datagram that a board sends before any request has no receiver, so it is dropped."""
 
     class Talking(ToyServer):
         def advance(self) -> list[tuple[int, bytes]]:
@@ -111,7 +111,10 @@ def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
 
 
 def test_datagram_channels_stand_on_ports_in_a_row() -> None:
-    """The ports listen on the loopback address only; the first port can be chosen."""
+    """The UDP ports of the channels are consecutive, and only on the loopback address.
+
+    The first port can be chosen.
+    """
     sockets = open_sockets(2)
     first, second = (place(one.address) for one in sockets)
     for one in sockets:
@@ -125,7 +128,7 @@ def test_datagram_channels_stand_on_ports_in_a_row() -> None:
 
 
 def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
-    """The sentence names the ports and what to do."""
+    """If a UDP port is in use or impossible, one sentence names the ports and what to do."""
     with closing(open_sockets(1)[0]) as taken:
         number = place(taken.address)[1]
         with pytest.raises(OSError, match=rf"UDP port {number} \(Address already in use\)"):
@@ -137,7 +140,7 @@ def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
 
 
 def test_the_facts_add_what_became_of_the_lines() -> None:
-    """The counts of dropped bytes and faults follow the board's own facts."""
+    """The facts of a board are followed by the numbers of dropped bytes and of faults."""
     with ServedBoard(ToyServer()) as served, served.lock:
         assert served.facts == {
             "x_m": 0.0,

@@ -12,7 +12,7 @@ from omnibot_driver.simulator.common.wired import WiredBoard
 
 
 def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
-    """A command split over two calls is complete, even if another channel receives in between."""
+    """A command in two pieces is complete, even if another channel receives data in between."""
     wired = WiredBoard(ToyLines())
     wired.receive(b"go 0.", 0.0, DRIVE)
     wired.receive(b"angle 30\n", 0.0, FRONT)
@@ -22,7 +22,7 @@ def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
 
 
 def test_each_channel_has_its_own_faults() -> None:
-    """The first line loses all bytes, the other none."""
+    """The line of the first channel loses all bytes, that of the second channel none."""
     cut = FaultyLine(LineFaults(lose=1.0))
     wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
     packets = [packet for _ in range(20) for packet in wired.advance()]
@@ -31,7 +31,7 @@ def test_each_channel_has_its_own_faults() -> None:
 
 
 def test_a_request_is_answered_when_its_move_is_done() -> None:
-    """During the move, other requests are answered, and another move is refused."""
+    """The reply to ``move`` comes at its end; meanwhile another move fails and ``odo`` succeeds."""
     wired = WiredBoard(ToyServer())
     wired.receive(b"move 0.02", 5.0)
     wired.receive(b"odo", 5.0)
@@ -45,7 +45,7 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """Delays up to 10 s pass without waiting, because they are in board time."""
+    """Delays are in board time, so a delay of 10 s passes without waiting."""
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
     wired = WiredBoard(board, [network])
@@ -60,7 +60,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """The arrival time continues the clock of the caller, which here began at 1000 s."""
+    """A late datagram arrives by the caller's clock, which in this test begins at 1000 s."""
     at: list[float] = []
 
     class Watch(ToyServer):
@@ -75,7 +75,7 @@ def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
 
 
 def test_lines_that_do_not_match_the_channels_are_a_defect() -> None:
-    """The refused transports are one line for two channels, and a line of the wrong kind."""
+    """One line for two channels is refused, and so is a line of the wrong kind."""
     for lines in ([FaultyLine()], [FaultyLine(), FaultyNetwork()]):
         with pytest.raises(ValueError, match="do not match"):
             WiredBoard(ToyLines(), lines)

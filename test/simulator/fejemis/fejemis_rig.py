@@ -32,7 +32,7 @@ class Rig:
         return self.board.now_s
 
     def booted(self) -> "Rig":
-        """Run for a second after power on, and discard the lines received."""
+        """Run for a second after power on, and discard the lines received in this time."""
         self.run(1.0)
         self.lines.clear()
         return self
@@ -43,7 +43,7 @@ class Rig:
             self.board.receive(text.encode("latin-1") + b"\n", self.now, port)
 
     def run(self, seconds: float) -> list[tuple[int, str]]:
-        """Advance by this time, in s; return the port and text of each line received meanwhile."""
+        """Advance by ``seconds``; return port and text of each line received in that time."""
         before = len(self.lines)
         for _ in range(round(seconds / self.board.tick_s)):
             for port, data in self.board.advance():
@@ -64,7 +64,7 @@ class Rig:
         return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]
 
     def drive(self, text: str, seconds: float) -> None:
-        """Send the same ``rc`` to both halves, and relay the angle of the front wheel."""
+        """Send the same ``rc`` line to both halves; run for ``seconds``, with the angle relayed."""
         self.relays = True
         self.say(FRONT, "sub fwl 15", text)
         self.say(DRIVE, text)

@@ -9,7 +9,7 @@ from fejemis_rig import DRIVE, FRONT, Rig
 
 
 def test_brush_and_lift() -> None:
-    """The lift takes 12 s from end to end at 6 V; its voltage ends after its time, or with 0."""
+    """The lift takes 12 s from end to end at 6 V; it stops after the given time, or with 0 V."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")
     rig.run(1.0)
@@ -28,7 +28,7 @@ def test_brush_and_lift() -> None:
 
 
 def test_the_band_and_single_leds() -> None:
-    """Each colour is limited to 0..255."""
+    """Each colour of the LEDs is limited to 0..255."""
     rig = Rig().booted()
     rig.say(FRONT, "ledb 10 20 300", "led 3 1 2 3")
     rig.run(0.01)
@@ -42,7 +42,7 @@ def test_the_band_and_single_leds() -> None:
 
 
 def test_distances_to_a_wall() -> None:
-    """Without a wall: 8.19 m, no sonar echo, and the end of the infrared range."""
+    """Without a wall, sensors report 8.19 m, no sonar echo, and the end of the infrared range."""
     rig = Rig(front_m=0.5).booted()
     assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]
     assert rig.ask(FRONT, "iri")[0].split()[:3] == ["irc", "0.500", "0.500"]
@@ -54,7 +54,7 @@ def test_distances_to_a_wall() -> None:
 
 
 def test_the_sonar_measures_when_it_is_triggered() -> None:
-    """``hcsr`` triggers the sonar; before that, the sonar repeats the last distance."""
+    """``hcsr`` triggers the sonar; without it the sonar repeats the last distance."""
     rig = Rig(front_m=2.0).booted()
     rig.drive("rc 2 0.5 0", 2.0)
     assert rig.ask(DRIVE, "sr04i") == ["sr04 2.000"]
@@ -63,7 +63,7 @@ def test_the_sonar_measures_when_it_is_triggered() -> None:
 
 
 def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
-    """The mean reading becomes the offset, so a robot that turns gets a wrong one."""
+    """The mean reading of the gyro becomes its offset, which is wrong for a robot that turns."""
     rig = Rig().booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -76,7 +76,7 @@ def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
 
 
 def test_the_accelerometer_is_calibrated_as_level() -> None:
-    """``acccal2`` assumes a level board; ``acccal`` sets offsets and scales."""
+    """``acccal2`` assumes that the board is level; ``acccal`` sets offsets and scales."""
     rig = Rig(accel_noise_mps2=0.0).booted()
     rig.say(DRIVE, "acccal2")
     rig.run(1.2)
@@ -88,7 +88,7 @@ def test_the_accelerometer_is_calibrated_as_level() -> None:
 
 
 def test_the_yaw_of_the_imu_follows_the_robot() -> None:
-    """The gyro of this test has no bias; a bias that is not calibrated would add to the yaw."""
+    """The yaw of the IMU is that of the robot, since the gyro in this test has no bias."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 0.0)).booted()
     rig.drive("rc 2 0.3 20", 4.0)
     yaw = float(rig.ask(DRIVE, "imuposei")[0].split()[3])
@@ -99,7 +99,7 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """``eer`` and ``setid 0`` load a configuration without offset: the bias turns the yaw."""
+    """``eer`` and ``setid 0`` load a configuration without gyro offset: the bias turns the yaw."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -120,7 +120,7 @@ def test_the_answer_to_confs_has_the_steering_first() -> None:
 
 
 def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
-    """``eew`` saves the configuration; ``eer`` and a restart load it."""
+    """``eew`` saves the configuration; ``eer`` and a restart load the saved configuration."""
     rig = Rig().booted()
     rig.say(DRIVE, "confw 0.08 0.081 20 64 0.41")
     rig.run(0.01)
@@ -136,7 +136,7 @@ def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
 
 
 def test_id_zero_erases_the_configuration() -> None:
-    """The configuration cannot be saved until the board has an id again."""
+    """``setid 0`` erases the configuration, which can be saved only after another ``setid``."""
     rig = Rig().booted()
     rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")
     rig.run(0.01)

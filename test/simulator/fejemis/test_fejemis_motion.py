@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion of the simulated robot: by the manual's equations, which differ from ``rc`` commands."""
+"""Motion of the simulated robot by the manual's equations; ``rc`` commands another motion."""
 
 from math import atan2, degrees, hypot, radians
 
@@ -31,14 +31,14 @@ def steered_degrees(v: float, w: float) -> float:
 def test_the_body_moves_by_the_equations_of_the_manual(
     v: float, w: float, speed: float, turn: float
 ) -> None:
-    """The values are calculated by hand; they are not those that ``rc`` commands."""
+    """The speed and turn rate are calculated by hand; an ``rc`` line names other values."""
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)
     assert (right - left) / B == pytest.approx(turn, abs=1e-4)
 
 
 def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
-    """The complete robot moves by the same equations after its front wheel has turned across."""
+    """Once its front wheel is at 90°, the robot turns five times as fast as ``rc`` commands."""
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 4.0)
     truth = rig.board.truth
@@ -47,14 +47,14 @@ def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
 
 
 def test_from_straight_ahead_a_turn_on_the_spot_surges_forward() -> None:
-    """Both wheels turn forward until the front wheel is across."""
+    """Until the front wheel is at 90°, both drive wheels turn forward."""
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 2.0)
     assert hypot(rig.board.truth.x_m, rig.board.truth.y_m) > 0.15
 
 
 def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
-    """An ``rc`` to the front half alone moves only the front wheel."""
+    """If only the front half gets the ``rc`` line, only the front wheel moves."""
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0 20")
     rig.run(2.0)
@@ -63,7 +63,7 @@ def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
 
 
 def test_without_the_angle_drive_goes_straight() -> None:
-    """The drive half knows the angle of the front wheel only from relayed lines."""
+    """The drive half gets the angle of the front wheel only from the host, which relays it."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.5 30")
     rig.run(1.0)
@@ -81,7 +81,7 @@ def test_no_command_ends_by_itself() -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
-    """The front wheel takes the angle of the same curve driven forward."""
+    """In reverse, mirroring firmware turns the front wheel as for the same curve forward."""
     rig = Rig(firmware=Firmware(sums=False, reverse="mirrored")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth
@@ -96,7 +96,7 @@ def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
-    """The front wheel is across, and the outer wheel turns backward."""
+    """In reverse, clamping firmware sets the front wheel to 90°, and the robot spins."""
     rig = Rig(firmware=Firmware(sums=False, reverse="clamped")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth
@@ -106,7 +106,7 @@ def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
 
 
 def test_the_steering_follows_a_small_step_at_12_radians_a_second() -> None:
-    """The angle reaches 63 % after about 1/12 s, without overshoot, as in the manual."""
+    """As in the manual, the steering angle reaches 63 % of a small step in 1/12 s."""
     rig = Rig(angle_noise_deg=0.0).booted()
     rig.say(FRONT, "rc 2 1 10")
     wanted = steered_degrees(1.0, radians(10))
@@ -121,7 +121,7 @@ def test_the_steering_follows_a_small_step_at_12_radians_a_second() -> None:
 
 
 def test_the_odometry_of_the_board_is_where_the_robot_is() -> None:
-    """The true wheels have the sizes that the board assumes."""
+    """The board's odometry is right here, as the wheels have the sizes that the board assumes."""
     rig = Rig().booted()
     for text in ("rc 2 0.3 0", "rc 2 0.2 20", "rc 2 0.2 -40"):
         rig.drive(text, 2.0)

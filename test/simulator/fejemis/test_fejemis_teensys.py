@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Functions of each half of the simulated Fejemis besides driving, and faults of one half alone."""
+"""Tests of the two halves of the simulated Fejemis: functions besides driving, and faults."""
 
 import json
 
@@ -24,7 +24,7 @@ def angle_line(rig: Rig) -> tuple[float, int, int]:
 
 
 def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
-    """Until ``start``, rcSource is -1, and commands have no effect."""
+    """After ``stop``, rcSource is -1 in heartbeats, and commands have no effect until ``start``."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.3 0")
     rig.run(0.5)
@@ -40,7 +40,7 @@ def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
 
 
 def test_some_firmware_goes_on_after_start() -> None:
-    """The manual does not say whether the last command takes effect again."""
+    """After ``start``, some firmware continues the last command; the manual does not say so."""
     rig = Rig(firmware=Firmware(sums=False, start_resumes=True)).booted()
     rig.say(DRIVE, "rc 2 0.3 0", "stop")
     rig.run(0.5)
@@ -54,7 +54,10 @@ def test_some_firmware_goes_on_after_start() -> None:
 
 
 def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
-    """Pose, subscriptions, source and time are reset; the other half continues."""
+    """A restart of the drive half resets its pose, subscriptions, source and time.
+
+    The front half continues.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, "sub pose 20")
     rig.drive("rc 2 0.3 0", 1.0)
@@ -76,7 +79,7 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
     boot_s: float, *, says_start: bool
 ) -> None:
-    """The time in the lines begins at zero with the boot."""
+    """The time in the lines is zero at the beginning of the boot."""
     rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
     began = rig.now
     rig.board.befall("drive", "restart")
@@ -94,7 +97,7 @@ def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
 
 
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
-    """The front half no longer sends the angle; the drive half uses the last one it received."""
+    """After a restart the front half sends no angle; the drive half keeps the last one received."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 4")
     rig.drive("rc 2 0.3 20", 1.0)
@@ -108,7 +111,7 @@ def test_front_that_restarts_switches_brush_and_lift_off() -> None:
 
 
 def test_what_is_sent_while_a_half_boots_is_lost() -> None:
-    """The half boots for 0.4 s."""
+    """Lines that are sent to a half during its boot of 0.4 s are lost."""
     rig = Rig()
     rig.say(DRIVE, "stop")
     rig.run(1.0)
@@ -118,7 +121,7 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """The other half sends as usual, and the robot still drives."""
+    """While one half is lost, the other half sends as usual, and the robot still drives."""
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
     port = DRIVE if half == "drive" else FRONT
@@ -133,7 +136,7 @@ def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
 
 
 def test_sums_can_begin_and_end_in_each_half() -> None:
-    """The change happens while the half is running."""
+    """A running half can begin or cease to use checksums."""
     rig = Rig().booted()
     rig.board.befall("front", "sums-begin")
     said = dict(rig.run(0.5))
@@ -144,7 +147,7 @@ def test_sums_can_begin_and_end_in_each_half() -> None:
 
 
 def test_faults_can_be_planned() -> None:
-    """Faults occur at their times, in whatever order the options list them."""
+    """Planned faults occur at their times, even if the options list them in another order."""
     late = Fault(at_s=2.0, half="front", what="well")
     rig = Rig(faults=(late, Fault(at_s=1.0, half="front", what="silent")))
     rig.run(0.99)
@@ -155,7 +158,7 @@ def test_faults_can_be_planned() -> None:
 
 
 def test_ports_can_be_swapped_and_ids_be_others() -> None:
-    """A host can identify each half only by its heartbeat."""
+    """If the ports are swapped, a host can identify each half only by its heartbeat."""
     rig = Rig(swapped=True)
     rig.run(1.0)
     assert any(port == FRONT and " 90 " in text for _, port, text in rig.lines)
@@ -169,7 +172,7 @@ def test_ports_can_be_swapped_and_ids_be_others() -> None:
 
 
 def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
-    """The diagnosis is ``0x3c2`` or ``0x13c2``, as in the manual's list."""
+    """The diagnosis of a healthy sensor is ``0x3c2`` or ``0x13c2``, as in the manual's list."""
     rig = Rig().booted()
     bits = [rig.ask(FRONT, "fwli")[0].split()[3] for _ in range(8)]
     assert set(bits) == {"0x3c2", "0x13c2"}
@@ -192,7 +195,7 @@ def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
     ],
 )
 def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> None:
-    """The bits are those of the manual's list."""
+    """Each error bit of the sensor's diagnosis is the one in the manual's list."""
     rig = Rig().booted()
     rig.board.befall("front", what)
     assert angle_line(rig)[1:] == (0, diagnosis)
@@ -232,7 +235,7 @@ def test_the_offset_of_the_sensor_is_configured() -> None:
 
 
 def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
-    """``on`` before the end of the delay cancels it."""
+    """``off`` cuts the power after its delay, unless ``on`` comes before that."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1")
     rig.say(DRIVE, "off 2")
@@ -249,7 +252,7 @@ def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
 
 
 def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> None:
-    """The delay of ``off`` ends without effect."""
+    """A restart of the drive half cancels an ``off`` whose delay has not ended."""
     rig = Rig().booted()
     rig.say(DRIVE, "off 2")
     rig.run(0.5)
@@ -262,7 +265,7 @@ def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> 
 
 
 def test_options_reach_the_board_by_a_url() -> None:
-    """The fault names are those of the command line."""
+    """The names of the faults in a URL are those of the command line."""
     url = (
         "sim://?sums=off&reverse=clamped&swapped&ids=90,7&fault=1:front:silent&fault=2:drive:hung"
         "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100&boot=0.05&no-start-line"
@@ -281,11 +284,11 @@ def test_options_reach_the_board_by_a_url() -> None:
     "wrong", ["fault=5:rear:silent", "fault=5:drive:hall-broken", "ids=a,b", "boot=-1"]
 )
 def test_a_wrong_option_is_refused(wrong: str) -> None:
-    """An example is a fault of the angle sensor in the drive half, which does not have one."""
+    """A wrong option is refused, such as a fault of the angle sensor in the drive half."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{wrong}", options.load(MODULE))
 
 
 def test_the_names_of_faults_are_unique() -> None:
-    """The front half looks both kinds up in one table."""
+    """A fault of a half and a fault of its sensor must not have the same name."""
     assert not FAULTS.keys() & SENSOR_FAULTS.keys()

@@ -24,7 +24,7 @@ SUMS = Firmware(sums=True)
     ],
 )
 def test_sums_are_those_of_the_public_hosts(line: str) -> None:
-    """The examples are typed from the public host programs."""
+    """The checksums in these lines are copied from the public host programs."""
     assert wire.checked(line)[0] is wire.Check.GOOD
     assert wire.line(line[3:], sums=True, carriage_return=False) == line.encode() + b"\n"
 
@@ -43,7 +43,7 @@ def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
 
 
 def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
-    """The line is discarded."""
+    """A line with a wrong checksum is discarded and answered by a comment."""
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(DRIVE, ";20rc 2 0.5 0")
     assert "# CRC failed" in answer
@@ -52,7 +52,7 @@ def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
 
 
 def test_a_line_without_a_sum_is_executed_under_protest() -> None:
-    """Firmware with checksums replies with this comment."""
+    """Firmware with checksums obeys a line without one, and answers it by a comment."""
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(DRIVE, "rc 2 0.5 0")
     assert answer.endswith("# processing under protest - no CRC")
@@ -61,7 +61,7 @@ def test_a_line_without_a_sum_is_executed_under_protest() -> None:
 
 
 def test_firmware_without_sums_does_not_know_them() -> None:
-    """The firmware treats the line as an unknown command, and its own lines have no checksum."""
+    """Firmware without checksums takes a line with one for an unknown command."""
     rig = Rig().booted()
     (answer,) = rig.ask(DRIVE, ";19rc 1 0.5 65")
     assert answer.startswith("# 1.0")
@@ -70,7 +70,7 @@ def test_firmware_without_sums_does_not_know_them() -> None:
 
 
 def test_an_unknown_command_is_a_comment() -> None:
-    """The comment contains the Teensy's time."""
+    """The comment on an unknown command has a checksum and names the command."""
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(FRONT, ";35fly")
     assert wire.checked(answer)[0] is wire.Check.GOOD
@@ -79,7 +79,7 @@ def test_an_unknown_command_is_a_comment() -> None:
 
 @pytest.mark.parametrize("text", ["stop", "start"])
 def test_the_front_half_does_not_know_stop_and_start(text: str) -> None:
-    """Only the drive half has these commands."""
+    """Only the drive half has the commands ``stop`` and ``start``."""
     rig = Rig().booted()
     assert rig.ask(FRONT, text)[0].endswith(f"unhandled: '{text}'")
     assert rig.ask(DRIVE, text) == []
@@ -96,7 +96,7 @@ def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
 
 
 def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
-    """The subscription itself is not acknowledged."""
+    """A subscription is not acknowledged; its messages come until the period is set to zero."""
     rig = Rig().booted()
     assert rig.ask(FRONT, "sub fwl 15") == []
     assert sum("fwl" in text for _, text in rig.run(1.5)) == 100
@@ -106,7 +106,7 @@ def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
 
 
 def test_leave_ends_all_of_them_the_heartbeat_too() -> None:
-    """The heartbeat stays off until it is subscribed again."""
+    """``leave`` ends all subscriptions, also that of the heartbeat."""
     rig = Rig().booted()
     rig.say(DRIVE, "sub pose 20", "sub gyro 10", "leave")
     rig.run(0.01)
@@ -126,7 +126,7 @@ KEYS = {
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
-    """The key is that of the help text; the infrared sensors reply with another key."""
+    """The key of each value is that of the help text; infrared sensors reply with another key."""
     rig = Rig().booted()
     rig.say(port, "leave")
     rig.run(0.01)
@@ -147,7 +147,7 @@ def test_help_is_a_flood_of_text_without_comment_marks() -> None:
 
 
 def test_a_line_of_more_than_200_characters_is_cut() -> None:
-    """The rest of a long line is read as a new line, in this case a command."""
+    """The rest of a line of more than 200 characters is read as a new line, here as a command."""
     rig = Rig().booted()
     rig.say(DRIVE, "x" * 200 + "stop")
     rig.run(0.01)
@@ -165,7 +165,7 @@ def test_a_line_of_more_than_200_characters_is_cut() -> None:
     ],
 )
 def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: float) -> None:
-    """A missing number is zero."""
+    """A number that is missing in a line is read as zero."""
     rig = Rig().booted()
     rig.say(DRIVE, line)
     rig.run(0.01)
@@ -174,7 +174,7 @@ def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: flo
 
 
 def test_lines_end_with_or_without_a_carriage_return() -> None:
-    """The rule applies in both directions; the manual shows neither."""
+    """A carriage return is optional in both directions; the manual does not show line ends."""
     rig = Rig().booted()
     rig.board.receive(b"stop\r\n", 0.0, DRIVE)
     rig.run(0.01)
@@ -186,7 +186,7 @@ def test_lines_end_with_or_without_a_carriage_return() -> None:
 
 
 def test_variants_of_messages() -> None:
-    """Variants have a time before the wheel speeds, a tilt after the pose, acceleration in g."""
+    """Some firmware sends a time before the wheel speeds, a tilt after the pose, or g."""
     usual = Rig(accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
     assert len(usual.ask(DRIVE, "veli")[0].split()) == 3
     assert len(usual.ask(DRIVE, "posei")[0].split()) == 5
@@ -199,7 +199,7 @@ def test_variants_of_messages() -> None:
 
 
 def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
-    """After more than two hours, a step is about 0.5 ms."""
+    """In single precision, the board's time has steps of about 0.5 ms after two hours."""
     firmware = Firmware(sums=False, single_precision=True)
     rig = Rig(firmware=firmware, uptime_s=8000.0)
     times = []
@@ -209,7 +209,7 @@ def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
 
 
 def test_the_two_clocks_run_apart() -> None:
-    """Each Teensy has its own crystal."""
+    """The clocks of the two Teensys differ, as each has a crystal of its own."""
     rig = Rig(clock_ppm=(200.0, -300.0))
     rig.run(20.0)
     assert rig.board.drive.clock_s == pytest.approx(20.004)
@@ -217,7 +217,7 @@ def test_the_two_clocks_run_apart() -> None:
 
 
 def test_bytes_to_the_boards_can_be_lost() -> None:
-    """The seed determines which bytes are lost."""
+    """Bytes sent to the boards can be lost; the seed determines which."""
     heard = []
     for _ in range(2):
         rig = Rig(firmware=SUMS, lose_inbound=0.05, seed=3).booted()
@@ -230,7 +230,10 @@ def test_bytes_to_the_boards_can_be_lost() -> None:
 
 
 def test_three_lost_characters_leave_a_valid_command() -> None:
-    """``c`` is 99, and ``2`` plus ``1`` is 99, so the sum modulo 99 stays the same."""
+    """Modulo 99, the character ``c`` is 0, and so are ``2`` and ``1`` together.
+
+    A line that lost these three characters has the same checksum.
+    """
     rig = Rig(firmware=SUMS).booted()
     whole, cut = "rc 2 0.250 11.459", "rc  0.250 1.459"
     assert wire.sum_of(whole) == wire.sum_of(cut)
@@ -241,7 +244,7 @@ def test_three_lost_characters_leave_a_valid_command() -> None:
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_word_with_a_space_behind_it_is_unknown_to_some_firmware(*, exact: bool) -> None:
-    """A sibling of this firmware compares the complete line with ``stop``."""
+    """A related firmware compares the complete line with ``stop``: a space makes it unknown."""
     rig = Rig(firmware=Firmware(sums=False, exact_words=exact)).booted()
     rig.ask(DRIVE, "stop ")
     assert rig.board.drive.source == (10 if exact else -1)

@@ -18,7 +18,7 @@ LOW_PASS = WriteSetting(Setting.RPM_LOW_PASS, 1.0)
 
 
 class Rig:
-    """A board and its host; ``heard`` holds all reports, each with the time of its last byte."""
+    """A board and its host; ``heard`` has all reports, each with the time of its last byte."""
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
         self.board = SimulatedLois(LoisSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
@@ -31,7 +31,7 @@ class Rig:
         return self.board.now_s
 
     def run(self, seconds: float) -> list[Report]:
-        """Advance by this time, in s; return the reports received meanwhile."""
+        """Advance by ``seconds``; return the reports received in that time."""
         found: list[Report] = []
         for _ in range(round(seconds / self.board.tick_s)):
             found += self.decoder.feed(self.board.step(), self.now)
@@ -53,12 +53,12 @@ class Rig:
                 raise AssertionError(f"{command} was not obeyed")
 
     def drive(self, left: int, right: int, seconds: float) -> list[Report]:
-        """Command these wheel speeds, in RPM, and return the reports received meanwhile."""
+        """Command these wheel speeds, in RPM, for ``seconds``; return the reports received."""
         self.say(SetRpm(left, right))
         return self.run(seconds)
 
     def booted(self) -> "Rig":
-        """Run until the board has booted, and switch its low-pass on if it has one."""
+        """Run until the board has booted; set its low-pass filter if the board has one."""
         self.run(2.1)
         if self.board.settings.quirks.extra_settings:
             self.say(LOW_PASS)
@@ -71,5 +71,5 @@ def ticks_in(reports: list[Report]) -> list[Ticks]:
 
 
 def odometry_in(reports: list[Report]) -> list[BoardOdometry]:
-    """Return the reports of the odometry, in order."""
+    """Return the reports of the board's odometry, in order."""
     return [report for report in reports if isinstance(report, BoardOdometry)]

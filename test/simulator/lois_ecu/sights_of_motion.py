@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detectors of quirks in motion: how a board counts, measures, controls and adds up its wheels.
+"""Detectors of quirks in motion: how a board counts ticks, and measures and controls speeds.
 
-Each function is named after a quirk, and returns whether a board shows it.
+Each function has the name of a quirk, and returns whether a board with these quirks shows it.
 """
 
 import math
@@ -24,14 +24,14 @@ STRAIGHT = 20
 
 
 def ticks_of_forward_targets(quirks: Quirks) -> bool:
-    """Driving backward counts no ticks."""
+    """No ticks are counted while the robot drives backward."""
     rig = Rig(quirks).booted()
     rig.drive(-STRAIGHT, -STRAIGHT, 4.0)
     return ticks_in(rig.run(1.0))[-1].left == 0
 
 
 def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
-    """With equal controllers, 0x20 reports less than 75 % of a straight drive."""
+    """With equal controllers, message 0x20 reports less than 75 % of a straight drive."""
     rig = Rig(quirks).booted()
     rig.say(WriteSetting(Setting.RIGHT_KP, 0.4412), WriteSetting(Setting.RIGHT_TN, 0.2865))
     rig.drive(STRAIGHT, STRAIGHT, 10.0)
@@ -49,7 +49,7 @@ def velocity_may_be_nan(quirks: Quirks) -> bool:
 
 
 def sign_of_command(quirks: Quirks) -> bool:
-    """After a change to backward, the measured speed is negative before the wheel reverses."""
+    """After a backward command, the measured speed is negative before the wheel reverses."""
     rig = Rig(quirks).booted()
     rig.drive(30, 40, 6.0)
     rig.say(SetRpm(-30, -40))
@@ -93,7 +93,7 @@ def reverse_runs_fast(quirks: Quirks) -> bool:
 
 
 def low_pass_starts_at_zero(quirks: Quirks) -> bool:
-    """Until the low-pass is written, a speed target does not move the robot."""
+    """No speed target moves the robot until the low-pass filter is set."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.drive(30, 30, 5.0)

@@ -2,7 +2,7 @@
 
 """Detectors of quirks in communication: what a board receives, sends and records.
 
-Each function is named after a quirk, and returns whether a board shows it.
+Each function has the name of a quirk, and returns whether a board with these quirks shows it.
 """
 
 from dataclasses import replace
@@ -67,7 +67,7 @@ def clock_in_ms(quirks: Quirks) -> bool:
 
 
 def clock_stops_while_sending(quirks: Quirks) -> bool:
-    """The clock is more than 3 % slow, because it stops during each message."""
+    """The board's clock is more than 3 % slow, because it stops during each message."""
     rig = Rig(quirks)
     rig.run(3.0)
     began, counts = rig.now, [ticks_in(rig.run(0.5))[-1].time_counts]
@@ -103,7 +103,7 @@ def deaf_while_counting(quirks: Quirks) -> bool:
 
 
 def button_waits_while_sending(quirks: Quirks) -> bool:
-    """The power stays on during a record; one of 100 samples takes 0.12 s to send."""
+    """The button does not cut the power during a record; 100 samples take 0.12 s to send."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(50, 50), RecordTorque(100, 100))
@@ -125,7 +125,7 @@ def odometry_period_is_fixed(quirks: Quirks) -> bool:
 
 
 def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
-    """Writing 0x11 does so even if the mode does not change."""
+    """Command 0x11 sets the short correction to zero, even if it does not change the mode."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST))
@@ -152,7 +152,7 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
 
 
 def terminal_passes_input_on(quirks: Quirks) -> bool:
-    """The compass reads 34 lines a second, and the board obeys no faster."""
+    """In compass mode the board obeys only as many lines as the compass reads: 34 a second."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.COMPASS))
@@ -163,7 +163,7 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 
 
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
-    """The second request is ignored, the third, 6 s later, is not."""
+    """A second request of a ball is ignored; a third one, 6 s later, is obeyed."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(DistributeBall(), DistributeBall())
@@ -173,7 +173,7 @@ def one_ball_in_six_seconds(quirks: Quirks) -> bool:
 
 
 def reset_clears_ticks_only(quirks: Quirks) -> bool:
-    """After 0x18 the odometry is kept, and the robot still drives."""
+    """After command 0x18 the odometry is kept, and the robot still drives."""
     rig = Rig(quirks).booted()
     rig.drive(20, 30, 4.0)
     rig.say(Reset())
@@ -188,7 +188,7 @@ def gps_is_ignored(quirks: Quirks) -> bool:
 
 
 def headings_average_over_north(quirks: Quirks) -> bool:
-    """While the robot turns through north, the reported heading leaps to the south."""
+    """While the robot turns through north, the reported heading jumps to the south."""
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.HEADING, 40), SetPeriod(Stream.TICKS, PERIOD_OFF))
     rig.drive(-20, 20, 12.0)
@@ -209,7 +209,7 @@ def _record(rig: Rig, kind: RecordKind, count: int, seconds: float) -> Record | 
 
 
 def records_in_100_us(quirks: Quirks) -> bool:
-    """At 20 RPM a tick takes 50 ms, which is beyond 16 bits in units of 100 ns."""
+    """At 20 RPM, ticks are 50 ms apart, which 16 bits can hold only in a unit above 100 ns."""
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 5.0)
     record = _record(rig, RecordKind.RPM, 20, 4.0)
@@ -219,7 +219,7 @@ def records_in_100_us(quirks: Quirks) -> bool:
 
 
 def torque_comes_as_rpm(quirks: Quirks) -> bool:
-    """The reply to 0x17 has command number 0x04."""
+    """The reply to the request 0x17 (torque) has command number 0x04."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(encode_command(RecordTorque(5, 5)))
@@ -229,14 +229,14 @@ def torque_comes_as_rpm(quirks: Quirks) -> bool:
 
 
 def record_waits_for_one_more(quirks: Quirks) -> bool:
-    """A record of 3 headings is not complete after 3 samples."""
+    """A record of 3 headings is still incomplete after 3 samples."""
     rig = Rig(quirks, compass_period_s=1.0)
     rig.run(2.5)
     return _record(rig, RecordKind.HEADING, 3, 3.1) is None
 
 
 def large_records_never_end(quirks: Quirks) -> bool:
-    """1025 torque samples would be complete after 93 s (fast control) or 205 s."""
+    """A record of 1025 torque samples is not complete after its time of 93 s or 205 s."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(with_sum(b":1704010401"))
@@ -248,7 +248,7 @@ def large_records_never_end(quirks: Quirks) -> bool:
 
 
 def lenient_hex(quirks: Quirks) -> bool:
-    """A payload with characters that are not digits is obeyed if its checksum is right."""
+    """A payload with characters that are not digits is accepted if the checksum is right."""
     rig = Rig(quirks)
     rig.run(2.1)
     for _ in range(5):
@@ -258,7 +258,7 @@ def lenient_hex(quirks: Quirks) -> bool:
 
 
 def slow_boot(quirks: Quirks) -> bool:
-    """The board is silent for 2 s after power-up, and then reads what has arrived before."""
+    """After power-up the board is silent for 2 s; then it reads what has arrived in that time."""
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))
     early = rig.run(1.9)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""For each deviation of the public firmware from the manual, a test checks how the driver copes."""
+"""For each deviation of the public firmware from the manual, a test of the driver is named."""
 
 import ast
 from dataclasses import fields
@@ -55,7 +55,7 @@ ANSWERS: dict[str, str] = {
 
 
 def test_every_quirk_has_an_answer() -> None:
-    """``ANSWERS`` names an existing test for each quirk."""
+    """The table ``ANSWERS`` names an existing test for each quirk."""
     assert set(ANSWERS) == {field.name for field in fields(Quirks)}
     there = {
         node.name

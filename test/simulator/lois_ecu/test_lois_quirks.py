@@ -23,14 +23,14 @@ SEEN: dict[str, Callable[[Quirks], bool]] = {
 
 
 def test_every_quirk_has_its_sight() -> None:
-    """A new quirk without a detector fails here."""
+    """Every quirk of the simulated board has a detector."""
     assert set(SEEN) == {field.name for field in fields(Quirks)}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """The detector finds the quirk if it is on, and not if only this quirk is off."""
+    """A detector finds its quirk if the quirk is on, and not if only this quirk is off."""
     assert SEEN[name](FIRMWARE)
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
@@ -38,12 +38,12 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
 def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
-    """The detector finds nothing on a board as documented, which has none of the quirks."""
+    """A detector finds nothing on a board as in the manual, where all quirks are off."""
     assert not SEEN[name](DOCUMENTED)
 
 
 def test_ticks_are_reported_as_they_are() -> None:
-    """The other tests of this module rely on the reports."""
+    """The board reports its ticks, on which the other tests of this module rely."""
     rig = Rig().booted()
     rig.drive(20, 20, 3.0)
     assert isinstance(ticks_in(rig.run(0.5))[-1], Ticks)

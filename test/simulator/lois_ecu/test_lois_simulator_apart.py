@@ -14,7 +14,7 @@ MODULES = sorted(Path(lois_ecu.__file__).parent.glob("*.py"))
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.name)
 def test_no_module_imports_the_core(path: Path) -> None:
-    """With a shared decoder, a misread manual would cancel out."""
+    """If the simulator used the driver's decoder, no test could detect a misread manual."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             assert node.module is not None

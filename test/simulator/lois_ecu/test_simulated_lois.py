@@ -39,7 +39,7 @@ BOTH = pytest.mark.parametrize("quirks", [DOCUMENTED, FIRMWARE], ids=["documente
 
 @BOTH
 def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
-    """All messages but the date, about every 400 ms, 1 s and 1.2 s; none is damaged."""
+    """All periodic messages but the date come, about every 400 ms, 1 s and 1.2 s, undamaged."""
     rig = Rig(quirks)
     heard = rig.run(22.0)
     counts = dict.fromkeys((Ticks, Heading, BoardOdometry, GpsTime, GpsPosition, GpsDate), 0)
@@ -62,7 +62,7 @@ def test_periods_stretch_with_the_load() -> None:
 
 @BOTH
 def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -> None:
-    """Both wheels reach about 20 RPM and keep it, because set points never expire."""
+    """Both wheels reach about 20 RPM and keep this speed, because set points never expire."""
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 10.0)
     speeds = []
@@ -91,9 +91,9 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
-    """The button's release does not move the robot.
+    """A release of the button does not move the robot.
 
-    A new set-point does, even while the button is pressed.
+    A new set point does, even while the button is pressed.
     """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 4.0)
@@ -110,7 +110,7 @@ def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
 
 @BOTH
 def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks: Quirks) -> None:
-    """Commands are still obeyed."""
+    """In a terminal mode the board sends only lines of the sensor, and still obeys commands."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.decoder.terminal = True
@@ -130,7 +130,7 @@ def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks
 
 @BOTH
 def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
-    """Lines with a checksum are rejected in this mode; the board's own lines keep theirs."""
+    """If checksums are off, the board rejects lines with a checksum, but still sends its own."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM))
@@ -148,7 +148,7 @@ def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
 
 @BOTH
 def test_junk_before_a_colon_is_harmless(quirks: Quirks) -> None:
-    """A colon always begins a new line."""
+    """A colon always begins a new line, so characters before the colon do no harm."""
     rig = Rig(quirks)
     rig.run(2.1)
     for line in (b"\xffx:030000000138\n", b":19000000003200:190000000032\n"):
@@ -173,7 +173,7 @@ def test_a_carriage_return_makes_a_line_too_long(quirks: Quirks) -> None:
 
 @pytest.mark.parametrize("payload", [b"0000 +01", b"00000x01", b"0000-fff"])
 def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
-    """Space, sign and prefix are accepted if the checksum is right."""
+    """The firmware reads numbers as ``strtol`` does, which allows a space, a sign and a prefix."""
     rig = Rig(FIRMWARE)
     rig.run(2.1)
     text = b":03" + payload
@@ -208,7 +208,7 @@ def test_the_gps_moves_with_the_robot() -> None:
 
 
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
-    """The ticks are zero, and the low-pass must be written again; the true pose is kept."""
+    """After a reboot the ticks are zero and the low-pass filter is not set; the true pose stays."""
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)
     place = rig.board.truth
@@ -222,7 +222,10 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
 
 
 def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> None:
-    """The firmware refuses a second ball within 6 s; a restarted board does not know the first."""
+    """A restarted board gives a ball at once, as it does not know when it gave the last one.
+
+    Otherwise the firmware refuses a second ball within 6 s.
+    """
     rig = Rig().booted()
     rig.say(SetLed(True), DistributeBall())
     rig.board.reboot()
@@ -233,7 +236,7 @@ def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> No
 
 
 def test_input_while_booting_is_kept_up_to_600_characters() -> None:
-    """Of 700 characters, the last 100 are lost."""
+    """Of 700 characters that arrive during the boot, the last 100 are lost."""
     rig = Rig()
     rig.board.receive(encode_command(LOW_PASS) * 50)
     rig.run(2.3)
@@ -242,7 +245,7 @@ def test_input_while_booting_is_kept_up_to_600_characters() -> None:
 
 
 def test_planted_errors_are_in_the_truth_alone() -> None:
-    """The board computes its odometry with the nominal wheel radius."""
+    """The board computes its odometry with the nominal wheel radius, not with the true one."""
     rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
     rig.drive(20, 20, 10.0)
     rig.say(SetRpm(0, 0))

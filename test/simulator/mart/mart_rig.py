@@ -18,7 +18,7 @@ INCH_M = 0.0254
 
 
 class Rig:
-    """A controller and its host; ``replies`` holds all replies, each with its time."""
+    """A controller and its host; ``replies`` has all replies, each with its time."""
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
         self.server = MartServer(MartSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
@@ -40,13 +40,13 @@ class Rig:
         self.server.receive(text.encode("latin-1"), STOP, "us", self.now)
 
     def run(self, seconds: float) -> list[str]:
-        """Advance by this time, in s; return the replies received meanwhile."""
+        """Advance by ``seconds``; return the replies received in that time."""
         found = self.server.advance(self.now + seconds)
         self.replies += [(reply.at_s, reply.data) for reply in found]
         return [reply.data.decode("latin-1") for reply in found]
 
     def wait(self, limit_s: float = 20.0) -> str | None:
-        """Return the next reply, or None after ``limit_s``; ``took_s`` is its delay, in s."""
+        """Return the next reply, or None after ``limit_s``; ``took_s`` is then its delay in s."""
         began_s, until_s = self.now, self.now + limit_s
         while self.now < until_s:
             found = self.run(max(0.0, min(self.server.wake_at, until_s) - self.now))
@@ -72,7 +72,7 @@ class Rig:
         return float(number)
 
     def drive(self, text: str, seconds: float = 1.0) -> None:
-        """Start an uncontrolled motion and let it run for this time, in s."""
+        """Start an uncontrolled motion and let the robot move for ``seconds``."""
         assert self.ask(text) == "ok"
         self.run(seconds)
 

@@ -12,7 +12,7 @@ from omnibot_driver.simulator.mart import FIRMWARE
 
 @pytest.mark.parametrize(("text", "sign"), [("TF 12", 1), ("TB 12", -1)])
 def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) -> None:
-    """The public server computes the distance from time."""
+    """The reply is "ok 12" although 15.8 inches were driven: the distance is computed from time."""
     rig = Rig()
     assert rig.ask(text) == "ok 12"
     assert sign * rig.x_in == pytest.approx(15.8, abs=0.2)
@@ -21,14 +21,14 @@ def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) ->
 
 @pytest.mark.parametrize("volts", [20.0, 26.0])
 def test_it_echoes_it_at_any_voltage(volts: float) -> None:
-    """The reply does not depend on the distance driven."""
+    """The reply to TF 24 is "ok 24" at any voltage, whatever the true distance is."""
     rig = Rig(volts=volts)
     assert rig.ask("TF 24") == "ok 24"
     assert abs(rig.x_in - 30.3) > 2
 
 
 def test_tf_24_slow_runs_at_normal_speed() -> None:
-    """Only TF SLOW 24 is slow, because the speed word must come first."""
+    """TF 24 SLOW is not slow, because the speed must precede the distance: TF SLOW 24."""
     fast, normal, slow = Rig(), Rig(), Rig()
     assert fast.ask("TF 24 SLOW") == normal.ask("TF NORMAL 24") == "ok 24"
     assert slow.ask("TF SLOW 24") == "ok 24"
@@ -37,7 +37,7 @@ def test_tf_24_slow_runs_at_normal_speed() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TF x", "TF SLOW x", "TB 0", "TB NORMAL y", "TF FAST 12"])
 def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
-    """The robot drives on until a stop."""
+    """If the distance of TF is 0 or a word, the robot drives until it is stopped."""
     rig = Rig()
     assert rig.ask(text, 60.0) is None
     assert rig.moving
@@ -46,7 +46,7 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """The limit is counted from the start of the move."""
+    """SDR limits the distance of an unlimited move, counted from the start of the move."""
     rig = Rig()
     rig.say("TF 0")
     rig.run(1.0)
@@ -59,14 +59,17 @@ def test_sdr_limits_an_unlimited_move_alone() -> None:
 
 
 def test_a_negative_distance_is_refused() -> None:
-    """The reply is "fail bad distance value"."""
+    """The reply to a negative distance is "fail bad distance value"."""
     assert Rig().ask("TF -5") == "fail bad distance value"
     assert Rig().ask("TB SLOW -5") == "fail bad distance value"
 
 
 @pytest.mark.parametrize("text", ["TF 0", "TB 0", "MCF 0", "MCB 0", "MCF far"])
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
-    """The result depends on the server's quirk; a word counts as zero."""
+    """A distance of zero is unlimited in the public server, but refused without this quirk.
+
+    A word is read as zero.
+    """
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"
     rig = Rig()
@@ -85,7 +88,7 @@ def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     ],
 )
 def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
-    """The server has two spellings of this reply."""
+    """The reply to a command without a distance is a failure; the server spells it in two ways."""
     assert Rig().ask(text) == answer
 
 
@@ -93,7 +96,7 @@ def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
 def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
     front_in: float, driven_in: float
 ) -> None:
-    """The robot moves a little before the first look at the sonar."""
+    """Near an obstacle the robot moves 0.3 inches before the server reads the sonar."""
     rig = Rig(front_m=front_in * INCH_M)
     assert rig.ask("TF 24") == "fail Insufficient front clearance."
     assert rig.took_s == pytest.approx(0.55, abs=0.06)
@@ -101,21 +104,21 @@ def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
 
 
 def test_near_an_obstacle_tb_fails_likewise() -> None:
-    """TB looks at the rear sonar."""
+    """Near an obstacle behind, TB fails, as it reads the rear sonar."""
     rig = Rig(rear_m=12 * INCH_M)
     assert rig.ask("TB 24") == "fail Insufficient rear clearance."
 
 
 @pytest.mark.parametrize("text", ["TF SLOW NCC 30", "TF DOCK 30"])
 def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
-    """The options NCC and DOCK switch the clearance check off, so the robot hits the wall."""
+    """The options NCC and DOCK switch the obstacle check off, so the robot hits the wall."""
     rig = Rig(front_m=20 * INCH_M)
     assert rig.ask(text, 60.0) == "ok 30"
     assert rig.server.hit_wall
 
 
 def test_tf_dock_stops_at_the_dock() -> None:
-    """The reply has the computed distance, not the one driven."""
+    """The reply to TF DOCK has the computed distance, not the driven one."""
     rig = Rig(dock_m=20 * INCH_M)
     assert rig.ask("DOCKED") == "ok false"
     answer = rig.ask("TF DOCK 60", 60.0)
@@ -126,7 +129,7 @@ def test_tf_dock_stops_at_the_dock() -> None:
 
 
 def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
-    """After that TF, the clearance is 19 inches again."""
+    """TFSFC sets the clearance of the next TF only; then the clearance is 19 inches again."""
     rig = Rig(front_m=60 * INCH_M)
     assert rig.ask("TFSFC 40") == "ok"
     assert rig.ask("TF 60") == "fail Insufficient front clearance."
@@ -136,7 +139,7 @@ def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
 
 
 def test_tf_holds_its_course_with_unequal_motors() -> None:
-    """TF corrects its heading by the gyro; F does not."""
+    """TF corrects its course by the gyro; F does not."""
     rig = Rig(motor_inequality=0.05)
     assert rig.ask("TF 80", 60.0) == "ok 80"
     assert abs(rig.yaw_deg) < 4
@@ -146,7 +149,7 @@ def test_tf_holds_its_course_with_unequal_motors() -> None:
 
 
 def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
-    """The reply is "fail excessive gyro correct"."""
+    """If one wheel stops, TF turns away and ends with "fail excessive gyro correct"."""
     rig = Rig()
     rig.say("TF 80")
     rig.run(1.0)
@@ -156,14 +159,14 @@ def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
 
 @pytest.mark.parametrize(("text", "sign"), [("MCR 90", -1), ("MCL 90", 1), ("MCL SLOW 90", 1)])
 def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
-    """The manual describes MCL differently."""
+    """MCR turns right and MCL left; the manual describes MCL differently."""
     rig = Rig()
     assert rig.ask(text) == "ok"
     assert sign * rig.yaw_deg == pytest.approx(93, abs=5)
 
 
 def test_mcr_normal_90_parses_as_0() -> None:
-    """The robot does not turn."""
+    """MCR NORMAL 90 is answered by ok, but the robot does not turn."""
     rig = Rig()
     assert rig.ask("MCR NORMAL 90") == "ok"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -171,7 +174,7 @@ def test_mcr_normal_90_parses_as_0() -> None:
 
 
 def test_less_than_10_degrees_are_turned_slowly() -> None:
-    """The same is seen at normal speed."""
+    """A turn of less than 10 degrees is slow, even if the command does not have SLOW."""
     rig, slow = Rig(), Rig()
     rig.ask("MCR 9")
     slow.ask("MCR SLOW 9")
@@ -180,14 +183,14 @@ def test_less_than_10_degrees_are_turned_slowly() -> None:
 
 @pytest.mark.parametrize("text", ["PTF 12 4 0.05 10", "PTF SLOW 12 4 0 10", "MCF 12", "MCB 12"])
 def test_undocumented_moves_answer_ok(text: str) -> None:
-    """The reply does not contain a distance."""
+    """Undocumented moves are answered by ok, without a distance."""
     rig = Rig()
     assert rig.ask(text) == "ok"
     assert abs(rig.x_in) > 8
 
 
 def test_the_port_is_silent_during_a_controlled_move() -> None:
-    """TF SLOW 80 takes 20 s, and all replies come after it."""
+    """TF SLOW 80 takes 20 s; requests of that time are answered after it."""
     rig = Rig()
     rig.say("TF SLOW 80", "ENC", "RMRA")
     assert rig.run(15.0) == []

@@ -9,7 +9,7 @@ from omnibot_driver.simulator.mart import FIRMWARE, Kind
 
 
 def test_rm_answers_in_71_ms() -> None:
-    """The reply comes when the encoder shows that the wheel turns."""
+    """The reply to RM comes after 71 ms, when the encoder shows that the wheel turns."""
     rig = Rig()
     assert rig.ask("RM 30") == "ok"
     assert rig.took_s == pytest.approx(0.071, abs=0.01)
@@ -17,7 +17,7 @@ def test_rm_answers_in_71_ms() -> None:
 
 
 def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
-    """F measures the bias of the gyro first."""
+    """F measures the bias of the gyro first, so its reply takes longer than that of R."""
     rig = Rig()
     assert rig.ask("F") == "ok"
     assert rig.took_s == pytest.approx(0.22, abs=0.015)
@@ -27,7 +27,10 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 
 
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
-    """The server does not know of the motion; only a write to the motors ends it."""
+    """If RM fails although the robot moves, only a write to the motors ends the motion.
+
+    The server does not know of the motion.
+    """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
     rig.run(1.0)
@@ -46,7 +49,7 @@ def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
 
 @pytest.mark.parametrize("change", ["1 1", "-1 -1", "5 -5", "0 1", "40 40"])
 def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(change: str) -> None:
-    """RMCS 0 0 does not stop the robot."""
+    """After RM -20, RMCS 0 0 has no effect; any other RMCS stops a motor or drives it forward."""
     rig = Rig()
     rig.drive("RM -20")
     assert rig.x_in < -1
@@ -64,7 +67,7 @@ def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(chan
 
 
 def test_rm_200_drives_backward_at_56() -> None:
-    """After the smallest RMCS the robot drives forward at full speed."""
+    """RM 200 drives backward at 56 units; the smallest RMCS then makes it full speed forward."""
     rig = Rig()
     rig.drive("RM 200")
     assert rig.server.chassis.right == 128 + 56
@@ -75,7 +78,7 @@ def test_rm_200_drives_backward_at_56() -> None:
 
 @pytest.mark.parametrize("speed", [1, 30, 127])
 def test_rm_1_to_127_drives_forward(speed: int) -> None:
-    """The motor register is 128 minus the speed."""
+    """After RM, the motor register is 128 minus the speed."""
     rig = Rig()
     rig.drive(f"RM {speed}")
     assert rig.server.chassis.right == 128 - speed
@@ -83,7 +86,7 @@ def test_rm_1_to_127_drives_forward(speed: int) -> None:
 
 
 def test_a_stuck_motor_can_hang_rm() -> None:
-    """RM hangs after a fast drive; the motors keep power, and the other wheel turns."""
+    """After a fast drive, RM hangs if a motor is stuck; the motors keep power, and one turns."""
     rig = Rig()
     rig.drive("RM 110")
     assert rig.ask("SRM") == "ok"
@@ -98,7 +101,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """A later RM repeats the reason of the last F."""
+    """If a motor is stuck, the first RM fails without a reason, and later ones with that of F."""
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)
@@ -109,7 +112,7 @@ def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
 
 
 def test_rm_0_is_a_motor_that_does_not_turn() -> None:
-    """A speed within the dead zone of the motors does not turn a motor either."""
+    """RM fails if its speed is zero or within the dead zone of the motors."""
     assert Rig().ask("RM 0") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 3") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 5") == "ok"
@@ -119,7 +122,7 @@ def test_rm_0_is_a_motor_that_does_not_turn() -> None:
     ("text", "seconds"), [("R", 0.6), ("L", 0.6), ("MCR 20", 0.6), ("F", 0.76), ("TF 12", 0.76)]
 )
 def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
-    """Afterwards the motors are off and the server is idle."""
+    """After a start that fails because of a stuck motor, motors are off and the server is idle."""
     rig = Rig(stuck="right")
     assert rig.ask(text) == "fail start timedout"
     assert rig.took_s == pytest.approx(seconds, abs=0.02)
@@ -129,7 +132,7 @@ def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
 
 
 def test_a_stuck_left_motor_is_not_noticed() -> None:
-    """Only the right wheel has an encoder."""
+    """A stuck left motor is not noticed, as only the right wheel has an encoder."""
     rig = Rig(stuck="left")
     rig.drive("F")
     assert rig.yaw_deg > 20
@@ -137,7 +140,7 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """Order and sign are the same in B."""
+    """CS and RMCS: the first number is for the right motor, and positive is forward, even in B."""
     rig = Rig()
     rig.drive(start)
     before = rig.server.chassis.copy()
@@ -152,7 +155,7 @@ def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, ch
 
 
 def test_cs_5_minus_5_turns_left() -> None:
-    """The true heading shows the turn to the left."""
+    """CS 5 -5 makes the right wheel faster, so the robot turns left."""
     rig = Rig()
     rig.drive("F")
     assert rig.ask("CS 5 -5") == "ok"
@@ -172,7 +175,7 @@ def test_cs_5_minus_5_turns_left() -> None:
     ],
 )
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
-    """At full speed the other motor is slowed down instead."""
+    """CS and RMCS cannot reverse a motor; at full speed they slow down the other motor."""
     rig = Rig()
     rig.drive(start, 0.5)
     rig.ask(change)
@@ -180,7 +183,7 @@ def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int
 
 
 def test_rmcs_0_0_just_reads_the_angle() -> None:
-    """RMCS 0 0 replies as RMRA does."""
+    """RMCS 0 0 changes nothing and returns the angle, as RMRA does."""
     rig = Rig()
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -192,7 +195,7 @@ def test_rmcs_0_0_just_reads_the_angle() -> None:
 
 @pytest.mark.parametrize("turn", ["RMCS 4 -4", "RMCS -4 4"])
 def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
-    """The angle agrees with the true heading within the noise of the gyro."""
+    """RMRA returns the angle since RM, positive to the left, right within the gyro's noise."""
     rig = Rig(gyro_bias_dps=0.0)
     rig.drive("L")
     rig.ask("SM")
@@ -207,7 +210,7 @@ def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30", "R"])
 def test_rmra_works_at_any_time(start: str) -> None:
-    """RMRA also works before the first motion, and in motions other than RM."""
+    """RMRA is answered before the first motion, and during any motion."""
     rig = Rig()
     assert rig.number("RMRA") == 0.0
     rig.drive(start)
@@ -221,7 +224,7 @@ def test_rmra_works_at_any_time(start: str) -> None:
 
 
 def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
-    """ENC replies in 5 ms."""
+    """ENC returns the signed count of the right wheel, within 5 ms."""
     rig = Rig(metres_per_count=0.001)
     rig.drive("R")
     spun = rig.number("ENC")
@@ -235,7 +238,7 @@ def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30", "R", "L", "TF 2", "MCR 5", "MCR 0"])
 def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
-    """The count keeps its value after the motion."""
+    """The encoder count stays after a motion; the start of the next motion sets it to zero."""
     rig = Rig()
     rig.drive("F")
     rig.ask("SM")
@@ -248,7 +251,7 @@ def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
 
 @pytest.mark.parametrize(("start", "side"), [("F", "front_m"), ("B", "rear_m")])
 def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str) -> None:
-    """Only the reply to the next SM reports the obstacle."""
+    """An obstacle ends F and B without a message; only the reply to the next SM reports it."""
     rig = Rig(**{side: 45 * INCH_M})
     rig.drive(start, 10.0)
     assert not rig.moving
@@ -260,7 +263,10 @@ def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str
 
 
 def test_an_obstacle_ends_rm_and_srm_tells() -> None:
-    """The reason is spelt differently from that of SM; RMCS fails with it, too."""
+    """After an obstacle has ended RM, RMCS and SRM fail with "insufficient clearance".
+
+    The reply to SM spells it differently.
+    """
     rig = Rig(front_m=45 * INCH_M)
     rig.drive("RM 30", 10.0)
     assert not rig.moving
@@ -270,7 +276,7 @@ def test_an_obstacle_ends_rm_and_srm_tells() -> None:
 
 
 def test_backward_rm_and_spins_see_no_obstacle() -> None:
-    """The server does not read the rear sonar in these motions."""
+    """The server does not read the rear sonar during a backward RM or a spin."""
     rig = Rig(rear_m=20 * INCH_M)
     rig.drive("RM -20", 6.0)
     assert rig.server.hit_wall
@@ -278,7 +284,7 @@ def test_backward_rm_and_spins_see_no_obstacle() -> None:
 
 @pytest.mark.parametrize(("front_in", "stops"), [(19.5, False), (18.5, True)])
 def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
-    """The sonar measures whole inches."""
+    """The front threshold is 19 inches; the sonar measures whole inches."""
     rig = Rig(front_m=front_in * INCH_M)
     rig.drive("RM 1", 0.3)
     assert rig.server.chassis.powered is not stops
@@ -286,7 +292,7 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 
 @pytest.mark.parametrize(("rear_in", "stops"), [(18.0, False), (15.5, True)])
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
-    """The robot moves 2 inches before the server looks."""
+    """The rear threshold is 15 inches, but the robot moves 2 inches before the first look."""
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)
     assert rig.server.chassis.powered is not stops
@@ -297,7 +303,7 @@ def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
 def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
     volts: float, inequality: float
 ) -> None:
-    """The speed regulator of the motor board is off."""
+    """The speed of a unit depends on voltage and motors, as the board's speed regulator is off."""
     rig = Rig(volts=volts, motor_inequality=inequality)
     rig.drive("RM 40")
     chassis = rig.server.chassis
@@ -308,7 +314,7 @@ def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
 
 
 def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
-    """The values are absolute, right motor first."""
+    """MCS sets the motor registers, the right one first; then all but MSM is refused."""
     rig = Rig()
     assert rig.ask("MCS 100 120") == "ok"
     assert (rig.server.chassis.right, rig.server.chassis.left) == (100, 120)
@@ -321,5 +327,5 @@ def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
 
 
 def test_the_firmware_is_what_is_played_by_default() -> None:
-    """The default is the public server, not the manual."""
+    """By default the simulated controller behaves as the public server, not as its manual."""
     assert Rig().server.quirks == FIRMWARE

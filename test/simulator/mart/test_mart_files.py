@@ -7,7 +7,7 @@ from mart_rig import Rig
 
 
 def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
-    """Return name, size and blocks of a file."""
+    """Return the name, the size and the blocks of the file that the server sends for ``text``."""
     before = len(rig.replies)
     rig.say(text)
     rig.run(0.1)
@@ -31,7 +31,7 @@ def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
 def test_a_file_comes_in_datagrams_of_512_bytes(
     start: str, end: str | None, text: str, name: str
 ) -> None:
-    """Name and size come first; SRM also fills LAST MOVE."""
+    """A file begins with its name and size; the file of LAST MOVE is also written by SRM."""
     rig = Rig()
     answer = rig.ask(start)
     assert answer is not None
@@ -49,7 +49,7 @@ def test_a_file_comes_in_datagrams_of_512_bytes(
 
 
 def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
-    """Files cannot be decoded as UTF-8."""
+    """Files are in Latin-1 and have the byte 0xB0 (°), so they are not valid UTF-8."""
     rig = Rig()
     rig.ask("TF 12")
     content = b"".join(download(rig, "LAST MOVE")[2])
@@ -60,7 +60,7 @@ def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
 
 
 def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
-    """The next motion makes a new file; a second LOG deletes nothing."""
+    """The first LOG deletes earlier files; a second LOG deletes nothing."""
     rig = Rig()
     rig.ask("TF 5")
     assert rig.ask("LOG") == "ok"
@@ -72,7 +72,7 @@ def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
 
 
 def test_exit_downloads_the_log_if_log_was_given() -> None:
-    """EXIT also ends the server."""
+    """EXIT sends the log if LOG was given, and ends the server."""
     rig = Rig()
     rig.ask("LOG")
     rig.ask("HELLO")
@@ -88,14 +88,14 @@ def test_exit_downloads_the_log_if_log_was_given() -> None:
 
 
 def test_exit_without_log_answers_nothing_and_ends_the_server() -> None:
-    """The server also ends when a log is downloaded."""
+    """Without a LOG before it, EXIT ends the server without an answer."""
     rig = Rig()
     assert rig.ask("EXIT") is None
     assert rig.server.crashed == "EXIT"
 
 
 def test_exit_stops_no_motor() -> None:
-    """A motion in progress continues without the server."""
+    """After EXIT the server has ended, but a motion in progress continues."""
     rig = Rig()
     rig.drive("RM 30")
     rig.say("EXIT")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Behaviour of the public server when its IMU does not respond."""
+"""Tests of the public server when its IMU does not respond."""
 
 import pytest
 from mart_rig import INCH_M, Rig
@@ -10,7 +10,7 @@ LOST = "fail MPU6050 connection lost"
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24", "SB"])
 def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
-    """The server does not answer later requests, either."""
+    """With a dead IMU these requests are never answered, and neither are later ones."""
     rig = Rig(imu_dies_s=0.0)
     rig.say(text, "HELLO", "SM")
     rig.stop("SL")
@@ -22,7 +22,7 @@ def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24"])
 def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: str) -> None:
-    """The move may start minutes later."""
+    """A move that waits for a dead IMU starts when the IMU responds again, even after minutes."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=300.0)
     rig.say(text)
     rig.run(299.0)
@@ -36,7 +36,7 @@ def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: 
 def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
     text: str, stops: tuple[str, ...]
 ) -> None:
-    """The requests are never answered."""
+    """With a dead IMU, RM, R and L start the motors, but are never answered; no stop works."""
     rig = Rig(imu_dies_s=0.0)
     rig.say(text)
     rig.run(0.5)
@@ -52,21 +52,21 @@ def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
 
 @pytest.mark.parametrize("text", ["RM 30", "R"])
 def test_the_start_timeout_is_dead_without_an_imu(text: str) -> None:
-    """A stuck motor is not noticed without samples of the IMU."""
+    """Without samples of the IMU, the server does not notice that a motor is stuck."""
     rig = Rig(imu_dies_s=0.0, stuck="both")
     assert rig.ask(text) is None
     assert rig.server.chassis.powered
 
 
 def test_the_obstacle_check_is_dead_without_an_imu() -> None:
-    """The robot drives into the wall."""
+    """Without samples of the IMU, the server does not check for obstacles during RM."""
     rig = Rig(imu_dies_s=0.0, front_m=50 * INCH_M)
     rig.ask("RM 30")
     assert rig.server.hit_wall
 
 
 def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
-    """Later requests are executed when the IMU responds again."""
+    """An RM without an IMU, and the requests after it, are answered when the IMU responds again."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
     rig.say("RM 30", "SRM")
     assert rig.run(29.0) == []
@@ -75,7 +75,7 @@ def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> 
 
 
 def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() -> None:
-    """SRM stops the motors, but is not answered."""
+    """If the IMU dies during RM, SRM stops the motors, but is not answered."""
     rig = Rig(imu_dies_s=1.0, front_m=60 * INCH_M)
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -93,7 +93,7 @@ def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() ->
 
 
 def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
-    """A constant RMRA during RM thus reveals a dead IMU."""
+    """While the IMU works, RMRA changes throughout a drive; a constant value shows a dead IMU."""
     for seed in range(8):
         rig = Rig(seed=seed)
         rig.drive("RM 30", 0.0)
@@ -105,7 +105,7 @@ def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
 def test_mcr_slow_0_proves_in_half_a_second_whether_it_lives(
     imu_dies_s: float, answer: str
 ) -> None:
-    """The robot does not move."""
+    """MCR SLOW 0 shows in 0.5 s whether the IMU works, without moving the robot."""
     rig = Rig(imu_dies_s=imu_dies_s)
     assert rig.ask("MCR SLOW 0") == answer
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -113,7 +113,7 @@ def test_mcr_slow_0_proves_in_half_a_second_whether_it_lives(
 
 
 def test_rst_imu_proves_it_in_0_13_s() -> None:
-    """The server refuses RST IMU while the robot moves."""
+    """RST IMU shows in 0.13 s whether the IMU works; it is refused while the robot moves."""
     rig = Rig()
     assert rig.ask("RST IMU") == "ok"
     rig.server.imu.alive = False
@@ -126,7 +126,7 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 
 
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
-    """The server does not use a closed IMU even if it responds again."""
+    """An IMU that failed is not used again before RST IMU or SB, even if it responds."""
     for cure in ("RST IMU", "SB"):
         rig = Rig()
         rig.server.imu.alive = False
@@ -139,7 +139,7 @@ def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -
 
 
 def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
-    """The motors stop when MCR fails."""
+    """With a dead IMU, MCR fails after half a second, and the motors stop."""
     rig = Rig(imu_dies_s=0.0)
     assert rig.ask("MCR 90") == LOST
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -149,7 +149,7 @@ def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
 
 @pytest.mark.parametrize("text", ["TF 200", "TB 200", "MCR 1000", "MCL 1000"])
 def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
-    """The move continues until it fails."""
+    """If the IMU dies during a controlled move, the move continues for 1.5 s and then fails."""
     rig = Rig(imu_dies_s=2.0)
     assert rig.ask(text) == LOST
     assert rig.took_s == pytest.approx(3.5, abs=0.05)
@@ -159,7 +159,7 @@ def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
 
 @pytest.mark.parametrize("start", ["F", "R"])
 def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> None:
-    """The reply comes when the IMU responds again."""
+    """If the IMU dies during F or R, SM stops the robot, but is answered only with a live IMU."""
     rig = Rig(imu_dies_s=1.0, imu_returns_s=40.0)
     rig.drive(start, 2.0)
     assert rig.ask("SM") is None
@@ -169,7 +169,7 @@ def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> 
 
 
 def test_the_bias_drifts_until_sb_finds_it() -> None:
-    """SB takes 0.53 s."""
+    """The gyro's bias drifts until SB measures it, which takes 0.53 s."""
     rig = Rig(gyro_bias_dps=0.5)
     rig.run(100.0)
     assert rig.number("RMRA") == pytest.approx(50.0, abs=1.0)

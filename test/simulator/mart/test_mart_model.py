@@ -42,7 +42,7 @@ def walk(rig: Rig, seed: int, steps: int) -> None:
 
 @pytest.mark.parametrize("seed", range(15))
 def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -> None:
-    """Both kinds of copies of the server reply as the original does, for steps of any size."""
+    """A copy of the server replies as the original does, for steps of time of any size."""
     rig = Rig(seed=seed, front_m=3.0, rear_m=3.0)
     walk(rig, seed, 40)
     twins = [rig.server.copy(), copy.deepcopy(rig.server)]
@@ -59,7 +59,7 @@ def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -
 
 
 def test_the_size_of_the_steps_does_not_matter() -> None:
-    """Steps of 1 ms and of 2 s give the same replies."""
+    """Steps of time of 1 ms and of 2 s give the same replies."""
     found = []
     for step_s in (0.001, 0.013, 2.0):
         rig = Rig(motor_inequality=0.03)
@@ -73,7 +73,7 @@ def test_the_size_of_the_steps_does_not_matter() -> None:
 
 
 def test_it_runs_faster_than_a_hundredth_of_real_time_even_while_it_drives() -> None:
-    """The limit is in processor time; an idle computer is about 1000 times as fast."""
+    """The limit is in processor time; an idle computer simulates about 1000 times real time."""
     rig = Rig()
     rig.drive("RM 30")
     began = time.process_time()
@@ -82,7 +82,7 @@ def test_it_runs_faster_than_a_hundredth_of_real_time_even_while_it_drives() -> 
 
 
 def test_a_robot_that_stands_costs_nothing_as_time_passes() -> None:
-    """A year passes in one step."""
+    """A year at rest is simulated in one step."""
     rig = Rig()
     assert rig.server.wake_at == float("inf")
     rig.run(3e7)
@@ -90,7 +90,7 @@ def test_a_robot_that_stands_costs_nothing_as_time_passes() -> None:
 
 
 def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
-    """Faults occur in both directions, in simulated time."""
+    """Datagrams are lost, doubled and reordered in both directions, in simulated time."""
 
     def talk(seed: int) -> tuple[list[bytes], list[bytes]]:
         faults = NetworkFaults(lose=0.2, duplicate=0.2, delay_s=0.3)
@@ -137,13 +137,13 @@ def test_options_choose_the_robot_and_its_faults() -> None:
 
 @pytest.mark.parametrize("word", ["volts=x", "volts=99", "motor-status=256", "stuck=front"])
 def test_options_that_make_no_sense_are_refused(word: str) -> None:
-    """The error has a text for the user."""
+    """Each wrong option is refused with a message for the user."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{word}", mart)
 
 
 def test_it_answers_on_two_udp_ports() -> None:
-    """The requests pass the driver's transport, on the loopback interface."""
+    """The driver's UDP transport exchanges datagrams with both ports of the controller."""
     with ServedBoard(mart.SimulatedMart()) as served:
         first, second = (int(address.rpartition(":")[2]) for address in served.addresses)
         assert second == first + 1
@@ -165,7 +165,7 @@ def test_it_answers_on_two_udp_ports() -> None:
 
 
 def test_it_answers_in_process() -> None:
-    """A sim:// URL runs the controller, which can also be rebooted."""
+    """A sim:// URL runs the controller in the driver's process, where it can also be rebooted."""
     transport = SimulatedTransport("sim://?volts=25", "omnibot_driver.simulator.mart")
     try:
         transport.write([(0, b"VOLTS")])
@@ -178,7 +178,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """The console and the tests use these facts."""
+    """The controller's facts are those that the console and the tests use."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

@@ -15,7 +15,7 @@ IN_SOURCE_ALONE = ("heading_in_reference_moves_only", "probe_turns", "heading_st
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """After SL alone every motion conflicts, and SM then silences the server for ever."""
+    """After SL alone, every motion is refused as a conflict, and SM hangs the command port."""
     rig = Rig(quirks)
     rig.drive("F")
     rig.stop("SL")
@@ -29,7 +29,7 @@ def stop_port_keeps_motion(quirks: Quirks) -> bool:
 
 
 def spin_stop_ends_drives(quirks: Quirks) -> bool:
-    """SS stops F."""
+    """SS stops the drive that F has started."""
     rig = Rig(quirks)
     rig.drive("F")
     rig.stop("SS")
@@ -38,7 +38,7 @@ def spin_stop_ends_drives(quirks: Quirks) -> bool:
 
 
 def early_stop_is_ignored(quirks: Quirks) -> bool:
-    """SL comes 0.1 s after F, before its ok."""
+    """An SL that comes 0.1 s after F, before the ok of F, does not stop the robot."""
     rig = Rig(quirks)
     rig.say("F")
     rig.run(0.1)
@@ -57,7 +57,7 @@ def left_spin_in_reference_move(quirks: Quirks) -> bool:
 
 
 def moves_wait_for_imu(quirks: Quirks) -> bool:
-    """Without an IMU, F is not answered, and starts when the IMU is back."""
+    """Without an IMU, F is not answered; the motion starts when the IMU is back."""
     rig = Rig(quirks, imu_dies_s=0.0, imu_returns_s=60.0)
     rig.say("F")
     answer = rig.wait(59.0)
@@ -66,20 +66,20 @@ def moves_wait_for_imu(quirks: Quirks) -> bool:
 
 
 def drives_trust_imu(quirks: Quirks) -> bool:
-    """RM moves without an IMU, and is not answered."""
+    """Without an IMU, RM moves the robot and is not answered."""
     rig = Rig(quirks, imu_dies_s=0.0)
     silent = rig.ask("RM 30") is None
     return silent and rig.moving
 
 
 def reference_speed_wraps(quirks: Quirks) -> bool:
-    """RM -20 drives backward."""
+    """RM with a negative speed, -20, drives backward."""
     rig = Rig(quirks)
     return rig.ask("RM -20") == "ok" and rig.server.chassis.right_mps < 0
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """After a stop of 0.57 s, RM fails at once; the next RM does not."""
+    """After a stop of 0.57 s, the next RM fails at once, and the one after it does not."""
     rig = Rig(quirks)
     rig.drive("RM 66")
     assert rig.ask("SRM") == "ok"
@@ -107,7 +107,7 @@ def zero_distance_is_unlimited(quirks: Quirks) -> bool:
 
 
 def echoes_distance(quirks: Quirks) -> bool:
-    """The reply is 12 inches after 16 were driven."""
+    """The reply to a move of 12 inches is 12, although 16 inches were driven."""
     rig = Rig(quirks)
     answer = rig.ask("TF 12")
     assert round(rig.x_in) == 16
@@ -121,7 +121,7 @@ def crashes_on_missing_numbers(quirks: Quirks) -> bool:
 
 
 def crashes_early(quirks: Quirks) -> bool:
-    """VOLTS ends a server that has just started, but not one that runs for a while."""
+    """VOLTS crashes a server that has just started, but not one that has run for a while."""
     rig = Rig(quirks)
     rig.server.restart(boot_s=0.0)
     early = rig.ask("VOLTS")
@@ -144,7 +144,7 @@ def exit_is_silent(quirks: Quirks) -> bool:
 
 
 def log_deletes_files(quirks: Quirks) -> bool:
-    """The server knows the name of the last file, but the file is deleted."""
+    """After LOG, the server knows the name of the last file, but the file is deleted."""
     rig = Rig(quirks)
     rig.ask("MCR SLOW 20")
     rig.ask("LOG")
@@ -153,14 +153,14 @@ def log_deletes_files(quirks: Quirks) -> bool:
 
 
 def unknown_reset_repeats(quirks: Quirks) -> bool:
-    """RST x repeats the previous reply, here the voltage."""
+    """RST x repeats the previous reply, which in this test is the voltage."""
     rig = Rig(quirks)
     rig.ask("VOLTS")
     return rig.ask("RST x") == "ok 24.00"
 
 
 def clock_moves_heading(quirks: Quirks) -> bool:
-    """The clock is set an hour ahead while the robot turns."""
+    """If the clock is set ahead by an hour while the robot turns, the heading jumps."""
     rig = Rig(quirks)
     rig.ask("TIME 1 1 2024 0 0 0")
     rig.drive("RM 30")
@@ -171,12 +171,12 @@ def clock_moves_heading(quirks: Quirks) -> bool:
 
 
 def undocumented_commands(quirks: Quirks) -> bool:
-    """TFSFC is an example."""
+    """TFSFC, an undocumented command, is understood."""
     return Rig(quirks).ask("TFSFC 30") == "ok"
 
 
 def heading_in_reference_moves_only(quirks: Quirks) -> bool:
-    """A spin does not change RMRA."""
+    """The heading that RMRA returns does not change in a spin."""
     rig = Rig(quirks)
     rig.drive("R")
     return rig.number("RMRA") == 0.0
@@ -191,7 +191,7 @@ def probe_turns(quirks: Quirks) -> bool:
 
 
 def heading_starts_off(quirks: Quirks) -> bool:
-    """The heading of the second RM, a long time after the first, does not start at zero."""
+    """The second RM, a long time after the first, begins with a heading that is not zero."""
     rig = Rig(quirks)
     for _ in range(2):
         rig.drive("RM 30", 0.0)
@@ -209,32 +209,32 @@ SEEN: dict[str, Callable[[Quirks], bool]] = {
 
 
 def test_every_quirk_has_its_sight() -> None:
-    """A new quirk without a detector fails here."""
+    """Every quirk of the simulated server has a detector."""
     assert set(SEEN) == {field.name for field in fields(Quirks)}
 
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """All other quirks are as in the public server."""
+    """A detector finds its quirk if the quirk is on, and not if only this quirk is off."""
     assert SEEN[name](replace(FIRMWARE, **{name: True}))
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_unseen_on_a_server_as_documented(name: str) -> None:
-    """All other quirks are off, as well."""
+    """A detector finds nothing in a server as in the manual, where all quirks are off."""
     assert not SEEN[name](DOCUMENTED)
 
 
 @pytest.mark.parametrize("name", IN_SOURCE_ALONE)
 def test_what_only_the_source_says_is_played_only_if_it_is_asked_for(name: str) -> None:
-    """Either variant of the server can be selected."""
+    """Quirks that only the published source has are off unless this variant is selected."""
     assert SEEN[name](SOURCE)
     assert not SEEN[name](FIRMWARE)
 
 
 def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
-    """SS has no effect on F, and SM ends F as usual."""
+    """By the published source, SS has no effect on F, which SM ends as usual."""
     rig = Rig(SOURCE)
     rig.drive("F")
     rig.stop("SS")
@@ -245,7 +245,7 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """The server still answers afterwards."""
+    """A server without the crashes answers that a number is missing, and continues."""
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":
         rig.drive("F")
@@ -254,7 +254,7 @@ def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> No
 
 
 def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
-    """Every motion is supervised."""
+    """A server as in the manual stops every motion when its IMU dies."""
     for start in ("F", "RM 30", "R"):
         rig = Rig(DOCUMENTED, imu_dies_s=1.0, front_m=200 * INCH_M)
         rig.drive(start, 5.0)
@@ -263,7 +263,7 @@ def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """The move's reply comes within 1 s of the stop."""
+    """On a server as in the manual, a stopped move is answered within 1 s of the stop."""
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):
             rig = Rig(DOCUMENTED)
@@ -278,12 +278,12 @@ def test_a_documented_move_is_cancelled_at_any_time() -> None:
 
 
 def test_the_ports_are_numbered_as_they_stand() -> None:
-    """The command port is channel 0."""
+    """Channel 0 is the command port."""
     assert COMMAND == 0
 
 
 def test_by_the_source_a_probe_of_a_living_imu_turns_the_robot_a_little() -> None:
-    """Each probe turns the robot by 1 to 2.5 degrees to the right."""
+    """By the published source, MCR SLOW 0 turns the robot by 1 to 2.5 degrees to the right."""
     rig = Rig(SOURCE)
     for probes in (1, 2, 3):
         assert rig.ask("MCR SLOW 0") == "ok"

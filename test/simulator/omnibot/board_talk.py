@@ -15,22 +15,22 @@ IMU, DELTA, POSE = b"\xff\xfa", b"\xff\xfb", b"\xff\xfc"
 
 
 def velocity(x: int, y: int, omega: int) -> bytes:
-    """Return a body velocity command, in LSB."""
+    """Return a body velocity command; the values are in LSB."""
     return bytes.fromhex("FF FE 01") + struct.pack(">3h", x, y, omega)
 
 
 def wheels(a: int, b: int, c: int) -> bytes:
-    """Return a wheel command, in LSB."""
+    """Return a command of wheel speeds; the values are in LSB."""
     return bytes.fromhex("FF FE 02") + struct.pack(">3h", a, b, c)
 
 
 def run(board: SimulatedBoard, seconds: float) -> bytes:
-    """Return everything that the board sends in this simulated time, in s."""
+    """Return everything that the board sends in the next ``seconds``, in simulated time."""
     return b"".join(board.step() for _ in range(round(seconds * 100)))
 
 
 def mode_of(board: SimulatedBoard) -> BoardMode:
-    """Return the mode; a type checker would assume that an attribute has not changed."""
+    """Return the board's mode; if it were read directly, a type checker would assume no change."""
     return board.mode
 
 
@@ -43,15 +43,15 @@ def booted(settings: BoardSettings) -> SimulatedBoard:
 
 
 def sent(board: SimulatedBoard, header: bytes) -> list[bytes]:
-    """Return the frames of one kind that the board has sent."""
+    """Return the frames with this header that the board has sent."""
     return [frame.data for frame in board.sent if frame.data.startswith(header)]
 
 
 def deltas(board: SimulatedBoard) -> list[tuple[int, int, int, int]]:
-    """Return the 25 Hz frames so far: 0.1 mm, 0.1 mm, 0.1 mrad, SEQ."""
+    """Return the values of the 25 Hz frames sent so far: 0.1 mm, 0.1 mm, 0.1 mrad, SEQ."""
     return [struct.unpack(">3hB", frame[2:]) for frame in sent(board, DELTA)]
 
 
 def poses(board: SimulatedBoard) -> list[tuple[float, float, float, int]]:
-    """Return the 5 Hz frames so far: mm, mm, mrad, SEQ."""
+    """Return the values of the 5 Hz frames sent so far: mm, mm, mrad, SEQ."""
     return [struct.unpack(">3fB", frame[2:]) for frame in sent(board, POSE)]

@@ -22,7 +22,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def readings(board: SimulatedBoard, seconds: float) -> list[tuple[float, ...]]:
-    """Return the IMU readings over this time, in g and °/s."""
+    """Return the IMU readings of the next ``seconds``, in g and °/s."""
     board.sent.clear()
     run(board, seconds)
     raw = [struct.unpack(">6h", frame[2:]) for frame in sent(board, IMU)]
@@ -44,7 +44,7 @@ def rms(values: list[tuple[float, ...]]) -> tuple[float, ...]:
 
 
 def test_at_rest_the_upside_down_sensor_feels_minus_one_g() -> None:
-    """Gravity is measured on -z of the sensor; bias and noise are those of the settings."""
+    """At rest, gravity is on -z of the sensor; bias and noise are those of the settings."""
     board = SimulatedBoard(BoardSettings(running=True, gyro_bias_dps=(1.0, -2.0, 3.0)))
     values = readings(board, 20.0)
     assert mean(values) == pytest.approx((0.0, 0.0, -1.0, 1.0, -2.0, 3.0), abs=0.005)
@@ -53,13 +53,13 @@ def test_at_rest_the_upside_down_sensor_feels_minus_one_g() -> None:
 
 
 def test_the_gyro_at_rest_reads_like_frame_headers_by_default() -> None:
-    """The mean raw counts are -6, -5 and -4."""
+    """At rest, the mean raw counts of the gyro are -6, -5 and -4, as in frame headers."""
     values = mean(readings(SimulatedBoard(RUNNING), 20.0))
     assert [rate * 131 for rate in values[3:]] == pytest.approx([-6, -5, -4], abs=0.5)
 
 
 def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
-    """A yaw rate of 0.5 rad/s reads -0.5 on z."""
+    """A yaw rate of 0.5 rad/s reads -0.5 on z of a gyro that is mounted upside down."""
     board = SimulatedBoard(BoardSettings(running=True, gyro_bias_dps=(0.0, 0.0, 0.0)))
     board.receive(velocity(0, 0, 250))
     run(board, 2.0)
@@ -68,7 +68,7 @@ def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
 
 
 def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
-    """The integrated acceleration is the speed gained: equal on x, reversed on y."""
+    """The integrated acceleration is the speed gained, with the same sign on x, reversed on y."""
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
     values = readings(board, 1.0)
@@ -99,7 +99,7 @@ def test_readings_saturate_at_the_range_of_the_sensor() -> None:
 
 
 def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
-    """The rms over sixty robots is that of the settings, because the steps of the walk add up."""
+    """After a second, the rms of a walking bias over sixty robots is that of the settings."""
     ends = []
     for seed in range(60):
         board = SimulatedBoard(
@@ -116,7 +116,7 @@ def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
 
 
 def test_a_stuck_gyro_reads_its_counts_whatever_the_motion() -> None:
-    """The three gyro values are constant, while the accelerometer still varies."""
+    """A stuck gyro has constant values, while the accelerometer's values still vary."""
     board = SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4)))
     board.receive(velocity(0, 0, 250))
     run(board, 1.0)

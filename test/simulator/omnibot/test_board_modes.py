@@ -31,10 +31,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
-    """The board sends and obeys nothing before the end of the boot.
-
-    Then it sends a text at once.
-    """
+    """A booting board sends and obeys nothing; at the end of its boot it sends a text at once."""
     board = SimulatedBoard(BoardSettings(boot_time_s=0.3))
     board.receive(WAKE_UP + b"S")
     assert run(board, 0.29) == b""
@@ -44,14 +41,14 @@ def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
 
 
 def test_a_paused_board_counts_once_a_second() -> None:
-    """The number is a uint8 that ascends from zero and wraps."""
+    """A paused board sends a number once a second: a uint8 that ascends from zero and wraps."""
     board = booted(BoardSettings())
     assert run(board, 2.0) == b"Paused: 1 \nPaused: 2 \n"
     assert run(board, 254.0).endswith(b"Paused: 255 \nPaused: 0 \n")
 
 
 def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
-    """The first S after the boot is lost if fewer than three bytes came before it."""
+    """The first three bytes after the boot are lost, even if they are letters such as S."""
     board = booted(BoardSettings())
     board.receive(b"SSS")
     assert mode_of(board) is BoardMode.PAUSED
@@ -60,7 +57,7 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """After three bytes during the boot, the first S is obeyed."""
+    """If three bytes have come during the boot, the first S after it is obeyed."""
     board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
     board.receive(bytes(3))
     run(board, 0.3)
@@ -69,7 +66,7 @@ def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
 
 
 def test_p_pauses_and_unpauses() -> None:
-    """The same letter toggles, and each pause begins with a text."""
+    """The letter P pauses the board and un-pauses it again; each pause begins with a text."""
     board = SimulatedBoard(RUNNING)
     board.receive(b"P")
     assert mode_of(board) is BoardMode.PAUSED
@@ -80,7 +77,7 @@ def test_p_pauses_and_unpauses() -> None:
 
 
 def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
-    """Start is idempotent, and a motion continues after it."""
+    """The letter S starts a paused board, and does not disturb the motion of a running one."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + b"SS" + velocity(35, 0, 0))
     run(board, 1.0)
@@ -91,7 +88,7 @@ def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
 
 
 def test_r_reboots_the_board_but_not_the_robot() -> None:
-    """Odometry, SEQ and the wake-up begin again; the true pose stays."""
+    """After R, odometry, SEQ and the wake-up begin again; the true pose of the robot stays."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
@@ -111,7 +108,7 @@ def test_r_reboots_the_board_but_not_the_robot() -> None:
 
 
 def test_a_power_cycle_does_what_r_does() -> None:
-    """``reboot`` and the letter R end in the same state."""
+    """``reboot`` and the letter R lead to the same state."""
     by_letter, by_power = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
     by_letter.receive(b"R")
     by_power.reboot()
@@ -120,7 +117,7 @@ def test_a_power_cycle_does_what_r_does() -> None:
 
 
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
-    """A 0x52 within a command resets a paused board, and a 0x50 starts it."""
+    """A paused board reads letters within a motion frame: 0x52 resets it, and 0x50 starts it."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
     assert mode_of(board) is BoardMode.BOOTING
@@ -132,7 +129,10 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """The rest of the frame is read as letters, so a 0x52 in it resets the board."""
+    """The wake-up takes the header of the frame, and the rest is read as letters:
+
+    0x52 is a reset.
+    """
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
     assert [command.kind for command in board.commands] == ["reset"]
@@ -140,7 +140,7 @@ def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() ->
 
 
 def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -> None:
-    """The first 0x50 pauses the board, which then reads letters only: the second one starts it."""
+    """On a board that obeys letters within frames, the first 0x50 pauses, and the second starts."""
     board = SimulatedBoard(BoardSettings(running=True, receiver=ReceiverKind(letters="anywhere")))
     board.receive(wheels(0x50, 0, 0x50))
     assert [command.kind for command in board.commands] == ["pause", "pause"]
@@ -148,7 +148,7 @@ def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -
 
 
 def test_a_running_board_takes_no_letters_out_of_frames() -> None:
-    """Within a control frame 0x50, 0x52 and 0x53 are numbers."""
+    """On a running board, 0x50, 0x52 and 0x53 within a control frame are numbers, not letters."""
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(0x50, 0x52, 0x53))
     assert list(board.commands) == [ReceivedCommand(0, "wheels", (0x50, 0x52, 0x53))]
@@ -156,7 +156,7 @@ def test_a_running_board_takes_no_letters_out_of_frames() -> None:
 
 
 def test_an_unknown_control_mode_is_ignored() -> None:
-    """All bytes of the frame are consumed, so a 0x50 in it is not a letter."""
+    """A frame of an unknown control mode is ignored, and a 0x50 in it is not a letter."""
     board = SimulatedBoard(RUNNING)
     board.receive(bytes.fromhex("FF FE 03 00 50 00 50 00 50"))
     assert not board.commands
@@ -164,7 +164,7 @@ def test_an_unknown_control_mode_is_ignored() -> None:
 
 
 def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
-    """The frame is consumed and ignored."""
+    """A board that has no emergency stop ignores the frame and drives on."""
     board = SimulatedBoard(BoardSettings(running=True, obeys_estop=False))
     board.receive(velocity(35, 0, 0) + ESTOP)
     assert [command.kind for command in board.commands] == ["velocity"]
@@ -173,7 +173,10 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 
 
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
-    """The pause is measured by the caller's times or, without them, by the ticks in between."""
+    """A pause in the input ends an incomplete frame on a board that looks for pauses.
+
+    The pause is measured by the caller's times or, without them, by the ticks in between.
+    """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))
     timed.receive(STOP[:-1], 5.000)
@@ -186,7 +189,7 @@ def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() ->
 
 
 def test_what_was_received_and_obeyed_is_on_record() -> None:
-    """The logs contain all bytes received, and each command with tick, kind and values."""
+    """The logs have all bytes received, and each command with its tick, kind and values."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)
     data = velocity(1, -2, 3) + b"x" + STOP
@@ -200,7 +203,7 @@ def test_what_was_received_and_obeyed_is_on_record() -> None:
 
 @pytest.mark.slow
 def test_the_record_of_received_bytes_is_bounded() -> None:
-    """The newest bytes are kept, about a million at most."""
+    """Of the bytes received, the log keeps the newest, about a million at most."""
     board = SimulatedBoard(RUNNING)
     for _ in range(30):
         board.receive(bytes(100_000))

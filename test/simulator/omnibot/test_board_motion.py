@@ -28,7 +28,7 @@ from omnibot_driver.simulator.omnibot import (
     ],
 )
 def test_a_commanded_velocity_is_reached(command: bytes, twist: tuple[float, float, float]) -> None:
-    """70 LSB are 1 m/s and 500 LSB are 1 rad/s, reached after 2 s."""
+    """A velocity command is reached after 2 s: 70 LSB are 1 m/s, and 500 LSB are 1 rad/s."""
     board = SimulatedBoard(RUNNING)
     board.receive(command)
     run(board, 2.0)
@@ -37,7 +37,7 @@ def test_a_commanded_velocity_is_reached(command: bytes, twist: tuple[float, flo
 
 
 def test_the_scales_of_the_settings_are_the_units_of_commands() -> None:
-    """Other scales give other speeds for the same command."""
+    """The settings can change the scales of commands, here to 100 LSB for 1 m/s."""
     board = SimulatedBoard(BoardSettings(running=True, linear_scale=100, angular_scale=1000))
     board.receive(velocity(20, 0, 200))
     run(board, 2.0)
@@ -57,7 +57,7 @@ def test_a_wheel_command_drives_that_wheel_alone() -> None:
 
 
 def test_a_motion_goes_on_without_further_commands() -> None:
-    """The board has no command timeout: after 60 s it still drives."""
+    """The board has no command timeout: after 60 s the robot still drives."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 60.0)
@@ -76,7 +76,7 @@ def test_stop_stops() -> None:
 
 @pytest.mark.parametrize("latches", [False, True])
 def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
-    """The motors are off within the tick, and the robot is at rest within 0.3 s."""
+    """An emergency stop switches the motors off within the tick; the robot is at rest in 0.3 s."""
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=latches))
     board.receive(velocity(35, 0, 0))
     run(board, 1.0)
@@ -90,7 +90,7 @@ def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
 
 
 def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> None:
-    """A driver that relies on a latch would let this robot move again."""
+    """If the emergency stop does not latch, the next motion command moves the robot again."""
     board = SimulatedBoard(RUNNING)
     board.receive(ESTOP + velocity(35, 0, 0))
     assert not board.estopped
@@ -99,7 +99,10 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 
 
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
-    """Only a reset releases the stop, no command, pause or start. Refused motion is not logged."""
+    """Only a reset releases a latched emergency stop: no command, pause or start does.
+
+    Motion commands that are refused are not logged.
+    """
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))
     run(board, 2.0)
@@ -121,7 +124,10 @@ POSITION = BoardSettings(running=True, control="position")
 def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
     goal: tuple[int, int, int],
 ) -> None:
-    """The pose is in mm and mrad of the board's earth frame, with full turns; it stops there."""
+    """With the switch on position, a command is a pose in the board's earth frame, in mm and mrad.
+
+    The robot stops at this pose; full turns count.
+    """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))
     run(board, 15.0)
@@ -134,7 +140,7 @@ def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
 
 
 def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
-    """The speed is limited to 0.3 m/s, however far away the pose is."""
+    """On the way to a pose, the speed is limited to 0.3 m/s, however far away the pose is."""
     board = SimulatedBoard(POSITION)
     board.receive(velocity(5000, 5000, 0))
     run(board, 5.0)
@@ -142,7 +148,10 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """For this reason Stop is a frame of mode 2."""
+    """With the switch on position, zeros in mode 1 are the pose of the origin, not a stop.
+
+    For this reason the stop frame has mode 2.
+    """
     board = SimulatedBoard(
         BoardSettings(running=True, control="position", initial_pose=BoardPose(1000.0))
     )
@@ -157,7 +166,7 @@ def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> Non
 
 @pytest.mark.parametrize("ending", [ESTOP, b"P", b"PS"])
 def test_an_emergency_stop_or_a_pause_forgets_the_pose_to_drive_to(ending: bytes) -> None:
-    """The robot does not continue to the pose afterwards."""
+    """After an emergency stop or a pause, the robot does not continue to the commanded pose."""
     board = SimulatedBoard(POSITION)
     board.receive(velocity(1000, 0, 0))
     run(board, 1.0)

@@ -42,7 +42,7 @@ def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
 
 
 def test_a_board_may_send_its_deltas_at_10_hz() -> None:
-    """Each ten IMU frames have one delta with the motion of all ten ticks, as in the manual."""
+    """After every ten IMU frames comes a delta with the motion of ten ticks, as in the manual."""
     board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     board.receive(velocity(35, 0, 0))
     run(board, 10.0)
@@ -53,7 +53,7 @@ def test_a_board_may_send_its_deltas_at_10_hz() -> None:
 
 
 def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
-    """In IMU-only mode the board obeys the same commands as in nominal mode."""
+    """In IMU-only mode the board sends only IMU frames, and obeys commands as in nominal mode."""
     board = booted(BoardSettings(imu_only=True))
     board.receive(WAKE_UP + b"S" + velocity(35, 0, 0))
     data = run(board, 2.0)
@@ -63,7 +63,7 @@ def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
 
 
 def test_within_a_tick_the_order_is_imu_delta_pose() -> None:
-    """All three are sent in the twentieth tick."""
+    """In the twentieth tick, the board sends an IMU frame, a delta and a pose, in this order."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.19)
     tick = board.step()
@@ -72,7 +72,7 @@ def test_within_a_tick_the_order_is_imu_delta_pose() -> None:
 
 
 def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
-    """The recorded frames, joined in order, are the bytes that ``step`` returned."""
+    """The recorded frames, joined in order, are all bytes that ``step`` has returned."""
     board = SimulatedBoard(BoardSettings())
     first = run(board, 1.0)
     board.receive(WAKE_UP + b"S")
@@ -80,7 +80,7 @@ def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
 
 
 def test_both_sequences_count_by_themselves_and_wrap() -> None:
-    """Deltas and poses each have their own SEQ, a uint8 from zero."""
+    """Deltas and poses each have a SEQ of their own: a uint8 that counts from zero and wraps."""
     board = SimulatedBoard(RUNNING)
     run(board, 52.0)
     assert [seq for *_, seq in deltas(board)] == [n % 256 for n in range(1300)]
@@ -88,7 +88,7 @@ def test_both_sequences_count_by_themselves_and_wrap() -> None:
 
 
 def test_a_sequence_goes_on_after_a_pause() -> None:
-    """Only a reboot sets SEQ to zero; motion during the pause is in the next delta."""
+    """A pause does not reset SEQ, as a reboot does; motion in the pause is in the next delta."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
@@ -104,7 +104,7 @@ def test_a_sequence_goes_on_after_a_pause() -> None:
 
 
 def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
-    """Ticks are counted from the end of the boot in every mode, so the phase does not change."""
+    """Ticks are counted in every mode, so a pause does not shift the times of deltas and poses."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)
     board.receive(b"P")
@@ -146,7 +146,7 @@ def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
 
 
 def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
-    """The board's odometry assumes nominal wheels; the true pose does not."""
+    """The board's odometry assumes nominal wheels; slip and scale errors move only the truth."""
     board = SimulatedBoard(
         BoardSettings(running=True, slip=0.05, wheel_radius_scale=(1.0, 1.01, 1.0))
     )
@@ -158,7 +158,7 @@ def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
 
 
 def test_earth_frame_deltas_add_up_to_the_pose() -> None:
-    """The sum of deltas, without rotation, is the board's pose within half an LSB per delta."""
+    """The sum of earth-frame deltas is the board's pose, within half an LSB per delta."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     run(board, 0.2 - 0.01 * (board.tick % 20))
@@ -176,7 +176,7 @@ def test_earth_frame_deltas_add_up_to_the_pose() -> None:
 def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
     frame: str, expected: tuple[int, int, int]
 ) -> None:
-    """At 0.5 m/s along the earth's y axis, 20 mm appear in y (earth) or in x (body)."""
+    """At 0.5 m/s along the earth's y axis, a delta has 20 mm in y (earth) or in x (body frame)."""
     board = SimulatedBoard(
         BoardSettings(
             running=True,
@@ -190,7 +190,7 @@ def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
 
 
 def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
-    """A board that has already driven sends its pose, and zero deltas while it is at rest."""
+    """A board with an initial pose sends it, while its deltas and the true pose are zero."""
     board = SimulatedBoard(
         BoardSettings(running=True, initial_pose=BoardPose(1500.0, -250.0, 8000.0))
     )
@@ -201,7 +201,7 @@ def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
 
 
 def test_the_heading_is_sent_unwrapped() -> None:
-    """After more than two turns the heading exceeds 4 pi, in mrad."""
+    """After more than two turns, the heading that the board sends exceeds 4 pi, in mrad."""
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(-40, -40, -40))
     run(board, 4.0)
@@ -209,7 +209,7 @@ def test_the_heading_is_sent_unwrapped() -> None:
 
 
 def test_the_pose_can_be_sent_little_endian() -> None:
-    """The setting reverses the bytes of each float."""
+    """A setting reverses the bytes of each float of the pose frame."""
     pose = BoardPose(1000.0, 0.0, 0.0)
     board = SimulatedBoard(BoardSettings(running=True, pose_byte_order="little", initial_pose=pose))
     run(board, 0.2)

@@ -10,7 +10,7 @@ from omnibot_driver.simulator.omnibot.motors import DEAD_ZONE_PWM, PWM_LIMIT, Mo
 
 
 class Wheel:
-    """A motor with its controller, which sees it through the encoder as in the firmware."""
+    """A motor and its controller, which measures the speed by the encoder as in the firmware."""
 
     def __init__(self) -> None:
         self.motor = Motor()
@@ -20,7 +20,7 @@ class Wheel:
         self._encoder = self.motor.encoder
 
     def hold(self, target: float, ticks: int) -> list[float]:
-        """Run the controller for some ticks; return the true speed after each of them."""
+        """Run the controller for ``ticks``; return the true speed after each tick."""
         speeds = []
         for _ in range(ticks):
             self.motor.advance(self.pwm)
@@ -50,7 +50,7 @@ def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
 
 
 def test_saturation_does_not_wind_up_the_integrator() -> None:
-    """A slow speed is reached as soon after 10 s of saturation as after 1 s."""
+    """The wheel reaches a slow speed as soon after 10 s of saturation as after 1 s."""
     long, short = Wheel(), Wheel()
     long.hold(300.0, 1000)
     short.hold(300.0, 100)
@@ -58,13 +58,13 @@ def test_saturation_does_not_wind_up_the_integrator() -> None:
 
 
 def test_the_effort_saturates() -> None:
-    """The PWM never exceeds its range in either direction."""
+    """The controller's PWM never exceeds its range in either direction."""
     assert WheelController().update(1e6, 0) == PWM_LIMIT
     assert WheelController().update(-1e6, 0) == -PWM_LIMIT
 
 
 def test_efforts_within_the_dead_zone_move_nothing() -> None:
-    """A resting wheel starts to turn only beyond the dead zone."""
+    """A resting wheel turns only at efforts beyond the dead zone."""
     motor = Motor()
     assert motor.advance(DEAD_ZONE_PWM) == 0.0
     assert motor.advance(-DEAD_ZONE_PWM) == 0.0

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[3]
 def test_a_name_is_found_where_it_was_with_a_warning(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The old name gives the same object, and the warning gives the new place."""
+    """The old name gives the same object as the new one, and the warning gives the new name."""
     monkeypatch.delitem(vars(simulator), name, raising=False)
     with pytest.warns(DeprecationWarning, match=r"from omnibot_driver\.simulator\.omnibot"):
         assert getattr(simulator, name) is getattr(omnibot, name)
@@ -26,7 +26,7 @@ def test_a_name_is_found_where_it_was_with_a_warning(
 
 
 def test_a_name_that_never_was_there_is_not_found() -> None:
-    """An AttributeError is raised, as in any module."""
+    """A name that never existed raises an AttributeError, as in any module."""
     with pytest.raises(AttributeError, match="has no attribute 'wheels'"):
         _ = simulator.wheels
 

@@ -10,7 +10,10 @@ from simulator_program import PATIENCE_S, line, say, simulator
 
 
 def test_the_first_line_is_the_path_and_nothing_else() -> None:
-    """A script can open the path that it reads; the hints for people are on stderr."""
+    """The first line on stdout is the path alone, so a script can read and open it.
+
+    The hints for people are on stderr.
+    """
     with simulator() as process:
         path = line(process)
         os.close(os.open(path, os.O_RDWR | os.O_NOCTTY))
@@ -22,7 +25,7 @@ def test_the_first_line_is_the_path_and_nothing_else() -> None:
 
 
 def test_the_console_tells_the_truth() -> None:
-    """``truth`` prints one line of JSON that contains pose and mode."""
+    """The console command ``truth`` prints one line of JSON with the true pose and the mode."""
     with simulator("--running") as process:
         line(process)
         say(process, "truth")
@@ -34,7 +37,7 @@ def test_the_console_tells_the_truth() -> None:
 
 
 def test_the_console_reboots_the_board() -> None:
-    """After ``reboot``, a running board is booting, or paused."""
+    """After the console command ``reboot``, a running board is booting, or already paused."""
     with simulator("--running") as process:
         line(process)
         say(process, "reboot\ntruth")
@@ -45,7 +48,7 @@ def test_the_console_reboots_the_board() -> None:
 
 
 def test_the_end_of_the_input_does_not_end_it() -> None:
-    """With /dev/null as stdin, the board still runs after its boot."""
+    """With /dev/null as stdin, the program still runs after the boot of the board."""
     with simulator(stdin=subprocess.DEVNULL) as process:
         port = os.open(line(process), os.O_RDONLY | os.O_NOCTTY)
         try:
@@ -56,7 +59,7 @@ def test_the_end_of_the_input_does_not_end_it() -> None:
 
 
 def test_the_options_reach_the_board() -> None:
-    """With ``--running`` and ``--imu-only`` the board starts in IMU-only mode."""
+    """With ``--running`` and ``--imu-only``, the board starts in IMU-only mode."""
     with simulator("--running", "--imu-only") as process:
         line(process)
         say(process, "truth")

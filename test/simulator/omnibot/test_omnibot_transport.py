@@ -17,7 +17,7 @@ PATIENCE_S = 20.0
 
 
 def read(transport: SimulatedTransport) -> bytes:
-    """Return the next bytes."""
+    """Return the next bytes that arrive."""
     deadline_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline_s:
         if data := transport.read()[1]:
@@ -45,7 +45,7 @@ def test_a_board_boots_and_obeys() -> None:
     ],
 )
 def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
-    """The message says what is wrong and names the command that lists the options."""
+    """The error message says what is wrong and names the command that lists the options."""
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, OMNIBOT)
     assert why in str(refusal.value)

@@ -25,7 +25,7 @@ def board_from_url(url: str) -> tuple[SimulatedBoard, Line]:
 
 
 def test_every_option_reaches_the_board_and_its_line() -> None:
-    """Each option arrives under its name; the seed goes to both the board and the line."""
+    """Each option of the URL reaches the board or its line; the seed reaches both."""
     board, line = board_from_url(
         "sim://?seed=7&imu_only&frame=body&delta_period=0.1&control=position&latching_estop&running"
         "&receiver=idle_gap&letters=anywhere&wakes_while_booting&ignore_estop"
@@ -48,13 +48,13 @@ def test_every_option_reaches_the_board_and_its_line() -> None:
 
 @pytest.mark.parametrize("period", ["0", "-0.04", "0.045", "nan", "inf", "fast", "11"])
 def test_deltas_are_sent_every_so_many_ticks(period: str) -> None:
-    """A period that is not a positive multiple of the tick, up to 10 s, is rejected."""
+    """The period of deltas must be a multiple of the tick, and at most 10 s."""
     with pytest.raises(OptionError, match="not a period of the board"):
         board_from_url(f"sim://?delta_period={period}")
 
 
 def test_without_options_all_is_as_usual() -> None:
-    """The settings are the defaults, and the line has no faults."""
+    """Without options, the board has the default settings, and its line has no faults."""
     board, line = board_from_url("sim://")
     assert board.settings == BoardSettings()
     assert line.carry(SENT) == SENT

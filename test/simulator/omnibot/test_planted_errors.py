@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Errors that a calibration has to find, planted in the simulator: each shows in its behaviour."""
+"""Errors for a calibration to find: each can be set in the simulator and has a visible effect."""
 
 import struct
 from math import pi, radians
@@ -23,7 +23,7 @@ WHEEL_B = bytes.fromhex("FF FE 02 00 00 00 08 00 00")
 
 
 def driven(command: bytes, seconds: float = 1.0, **settings: object) -> SimulatedBoard:
-    """Return a running board ``seconds`` after a command."""
+    """Return a running board, ``seconds`` after it has received a command."""
     board = SimulatedBoard(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
     board.receive(command)
     for _ in range(round(seconds * 100)):
@@ -44,7 +44,7 @@ def last(board: SimulatedBoard, header: bytes, count: int) -> tuple[int, ...]:
 def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_know(
     command: bytes, signs: tuple[int, int, int], axis: int
 ) -> None:
-    """Commands and odometry are both reversed, so the board's own pose is as expected."""
+    """A reversed axis reverses commands and odometry, so the board's own pose is as expected."""
     straight, reversed_ = driven(command), driven(command, axis_signs=signs)
     truth = (reversed_.truth.x_m, reversed_.truth.y_m, reversed_.truth.yaw_rad)
     assert truth[axis] < -0.05
@@ -55,14 +55,14 @@ def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_kn
 
 
 def test_wheel_counts_are_those_of_the_wheels() -> None:
-    """Calculated by hand: 8 / 70 m/s are 39 counts in 40 ms, on wheel B only."""
+    """By hand: if wheel B moves at 8 / 70 m/s, it has 39 counts in 40 ms, and the others none."""
     a, b, c = last(driven(WHEEL_B, 2.0, frame="wheel_counts"), DELTA, 3)
     assert (a, c) == (0, 0)
     assert b == pytest.approx(8 / 70 * 0.04 * 1560 / (2 * pi * 0.029), abs=1.5)
 
 
 def test_each_motor_has_its_own_constants() -> None:
-    """One motor is slower, and the others are unchanged."""
+    """If one motor has a lower constant, it is slower, and the others are unchanged."""
     slow = MotorConstants(time_constant_ticks=30.0)
     board = driven(FORWARD, 0.15, motors=(slow, MotorConstants(), MotorConstants()))
     a, b, _ = board.rim_speeds_mps
@@ -70,14 +70,14 @@ def test_each_motor_has_its_own_constants() -> None:
 
 
 def test_a_motors_delay_holds_its_effort_back() -> None:
-    """The wheel rests for this number of ticks, and then moves as with a motor without delay."""
+    """With a delay of three ticks, a motor rests for three ticks, then moves as one without."""
     prompt, late = Motor(), Motor(MotorConstants(delay_ticks=3))
     turned = [prompt.advance(500.0) for _ in range(10)]
     assert [late.advance(500.0) for _ in range(10)] == [0.0, 0.0, 0.0, *turned[:7]]
 
 
 def test_the_controllers_gains_are_those_given() -> None:
-    """Calculated by hand, one tick after a step of 10 counts: 5·10 + 2·10 + 1·10."""
+    """The expected effort is calculated by hand, a tick after a step of 10: 5·10 + 2·10 + 1·10."""
     gains = WheelGains(feed_forward=5.0, proportional=2.0, integral=1.0)
     assert WheelController(gains).update(10.0, 0.0) == 80.0
 
@@ -96,7 +96,7 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """Nose up is a negative pitch, left side up a positive roll (REP-103)."""
+    """By REP-103, a nose that is up is a negative pitch, a left side that is up a positive roll."""
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)
     board.step()
@@ -104,7 +104,7 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
 
 
 def test_a_robot_that_is_turned_by_hand_feels_it_and_its_wheels_do_not() -> None:
-    """A turn to the left is negative on a gyro that is mounted upside down."""
+    """A turn by hand to the left is negative on a gyro that is mounted upside down."""
     board = driven(b"", 0.1, gyro_noise_dps=0.0, gyro_bias_dps=(0.0, 0.0, 0.0))
     board.hold(yaw_rate=radians(30))
     board.step()

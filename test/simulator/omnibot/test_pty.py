@@ -14,7 +14,7 @@ RUNNING = BoardSettings(running=True)
 
 
 def read_until(descriptor: int, wanted: bytes) -> bytes:
-    """Return what a descriptor yields, up to the first chunk that contains the wanted bytes."""
+    """Return the bytes read from a descriptor, up to the first chunk that completes ``wanted``."""
     data = b""
     deadline_s = time.monotonic() + PATIENCE_S
     while wanted not in data:
@@ -25,7 +25,7 @@ def read_until(descriptor: int, wanted: bytes) -> bytes:
 
 
 def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
-    """Return a predicate: the board is in this mode."""
+    """Return a predicate that tells whether a board is in this mode."""
     return lambda board: board.mode is mode
 
 
@@ -62,7 +62,7 @@ def test_the_stream_read_is_the_stream_sent() -> None:
 
 
 def test_the_terminal_outlives_the_program_that_opened_it() -> None:
-    """A second program finds the board in the state in which the first one left it."""
+    """After one program has closed the terminal, a second one finds the board in the same state."""
     with PtyBoard(SimulatedBoard(RUNNING)) as pty:
         for letter, mode in ((b"P", BoardMode.PAUSED), (b"S", BoardMode.NOMINAL)):
             port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated receivers, with damaged commands typed by hand as input."""
+"""Tests of the simulated receivers with commands typed by hand, some of them damaged."""
 
 import pytest
 from hypothesis import given
@@ -40,7 +40,7 @@ def understood(
     control_frames: bool = True,
     pause_s: float = 0.05,
 ) -> list[Command]:
-    """Return the commands that a fresh receiver finds in hexadecimal writes with pauses between."""
+    """Return the commands that a new receiver finds in hexadecimal writes, with pauses between."""
     receiver = CommandReceiver(kind, awake=awake)
     commands: list[Command] = []
     now_s = 0.0
@@ -57,7 +57,7 @@ def understood(
 def test_every_receiver_understands_each_command_of_the_appendix(
     typed: str, mode: int, values: tuple[int, int, int], kind: ReceiverKind
 ) -> None:
-    """The frames are undamaged, with or without zero bytes before them."""
+    """Each undamaged frame is understood, with or without zero bytes before it."""
     assert understood(typed, kind=kind) == [ControlFrame(mode, values)]
     assert understood("00 00 00" + typed, kind=kind) == [ControlFrame(mode, values)]
 
@@ -66,7 +66,7 @@ def test_every_receiver_understands_each_command_of_the_appendix(
 @every_kind
 @given(typed=st.lists(st.sampled_from([typed for typed, _, _ in APPENDIX.values()]), max_size=20))
 def test_frames_back_to_back_are_all_understood(typed: list[str], kind: ReceiverKind) -> None:
-    """A run of commands yields as many frames, in order."""
+    """Frames without a gap between them are all understood, in order."""
     meanings = {typed: ControlFrame(mode, values) for typed, mode, values in APPENDIX.values()}
     assert understood("".join(typed), kind=kind) == [meanings[one] for one in typed]
 
@@ -96,7 +96,7 @@ def test_letters_act_between_control_frames_and_not_within() -> None:
 
 
 def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
-    """Each letter within a frame acts, and the last byte still completes the frame."""
+    """A letter within a frame acts, and the frame is still completed by its last byte."""
     assert understood("53 FF FE 01 00 50 00 52 00 53 50", kind=LETTERS_ANYWHERE) == [
         START,
         PAUSE,
@@ -109,13 +109,13 @@ def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
 
 @every_kind
 def test_letters_within_a_control_frame_act_where_frames_are_not_obeyed(kind: ReceiverKind) -> None:
-    """A board that obeys only letters also obeys the letters P, R and S in a motion frame."""
+    """A board that obeys only letters obeys P, R and S even within a motion frame."""
     frame = "FF FE 01 00 50 00 52 00 53"
     assert understood(frame, kind=kind, control_frames=False) == [PAUSE, RESET, START]
 
 
 def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
-    """FF S is a stray byte and a start; only the naive firmware loses the S as half a header."""
+    """In FF S, the FF is a stray byte and S a start; the naive receiver loses the S with the FF."""
     assert understood("FF 53") == [START]
     assert understood("FF 53", kind=WINDOW) == [START]
     assert understood("FF 53", kind=NAIVE) == []
@@ -123,7 +123,7 @@ def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
 
 
 def test_the_window_takes_no_letter_soon_after_a_header() -> None:
-    """A letter acts only when the FF FE has left the window of nine bytes."""
+    """The window receiver obeys a letter only when FF FE has left its window of nine bytes."""
     assert understood("FF FE 02 00 00 00 53 00 00 53", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0x0053, 0)),
         START,
@@ -141,19 +141,19 @@ def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> No
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
-    """The P that should pause the robot makes it turn instead."""
+    """After a stop that lost a byte, a P, which should pause the robot, becomes a wheel speed."""
     assert understood("FF FE 02 00 00 00 00 00", "50") == [ControlFrame(0x02, (0, 0, 80))]
 
 
 def test_an_idle_gap_ends_half_a_frame() -> None:
-    """The next frame is found, and a letter acts."""
+    """After an idle gap, the next frame is found, and a letter acts."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole, kind=IDLE_GAP) == [STOP]
     assert understood(short, "50", kind=IDLE_GAP) == [PAUSE]
 
 
 def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
-    """The receiver continues to count, because bytes may be late."""
+    """After a pause of less than 5 ms the receiver continues to count, as bytes may be late."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     false = [ControlFrame(0x02, (0, 0, 255))]
     assert understood(short, whole, kind=IDLE_GAP, pause_s=0.0048) == false
@@ -162,9 +162,9 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """The receiver keeps the bytes.
+    """A window receiver takes the FF of the next frame as the missing byte of a short stop.
 
-    So it also finds the header whose first byte it used as a value.
+    It keeps the byte, so it also finds the next frame.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
@@ -173,7 +173,7 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """The value -2 is FF FE, so 02 and the six bytes after it form a second frame."""
+    """The value -2 in a frame is FF FE, so 02 and the six bytes after it form a second frame."""
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))
     assert understood(data, kind=WINDOW) == [first, second]
@@ -181,7 +181,7 @@ def test_a_window_finds_a_header_within_a_frame() -> None:
 
 
 def test_a_frame_without_its_header_acts_by_its_letters() -> None:
-    """If FF or FE is lost, a 52 in the payload acts as R."""
+    """If a frame loses its FF or its FE, a 52 in the payload acts as the letter R."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         assert understood("FE 01 00 52 00 00 00 00", kind=kind) == [RESET]
         assert understood("FF 01 00 52 00 00 00 00", kind=kind) == [RESET]
@@ -198,7 +198,7 @@ def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
 
 
 def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None:
-    """The receiver discards the second FF; the payload is then read as letters."""
+    """In FF FF FE, a naive receiver discards the second FF; the payload is read as letters."""
     assert understood("FF FF FE 02 00 20 00 00 00 00", kind=NAIVE) == []
     assert understood("FF FF FE 02 00 52 00 00 00 00", kind=NAIVE) == [RESET]
 
@@ -208,20 +208,19 @@ def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None
 
 @every_kind
 def test_the_first_three_bytes_after_power_up_are_swallowed(kind: ReceiverKind) -> None:
-    """The manual's serial initialization consumes any three bytes, even letters."""
+    """After power-up, the serial initialization consumes three bytes, even letters."""
     assert understood("52 50 53 53", kind=kind, awake=False) == [START]
 
 
 @every_kind
 def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> None:
-    """After the wake-up, the rest of the motion frame is read as letters."""
+    """A motion frame that wakes the board loses its header, and its rest is read as letters."""
     assert understood("FF FE 01 00 52 00 00 00 00", kind=kind, awake=False) == [RESET]
 
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """After two bytes during the boot, the wake-up takes one more, or three if those are not
-    counted."""
+    """The wake-up takes three bytes; two bytes during the boot count for it, or do not."""
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()

@@ -36,35 +36,35 @@ def test_each_command_of_the_appendix_is_understood(
 
 
 def test_commands_reach_the_whole_range_of_a_short() -> None:
-    """The extremes +32,767 and -32,768 keep their sign and byte order."""
+    """The extremes +32,767 and -32,768 of a command value keep their sign and byte order."""
     frame = bytes.fromhex("FF FE 01 7F FF 80 00 FF FF")
     assert control_frame(frame) == ControlFrame(0x01, (32767, -32768, -1))
 
 
 def test_the_imu_frame_is_laid_out_as_in_the_manual() -> None:
-    """The layout is FF FA, then accelerometer and gyro, most significant byte first."""
+    """The IMU frame is FF FA, then accelerometer and gyro, most significant byte first."""
     sent = imu_frame((1, -2, 0x1234), (-6, -5, -4))
     assert sent == bytes.fromhex("FF FA 00 01 FF FE 12 34 FF FA FF FB FF FC")
 
 
 def test_the_delta_frame_is_laid_out_as_in_the_manual() -> None:
-    """The layout is FF FB, X_DIF, Y_DIF, TH_DIF, then SEQ in the ninth byte."""
+    """The delta frame is FF FB, X_DIF, Y_DIF, TH_DIF, and SEQ in the ninth byte."""
     assert delta_frame((200, -200, 32767), 255) == bytes.fromhex("FF FB 00 C8 FF 38 7F FF FF")
 
 
 def test_the_pose_frame_is_laid_out_as_in_the_manual() -> None:
-    """The layout is FF FC, three floats with the most significant byte first, then SEQ."""
+    """The pose frame is FF FC, three floats with the most significant byte first, and SEQ."""
     sent = pose_frame(1000.0, -2.5, 1.0, 7)
     assert sent == bytes.fromhex("FF FC 44 7A 00 00 C0 20 00 00 3F 80 00 00 07")
 
 
 def test_the_pose_frame_can_be_little_endian() -> None:
-    """The other reading of the manual reverses the bytes of each float and nothing else."""
+    """The other reading of the manual reverses the bytes of each float in the pose frame."""
     sent = pose_frame(1000.0, -2.5, 1.0, 7, "little")
     assert sent == bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 07")
 
 
 def test_the_paused_text_is_the_one_of_the_manual() -> None:
-    """The text has a space before the line feed."""
+    """The text of a paused board has a space before its line feed."""
     assert paused_text(0) == b"Paused: 0 \n"
     assert paused_text(255) == b"Paused: 255 \n"

@@ -20,14 +20,14 @@ L = 0.143
 def test_the_odometry_matrix_inverts_the_velocity_equations(
     vx: float, vy: float, yaw_rate: float
 ) -> None:
-    """A conversion from body to rims and back changes nothing."""
+    """If a body velocity is converted to rim speeds and back, the result is the same velocity."""
     assert body_from_rims(rims_from_body(vx, vy, yaw_rate, L), L) == pytest.approx(
         (vx, vy, yaw_rate), abs=1e-12
     )
 
 
 def test_the_velocity_equations_are_those_of_the_manual() -> None:
-    """The robot moves along x, along y and turns; each wheel has the manual's sign."""
+    """In motions along x, along y and in a turn, each wheel has the sign of the manual."""
     c30 = cos(pi / 6)
     assert rims_from_body(1, 0, 0, L) == pytest.approx((-c30, c30, 0))
     assert rims_from_body(0, 1, 0, L) == pytest.approx((-0.5, -0.5, 1))
@@ -35,7 +35,7 @@ def test_the_velocity_equations_are_those_of_the_manual() -> None:
 
 
 def test_a_pose_moves_at_the_mean_heading_of_the_step() -> None:
-    """A quarter turn while driving forward ends on the diagonal."""
+    """A forward motion during a quarter turn ends on the diagonal."""
     moved = PlanarPose(1.0, 2.0, 0.0).moved(1.0, 0.0, pi / 2)
     assert moved == pytest.approx((1 + sqrt(0.5), 2 + sqrt(0.5), pi / 2))
 
@@ -49,21 +49,21 @@ def drive(settings: BoardSettings, ticks: int = 300) -> World:
 
 
 def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
-    """A radius scale multiplies the true motion and does not change the encoders."""
+    """A scale of the wheel radius multiplies the true motion and does not change the encoders."""
     plain, large = drive(BoardSettings()), drive(BoardSettings(wheel_radius_scale=(1.02,) * 3))
     assert large.encoders == plain.encoders
     assert large.truth.yaw_rad == pytest.approx(1.02 * plain.truth.yaw_rad)
 
 
 def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
-    """A base radius scale divides the true turn and does not change the encoders."""
+    """A scale of the base radius divides the true turn and does not change the encoders."""
     plain, wide = drive(BoardSettings()), drive(BoardSettings(base_radius_scale=1.05))
     assert wide.encoders == plain.encoders
     assert wide.truth.yaw_rad == pytest.approx(plain.truth.yaw_rad / 1.05)
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """Over many wheel turns the loss averages to the setting; its details depend on the seed."""
+    """Over many turns of the wheels, the mean slip is that of the settings; the seed varies it."""
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)
     second = drive(BoardSettings(slip=0.1, seed=2), 3000)
@@ -73,7 +73,7 @@ def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
 
 
 def test_the_twist_is_the_derivative_of_the_pose() -> None:
-    """In a steady turn, the yaw grows by the yaw rate."""
+    """In a steady turn, the yaw grows by the yaw rate in each second."""
     world = drive(BoardSettings())
     before = world.truth
     world.advance((1000.0, 1000.0, 1000.0))
@@ -94,7 +94,7 @@ def test_a_force_moves_the_robot_in_its_direction() -> None:
 
 
 def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
-    """The slope pulls along the floor's x axis."""
+    """A slope pulls the robot along the floor's x axis, whatever its heading is."""
     world = World(BoardSettings(slope_pwm=500.0))
     world.gripped = Twist(0.0, 0.0, pi / 2)
     for _ in range(100):
@@ -110,9 +110,9 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """The motors have no effect while the robot is gripped.
+    """While the robot is gripped and moved, its motors have no effect.
 
-    Afterwards they continue from its place.
+    Afterwards they move the robot from its new place.
     """
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
@@ -128,7 +128,7 @@ def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> N
 
 
 def test_swapped_motors_get_each_others_effort() -> None:
-    """Each encoder stays with its wheel."""
+    """If motors are swapped, each encoder still counts its own wheel."""
     world = World(BoardSettings(motor_wiring=(2, -1, 3)))
     for _ in range(50):
         world.advance((1000.0, 500.0, 0.0))
