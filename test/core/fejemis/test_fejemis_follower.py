@@ -47,7 +47,7 @@ def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
 
 
 def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
-    """Commands of 0.9 and 1.5 rad in turn do not restart the time of a wheel at rest."""
+    """Commands that alternate between 0.9 and 1.5 rad do not extend a blocked wheel's time."""
     follower = Follower()
     seen = 0
     for n in range(200):
@@ -57,7 +57,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """If a blocked wheel did not refuse motion, each new command would move the robot for 1 s."""
+    """If the driver did not refuse motion, each command would move the robot for 1 s again."""
     follower = Follower()
     at = blocked(follower, 0.0)
     assert follower.refusal == UNTIL_IT_MOVES

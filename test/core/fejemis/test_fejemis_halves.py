@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two boards of one robot: either may be swapped, disconnected, restarted or silent alone."""
+"""Two boards of one robot: their ports may be swapped, and one alone may restart or be silent."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -183,7 +183,7 @@ def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
 
 
 def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
-    """If both boards are silent after a reconnect, the cause is probably common to both."""
+    """If both boards are silent after a reconnect, one notice names neither of them."""
     bench = nominal()
     bench.close()
     bench.speaks = set()
@@ -195,7 +195,7 @@ def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
-    """When lines begin or no longer have checksums, the robot stops once, then drives as before."""
+    """When checksums appear or disappear, the robot stops once, and then drives as before."""
     bench = nominal(Simulated(firmware=Firmware(sums=not begins)))
     bench.drive_on()
     bench.robot.drive.sums = bench.robot.front.sums = begins
@@ -243,7 +243,7 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """Each error bit of the angle sensor has a notice and stops the robot until it is clear."""
+    """Each error bit of the angle sensor has a notice, and stops the robot while it is set."""
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -268,7 +268,7 @@ def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
 
 
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """A sensor that repeats its last angle reports no error; the missing rotation shows it."""
+    """A sensor that repeats its last angle reports no error; missing rotation shows the fault."""
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
     with pytest.raises(CommandRefused, match="front wheel did not go where"):
@@ -313,7 +313,7 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
 
 
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
-    """The list of what a board does not know belongs to the board, not to the port.
+    """The list of requests that a board does not know belongs to the board, not to its port.
 
     So another board on the same port is queried for everything again.
     """
@@ -331,7 +331,7 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
 
 
 def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
-    """After a reconnect another board may be at the port, so values of before are not shown."""
+    """After a reconnect another board may be at the port, so the old values are not shown."""
     bench = nominal()
     bench.run(6.0)
     told = {"Drive ver", "Drive bat", "Drive cvdrive", "Front id"}

@@ -72,7 +72,7 @@ Read = tuple[float, list[Line]]
 
 
 def damaged(lines: list[Line], chance: random.Random, lost: float, twice: float) -> list[Line]:
-    """Return the lines without the lost ones (chance ``lost``); some come twice (``twice``)."""
+    """Return the lines; each is lost with chance ``lost``, or comes twice (``twice``)."""
     kept = [line for line in lines if chance.random() >= lost]
     return [line for line in kept for _ in range(1 + (chance.random() < twice))]
 
@@ -128,7 +128,7 @@ class Outcome:
     given: list[tuple[int, int]]
     false: list[tuple[int, int]]
     excused: list[tuple[int, int]]
-    """Pairs with lines of two samples that the stream does not show to be wrong."""
+    """Pairs with lines of two samples, which nothing in the stream shows to be wrong."""
 
 
 def outcome(reads: list[Read]) -> Outcome:

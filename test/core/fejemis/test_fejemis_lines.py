@@ -129,7 +129,7 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 
 @pytest.mark.parametrize("text", GOLDEN)
 def test_every_message_is_understood(text: str) -> None:
-    """Both the manual's examples and its lists of fields are covered."""
+    """The tested lines cover the manual's examples and its lists of fields."""
     assert parse(text) == GOLDEN[text]
 
 
@@ -179,7 +179,7 @@ def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
 
 
 def test_a_line_may_have_200_characters_and_no_more() -> None:
-    """A longer line is discarded up to its line end, in whatever pieces it arrives."""
+    """A line of over 200 characters is discarded up to its end, in whatever pieces it comes."""
     decoder = FejemisDecoder()
     text = b"# " + b"x" * (LONGEST_LINE - 2)
     assert len(feed(decoder, text + b"\n")) == 1
@@ -214,7 +214,7 @@ def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> 
 
 
 def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None:
-    """One heartbeat that lost or gained its checksum may be damaged; a second is believed."""
+    """One heartbeat that lost or gained its checksum may be damaged; two show a real change."""
     decoder = FejemisDecoder("auto")
     feed(decoder, with_sum(BEAT) + b"\n")
     feed(decoder, BEAT + b"\n" + with_sum(BEAT) + b"\n" + BEAT + b"\n")

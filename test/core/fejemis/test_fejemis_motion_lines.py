@@ -63,7 +63,7 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 
 
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """Commands of the complete range are tried, each with the line that follows."""
+    """Commands of the complete range are tried, each together with the line after it."""
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
     behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
@@ -78,7 +78,7 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 
 
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
-    """The driver avoids lines with digit pairs or checksums that would hide such a loss."""
+    """The driver avoids digit pairs and checksums that would hide the loss of two characters."""
     chance = random.Random(7)
     for _ in range(150):
         v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
@@ -176,7 +176,7 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
     """A related firmware compares the complete line with ``stop``, so nothing is appended.
 
-    An empty line may precede it.
+    An empty line may precede the line.
     """
     data = line(text, sums=sums).lstrip(b"\n")
     assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"

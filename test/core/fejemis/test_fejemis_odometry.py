@@ -86,7 +86,7 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
 
 
 def test_a_gap_is_settled_by_the_pose_after_it() -> None:
-    """No message arrives while the robot drives a curve for 2 s; the next pose corrects that."""
+    """No pose arrives while the robot drives a curve for 2 s; the next pose corrects odometry."""
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     drive.run(0.3, 0.2, 1.0)
@@ -107,7 +107,7 @@ def test_a_gap_is_settled_by_the_pose_after_it() -> None:
     ],
 )
 def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
-    """The false pose is skipped, and the next correct pose continues from the last correct one."""
+    """A false pose is skipped, and the next correct pose continues from the last correct one."""
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     drive.run(0.3, 0.4, 2.0)

@@ -80,7 +80,7 @@ def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
 
 
 def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """The drive board still counts down, so nothing may move."""
+    """After a reconnect, the drive board still counts down, so motion is refused."""
     bench.close()
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
@@ -91,7 +91,7 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
-    """The estimate of the board's clock is kept, so the time in its lines shows the restart."""
+    """The driver keeps its estimate of the board's clock, which shows the restart later."""
     bench.run(5.0)
     bench.close()
     bench.speaks = set()

@@ -149,7 +149,7 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:
-    """After a pause the board may have restarted; its heartbeat has to rule that out."""
+    """After a gap in its data a board may have restarted, unless a heartbeat rules it out."""
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}
     bench.run(pause_s)
@@ -163,7 +163,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 
 
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
-    """The reply shows at once whether the board restarted; its own heartbeats come every 0.4 s."""
+    """A requested heartbeat shows a restart at once; periodic ones come only every 0.4 s."""
     bench = nominal()
     bench.speaks = {DRIVE}
     bench.run_until(lambda: bench.board._ports.halves[FRONT].unsure)
@@ -178,7 +178,7 @@ def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
 
 @pytest.mark.parametrize("read_s", [0.001, 0.05])
 def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) -> None:
-    """One line in twenty from the boards is lost for 10 s, without suspicion of a restart."""
+    """If one line in twenty is lost for 10 s, the driver does not suspect a restart."""
     bench = nominal()
     chance = random.Random(3)
 

@@ -112,7 +112,10 @@ def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets(
 
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
-    """While the robot is driven, only the loading of saved values is accepted: it stops first."""
+    """While the robot is driven, no job is accepted but the loading of a configuration.
+
+    It stops the robot first.
+    """
     bench = nominal()
     bench.drive_on()
     if job is not Job.LOAD:
@@ -124,7 +127,7 @@ def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
 
 
 def test_a_job_that_nothing_confirms_fails() -> None:
-    """A job that no board confirms fails within its time limit; until then others are refused."""
+    """A job that no board confirms fails within its time limit; until then no other job starts."""
     bench = nominal()
     bench.hears = {FRONT}
     token = object()

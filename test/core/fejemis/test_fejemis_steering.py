@@ -54,7 +54,7 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """By the manual's equations, ``rc`` does not give the body the v and w that it names."""
+    """By the manual, an ``rc`` line with v and w gives the body another speed and turn rate."""
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
 
@@ -82,7 +82,7 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """The limit allows for a wheel angle that is up to 5° off."""
+    """The tolerance on the body's speed is that of a wheel angle which is wrong by 5°."""
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist
@@ -130,7 +130,10 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The tolerance is 1.2 % of the outer wheel's speed, and 3 % of its speed per track width."""
+    """The speed is right within 1.2 % of the outer wheel's speed.
+
+    The turn rate is right within 3 % of the outer wheel's speed divided by the track width.
+    """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
     truth = bench.robot.truth
@@ -176,7 +179,7 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int) -> None:
-    """At 95°, the drive board would turn the inner wheel at 1.45 times the outer speed.
+    """At a wheel angle of 95°, the drive board would turn its inner wheel faster than the outer.
 
     So the driver relays at most 90°.
     """

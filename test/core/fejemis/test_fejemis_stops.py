@@ -133,7 +133,7 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
     """Lift voltages and colours are sent at most twenty times a second, the newest ones last.
 
-    A stop is sent at once. The brush line is not sent more often because of them.
+    A stop is sent at once. Frequent voltages and colours do not make the brush line frequent.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -154,7 +154,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """The time limit of a lift voltage that is sent late begins when it is sent.
+    """The time limit of a lift voltage begins when the voltage is sent, even if that is late.
 
     A stop before that discards the voltage.
     """
@@ -246,7 +246,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The guard sends different lines for a stop and for a latched e-stop, as does the exit."""
+    """The guard's lines (stop, latched e-stop) and those of the exit all stop the motors."""
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
         bench.board.services.set_brush(True, bench.now)

@@ -86,7 +86,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
-    """Times after a restart could be old times that are read late, but they go back."""
+    """After a restart, the board's times could be late ones, but they are lower than before."""
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
     restarts = 0
@@ -170,7 +170,7 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """A restart sets the board's time back; lines that waited only make the time jump ahead."""
+    """A restart sets the board's time back; lines that waited only make it jump ahead."""
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)

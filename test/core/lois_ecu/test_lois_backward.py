@@ -23,7 +23,8 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
     """The public firmware counts no ticks backward and reports integer RPM, so the heading drifts.
 
-    Its mean error of position is 4.9 % of the way in eight drives, and 13 % in the worst of them.
+    The mean error of the position is 4.9 % of the way in eight drives, and 13 % in the worst of
+    them.
     """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
@@ -39,8 +40,8 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
     """With the boot gains, the right wheel oscillates, comes to rest, and keeps its last speed.
 
-    The normalized squared error of half of all drives is below 2.4 if the covariance is right; a
-    few of these drives are far above.
+    If the covariance is right, the normalized squared error of half of all drives is below 2.4; a
+    few drives with the boot gains are far above.
     """
     seeds = range(1000, 1005)
     drives = [motion(wrong("firmware", seed), name, LoisEcuSettings()) for seed in seeds]
@@ -83,7 +84,7 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """Too much feed-forward makes the wheels fast; no ticks count it, but report 0x20 shows it."""
+    """Too much feed-forward makes the wheels too fast; report 0x20 shows it, but no ticks do."""
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
     assert one.way_m > 11.0
@@ -92,7 +93,7 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM the firmware loses ticks from its measured speed, as they come too fast."""
+    """At 62 RPM some ticks follow each other so soon that the firmware loses their speed."""
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)
 

@@ -182,7 +182,7 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """The record arrives while the wheels turn; its unit of time follows from the board's clock."""
+    """The record arrives while the wheels turn; its time unit depends on the kind of firmware."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -223,7 +223,7 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """A notice names the likely sender of the foreign data; the first valid line clears it."""
+    """A notice names the likely sender of foreign data; the first valid line ends the notice."""
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []
     assert ecu.advice is not None

@@ -30,7 +30,7 @@ class DeafBench(Bench):
 
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """A request of a single date replaces the period, so the period is sent again after it."""
+    """A request of a single date replaces the date period, so the period is then sent again."""
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
         bench = DeafBench(firmware, 500, nth)
@@ -40,7 +40,7 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """Each copy of the line restarts the period, so requested dates confirm the settings."""
+    """Each line that sets the date period restarts it, so requested dates confirm settings."""
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)
     assert bench.session.board._ecu.confirmed

@@ -158,7 +158,7 @@ def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> Non
 
 @pytest.mark.parametrize("kind", RecordKind)
 def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKind) -> None:
-    """A line of the record is lost, doubled or cut, or a foreign line is inserted."""
+    """If a line of a record is lost, doubled, cut or foreign, no wrong record is returned."""
     samples = tuple(range(20, 31))
     record = Record(kind, samples, () if kind is RecordKind.HEADING else samples[:5])
     whole = encode_report(record)

@@ -72,8 +72,7 @@ def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject,
 def test_lines_of_two_groups_never_make_one_group(kind: str, step_s: float) -> None:
     """The end of one burst and the beginning of the next are lost.
 
-    If the number of the remaining lines is that of a group, only the time between them shows the
-    loss.
+    If as many lines remain as a group has, only the time between these lines shows the loss.
     """
     groups: list[list[Report]] = []
     for n in range(1, 7):

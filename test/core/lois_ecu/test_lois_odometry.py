@@ -110,7 +110,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The wheels' displacements add up to the distance; each step is at most 1 m/s plus 3 cm."""
+    """The wheels' displacements add up to the distance; no step is larger than 1 m/s plus 3 cm."""
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
     rig.order(*STOP, 2.0)
@@ -184,7 +184,7 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
-    """When a setting changes, part of the next group's ticks is a way that was predicted before."""
+    """When a setting changes, part of the next group's ticks belong to a way already predicted."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -239,7 +239,7 @@ def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """Backward by duty, only commands are known: sigma exceeds 20 % of the distance."""
+    """In a backward drive by duty, only commands are known: sigma exceeds 20 % of the way."""
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
     found: list[FusedOdometry] = []

@@ -86,7 +86,7 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
     """A loss of exactly one line's length may join two set points, so they are sent 18 ms apart.
 
-    The board may be deaf for 13 ms at once.
+    The board may be deaf for 13 ms without a break.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]

@@ -32,7 +32,7 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
 
 
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:
-    """The columns of times and speeds stay empty, and a remark explains why."""
+    """If the time unit is unknown, times and speeds are left empty, and a remark explains why."""
     assert read(tmp_path / "rpm.csv", RPM, None).splitlines()[1] == "0,,,,,500,250"
     assert "unit" in remark(RecordReading(RPM, None, 60))
 

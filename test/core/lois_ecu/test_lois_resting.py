@@ -25,7 +25,7 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """A wheel that falls from 41 to 20 RPM is at rest only after one more repetition of 20 RPM."""
+    """After a fall from 41 to 20 RPM, the third repetition of 20 RPM shows that the wheel rests."""
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
     assert 0.0 < told(43, 41, 29, 20, 20, 20).chance < 1.0
@@ -38,7 +38,7 @@ def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """A speed that was constant from the beginning may be repeated any number of times."""
+    """A speed that never fell is that of a rolling wheel, however often it is repeated."""
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
@@ -49,7 +49,7 @@ def test_one_tick_that_came_late_is_not_a_fall() -> None:
 
 @pytest.mark.parametrize("rpm", [1, 3, 25, 40])
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
-    """A wheel comes to rest by itself only from 4.5 to 23.5 RPM."""
+    """A wheel that comes to rest by itself has a last speed of 4.5 to 23.5 RPM."""
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
 
@@ -59,7 +59,7 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels have the same speed, the board reports none, and estimates are used."""
+    """While both wheels have the same speed, the board reports no speed; estimates are used."""
     wheel = told(12)
     for rpm in (30.0, 28.0):
         wheel.note(rpm, GROUP_S)

@@ -58,7 +58,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """The few ticks of a drive of 1.2 s prove a reset if the wheels are at rest when it is sent."""
+    """The few ticks of a drive of 1.2 s prove a reset that is sent while the wheels are at rest."""
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
     bench.run(3.0)

@@ -43,7 +43,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The end of a terminal mode is reported once, even if its first lines are lost."""
+    """The end of a terminal mode is reported once, even if the first lines that end it are lost."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -137,7 +137,7 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 
 
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
-    """In compass mode the public firmware reads only 4800 baud, so the e-stop sends only Stop."""
+    """In compass mode the public firmware reads only 480 characters/s, so only Stop is sent."""
     bench = Bench("firmware")
     configure(bench, COMPASS)
     bench.run_until(lambda: bench.board.terminal_mode == 2)

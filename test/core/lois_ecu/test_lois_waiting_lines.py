@@ -30,7 +30,7 @@ def drive_and_require_sleep(bench: Bench, seconds: float) -> None:
 
 @FIRMWARE
 def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
-    """The LED's line does not wait for the end of the drive, as a gain does."""
+    """A gain is written only after the end of a drive, but the LED's line during the drive."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 1.0)
     switch_led(bench, on=True)
@@ -62,7 +62,7 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 
 
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
-    """A pause of 13 ms could cut both lines, and what is left of them could be another motion."""
+    """One pause of 13 ms could cut the LED's line and a motion; the rests could be a motion."""
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)
     switch_led(bench, on=True)

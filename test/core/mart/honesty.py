@@ -20,7 +20,7 @@ from mart_campaign import FIRMWARES, TWISTS
 from omnibot_driver.simulator.common.network import NetworkFaults
 
 RARE = 16.3
-"""The value that 0.1 % of the squares of three honest normal errors exceed."""
+"""With an honest covariance, 0.1 % of the normalised squared errors exceed this value."""
 NETWORKS = {
     "good": NetworkFaults(),
     "late by up to 0.3 s": NetworkFaults(delay_s=0.3),

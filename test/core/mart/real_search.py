@@ -7,8 +7,9 @@
 eight wishes, in which each wish follows each wish. In both sets, one datagram of either direction
 is lost, late or duplicated, or the IMU is dead from that datagram on; there is a trial for each
 datagram. ``beginnings``: a driver starts while the robot may already be in a motion, and the
-network is away for various times. ``PYTHONPATH=.:test:test/core python
-test/core/mart/real_search.py`` runs all of them.
+network is away for various times.
+
+``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all of them.
 """
 
 import copy
@@ -47,7 +48,7 @@ MOST_DATAGRAMS: Final = 7
 Later datagrams are only the repeated stops of an e-stop.
 """
 PROOF_S: Final = 0.25
-"""A motion that begins later than this, in s, after the death of the IMU was not proved."""
+"""Time in s after the death of the IMU; a motion that begins later was not proved."""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
@@ -62,10 +63,10 @@ ENDS_S, SETTLED_S = 16.0, 1.5
 class Trial(NamedTuple):
     """One run of the search: either wishes with one disturbed datagram, or a driver that starts.
 
-    ``wishes``: in this order; ``number``: of the datagram (from 0, without polls) that has the
-    ``fate`` in direction ``way`` (0: to the server, 1: from it). ``met``: the command that the
-    server obeys when the driver starts; the network is away until ``away_s``, and again for 1 s
-    after a further ``back_s``, in the directions ``ways``.
+    ``wishes``: what the user wants, in order. ``number``: number of the datagram (from 0, without
+    polls) that has the ``fate``, in direction ``way`` (0: to the server, 1: from it). ``met``: the
+    command that the server obeys when the driver starts. The network is away until ``away_s``, and
+    again for 1 s after a further ``back_s``, in the directions ``ways``.
     """
 
     wishes: tuple[str, ...] = ()
@@ -160,7 +161,7 @@ def eights() -> Iterator[Trial]:
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield a trial for each fate of each datagram that these wishes send without a fault."""
+    """Yield a trial for each fate of each datagram in a run of these wishes."""
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
         for n, fate in product(range(most), FATES):

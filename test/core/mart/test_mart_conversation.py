@@ -231,7 +231,7 @@ def at(at_s: float, spread_s: float = 0.01) -> Moment:
 
 
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
-    """An impossible encoder count is ignored; the next possible one continues from the last one."""
+    """An impossible encoder count is ignored; the distance continues from the count before it."""
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
@@ -240,7 +240,7 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 
 
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
-    """A count that is as before the motion is late, or the server has not received the start."""
+    """A count from before the motion is a late reply, or the server has not received the start."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -267,7 +267,7 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """A reported turn of 3° was a late count, as the wheel shows; the odometry uses the wheel."""
+    """The wheel shows that a reported turn of 3° was a late encoder count, not an angle."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)

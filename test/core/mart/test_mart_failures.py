@@ -43,7 +43,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 
 
 def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
-    """A failed RST IMU leaves the IMU closed, so it is repeated; a third failure is accepted."""
+    """A failed RST IMU leaves the IMU closed, so it is repeated; a third failure is believed."""
     bench = MartBench("source").ready()
     bench.server.imu.alive = False
     bench.try_command(0.3, 0.0)
@@ -68,7 +68,7 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """The failure shows that the first RM has arrived, so the stop before the next RM is short."""
+    """An RM that has failed has arrived at the server, so the stop before the next RM is short."""
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 3.0)
     bench.command(0.0, 0.0, 1.0)
@@ -113,7 +113,7 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server gives the reason for which the last B ended; the front sonar shows no obstacle."""
+    """RM fails with the reason of the last B, an obstacle, but the front sonar shows none."""
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -224,7 +224,7 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """A server that moves although its RM failed does so at once, not seconds later.
+    """A robot that moves although its RM failed begins to move at once, not seconds later.
 
     So a later push of the robot is not regarded as a defect of the server.
     """

@@ -19,7 +19,7 @@ from omnibot_driver.simulator.mart import Firmware
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """A requested turn of 1° turns the robot by 7°; it is not repeated until no moves are left."""
+    """A requested turn of 1° turns the robot by 7°; the driver does not use up its moves on it."""
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
         goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
@@ -87,7 +87,7 @@ def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) ->
 
 @pytest.mark.parametrize("every_s", [2.0, 1.0, 0.2])
 def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: float) -> None:
-    """``ros2 topic pub`` repeats its message once a second."""
+    """A goal that ``ros2 topic pub`` repeats every second is not begun again each time."""
     once, repeated = MartBench().ready(), MartBench().ready()
     for _ in range(round(30.0 / every_s)):
         repeated.go_to(1.0, 0.5, 0.0)

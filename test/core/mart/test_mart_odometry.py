@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry from replies that are lost, late, duplicated or the answer to another query."""
+"""Odometry when replies are lost, late or duplicated, or belong to another query."""
 
 import math
 
@@ -20,7 +20,7 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packet
 
 WRONG_NEES = 28.0
-"""The value that 1 in 270,000 squares of three honest normal errors exceeds."""
+"""With an honest covariance, 1 in 270,000 normalised squared errors exceeds this value."""
 
 
 def at(at_s: float, *, doubtful: bool = False) -> Moment:
@@ -205,7 +205,7 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """A copy is not the missing reply, so a query with the same form of reply still waits."""
+    """A copy of an old reply is not the missing one, so a query with that form of reply waits."""
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
     talk.ask(words.SFC.request(), 1.1)
@@ -262,7 +262,7 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """A change that arrives twice looks like unequal motors; at most 8 % is believed."""
+    """A speed change that arrives twice looks like unequal motors; at most 8 % is believed."""
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)
     for tick in range(100):

@@ -67,7 +67,7 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(seed: int) -> None:
-    """HELLO is sent when replies are missing, so a motion begins soon after its command."""
+    """After missing replies the driver sends HELLO; the answer shows that the server is there."""
     bench = MartBench("source", NetworkFaults(lose=0.1), seed=seed).ready()
     appeared = set()
     for _ in range(300):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""No sequence of wishes, losses, copies and delays hangs the server or keeps the robot moving."""
+"""No sequence of commands, losses, copies and delays hangs the server or keeps the robot moving."""
 
 from collections.abc import Callable
 from typing import Final
@@ -17,7 +17,7 @@ from omnibot_driver.simulator.mart import FIRMWARE, Kind, MartServer, MartSettin
 pytestmark = pytest.mark.slow
 
 SETTLES_S: Final = 0.9
-"""Time in s that is longer than any reply takes; only controlled moves take longer."""
+"""Time in s within which every reply comes, except the replies to controlled moves."""
 ON_THE_WIRE: Final = {
     "RM": b"RM 30",
     "TF": b"TF 200",

@@ -17,7 +17,7 @@ STEP_S = 0.1
 
 
 def test_before_anything_is_measured_a_motor_is_taken_for_ideal() -> None:
-    """For an ideal motor, the command units equal the speed in nominal units."""
+    """Before any measurement, a motor needs as many units as an ideal motor: its nominal speed."""
     assert MotorLine().units(12.0) == 12.0
 
 
@@ -65,7 +65,7 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """Noise at one speed, however long it is driven, does not change the other speeds."""
+    """Noise at one speed, even for a long time, does not change the units for other speeds."""
     random, line = Random(seed), MotorLine()
     for units in (40.0, 12.0, 40.0, 12.0):
         line.learn(units, slope * max(0.0, units - dead))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion of the simulated robot by the manual's equations; ``rc`` commands another motion."""
+"""The simulated robot moves by the manual's equations, not with the v and w of an ``rc`` line."""
 
 from math import atan2, degrees, hypot, radians
 

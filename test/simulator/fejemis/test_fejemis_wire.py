@@ -52,7 +52,7 @@ def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
 
 
 def test_a_line_without_a_sum_is_executed_under_protest() -> None:
-    """Firmware with checksums obeys a line without one, and answers it by a comment."""
+    """Firmware with checksums obeys a line that has no checksum, and answers it by a comment."""
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(DRIVE, "rc 2 0.5 0")
     assert answer.endswith("# processing under protest - no CRC")
@@ -61,7 +61,7 @@ def test_a_line_without_a_sum_is_executed_under_protest() -> None:
 
 
 def test_firmware_without_sums_does_not_know_them() -> None:
-    """Firmware without checksums takes a line with one for an unknown command."""
+    """Firmware without checksums takes a line with a checksum for an unknown command."""
     rig = Rig().booted()
     (answer,) = rig.ask(DRIVE, ";19rc 1 0.5 65")
     assert answer.startswith("# 1.0")
@@ -186,7 +186,7 @@ def test_lines_end_with_or_without_a_carriage_return() -> None:
 
 
 def test_variants_of_messages() -> None:
-    """Some firmware sends a time before the wheel speeds, a tilt after the pose, or g."""
+    """Some firmware sends a time before the wheel speeds, a tilt after the pose, or g as unit."""
     usual = Rig(accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
     assert len(usual.ask(DRIVE, "veli")[0].split()) == 3
     assert len(usual.ask(DRIVE, "posei")[0].split()) == 5
@@ -244,7 +244,7 @@ def test_three_lost_characters_leave_a_valid_command() -> None:
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_word_with_a_space_behind_it_is_unknown_to_some_firmware(*, exact: bool) -> None:
-    """A related firmware compares the complete line with ``stop``: a space makes it unknown."""
+    """``stop`` with a space after it is unknown to firmware that compares complete lines."""
     rig = Rig(firmware=Firmware(sums=False, exact_words=exact)).booted()
     rig.ask(DRIVE, "stop ")
     assert rig.board.drive.source == (10 if exact else -1)

@@ -70,7 +70,7 @@ def keeps_speed_of_stalled_wheel(quirks: Quirks) -> bool:
 
 
 def duty_drags_target(quirks: Quirks) -> bool:
-    """After a negative duty, a positive one is measured as a negative speed."""
+    """After a negative duty, a positive duty gives a negative measured speed."""
     rig = Rig(quirks).booted()
     rig.say(SetDuty(-40, -30))
     rig.run(3.0)

@@ -190,7 +190,7 @@ def test_undocumented_moves_answer_ok(text: str) -> None:
 
 
 def test_the_port_is_silent_during_a_controlled_move() -> None:
-    """TF SLOW 80 takes 20 s; requests of that time are answered after it."""
+    """TF SLOW 80 takes 20 s; requests that are sent meanwhile are answered after it."""
     rig = Rig()
     rig.say("TF SLOW 80", "ENC", "RMRA")
     assert rig.run(15.0) == []

@@ -67,7 +67,7 @@ def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(chan
 
 
 def test_rm_200_drives_backward_at_56() -> None:
-    """RM 200 drives backward at 56 units; the smallest RMCS then makes it full speed forward."""
+    """RM 200 drives backward at 56 units; the smallest RMCS then drives full speed forward."""
     rig = Rig()
     rig.drive("RM 200")
     assert rig.server.chassis.right == 128 + 56
@@ -101,7 +101,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """If a motor is stuck, the first RM fails without a reason, and later ones with that of F."""
+    """If a motor is stuck, the first RM fails without a reason, a later RM with that of F."""
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)

@@ -31,7 +31,7 @@ def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
 def test_a_file_comes_in_datagrams_of_512_bytes(
     start: str, end: str | None, text: str, name: str
 ) -> None:
-    """A file begins with its name and size; the file of LAST MOVE is also written by SRM."""
+    """A download begins with name and size; SRM also writes the file of LAST MOVE."""
     rig = Rig()
     answer = rig.ask(start)
     assert answer is not None

@@ -159,7 +159,7 @@ def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
 
 @pytest.mark.parametrize("start", ["F", "R"])
 def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> None:
-    """If the IMU dies during F or R, SM stops the robot, but is answered only with a live IMU."""
+    """If the IMU dies during F or R, SM stops the robot; its reply comes when the IMU is back."""
     rig = Rig(imu_dies_s=1.0, imu_returns_s=40.0)
     rig.drive(start, 2.0)
     assert rig.ask("SM") is None

@@ -34,7 +34,7 @@ NOT_SUPPORTED = "fail command not supported"
     ],
 )
 def test_a_question_is_answered_in_its_time(text: str, answer: str, seconds: float) -> None:
-    """At rest, each of these requests is answered by this text after this time."""
+    """At rest, the request is answered by ``answer`` after ``seconds``."""
     rig = Rig(gyro_bias_dps=0.0)
     assert rig.ask(text) == answer
     assert rig.took_s == pytest.approx(seconds, abs=0.001)
@@ -201,7 +201,7 @@ def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
 
 
 def test_a_motor_that_tripped_does_not_turn() -> None:
-    """Of two motors, one of which has tripped, only the other one turns."""
+    """A motor that has tripped does not turn; the other motor turns."""
     rig = Rig(motor_status=8)
     rig.drive("RM 30")
     assert rig.server.chassis.left_mps == 0.0 < rig.server.chassis.right_mps

@@ -129,10 +129,7 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """The wake-up takes the header of the frame, and the rest is read as letters:
-
-    0x52 is a reset.
-    """
+    """The wake-up takes the header, so the rest of the frame is read as letters, even a reset."""
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
     assert [command.kind for command in board.commands] == ["reset"]
