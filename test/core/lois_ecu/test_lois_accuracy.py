@@ -29,7 +29,7 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
 
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
-    """In a turn one wheel turns backward, and the public firmware does not count its ticks."""
+    """In a turn on the spot, the public firmware counts no ticks of the wheel that reverses."""
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
     assert abs(one.error.yaw_rad) < 0.03 * one.turned_rad
@@ -47,7 +47,7 @@ def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["left", "right"])
 def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -> None:
-    """In a turn one wheel turns backward, and the public firmware does not count its ticks."""
+    """In a turn on the spot, the public firmware counts no ticks of the wheel that reverses."""
     one = motion(nominal("firmware", 1000), name, side_m=1.0)
     assert off_m(one) < 0.15
     assert one.sigmas < 3.0

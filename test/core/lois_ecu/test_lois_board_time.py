@@ -27,7 +27,7 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """The times of groups stay in order even if the first delay is implausible (over 0.25 s)."""
+    """The times of groups that are read together stay in order, whatever the first delay is."""
     board = BoardTime()
     taken_s = []
     for step in range(60):
@@ -40,7 +40,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """If reads are up to 30 ms late at random, the estimated delay has half that sigma."""
+    """If reads are up to 30 ms late at random, the estimate has a sigma of 5 ms to 25 ms."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -49,7 +49,7 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """While the unit of the board's clock is unknown, the delay is 0, with a sigma of 12 ms."""
+    """Without a known clock, also after a restart, the delay is 0, with a sigma of 12 ms."""
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
     for step in range(20):

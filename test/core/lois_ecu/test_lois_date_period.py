@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The period of the GPS date, and the requests of a single date that confirm the settings."""
+"""The period of the GPS date, and the requests for a single date that confirm the settings."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench
@@ -30,7 +30,7 @@ class DeafBench(Bench):
 
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """A request of a single date replaces the date period, so the period is then sent again."""
+    """A request for a single date replaces the date period, so the period is then sent again."""
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
         bench = DeafBench(firmware, 500, nth)

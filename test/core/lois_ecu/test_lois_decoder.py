@@ -37,7 +37,7 @@ def rounded(found: list[Report]) -> list[bytes]:
 
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> None:
-    """The same stream is fed report by report, byte by byte, and cut at random places."""
+    """A stream gives the same reports if it is fed byte by byte or cut at random places."""
     said = reports(20.0, firmware=firmware)
     sent = [report for _, report in said]
     stream = pieces(said)

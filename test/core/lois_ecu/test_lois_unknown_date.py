@@ -29,7 +29,7 @@ WORKS = pytest.mark.parametrize(
 class GpsRig(Rig):
     """A robot whose GPS has no date until ``dated`` is set; ``sent``: lines and their times.
 
-    ``requests``: times of the requests of a date; ``unknown``: what the GPS sends instead of a
+    ``requests``: times of the requests for a date; ``unknown``: what the GPS sends instead of a
     date.
     """
 
@@ -142,7 +142,7 @@ def test_no_date_is_requested_from_a_board_that_ignores_its_gps() -> None:
 
 
 def test_no_date_is_requested_where_dates_come_periodically() -> None:
-    """A request of a date would replace the period that the user has set."""
+    """A request for a date would replace the period that the user has set."""
     rig = GpsRig(DOCUMENTED)
     rig.driver.settings = LoisEcuSettings(
         periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000, Stream.GPS_POSITION: 1000}

@@ -192,7 +192,7 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
     firmware: Firmware,
 ) -> None:
-    """An ok soon after a count or another ``ok`` may be a copy, so the stop is repeated.
+    """A reply soon after a count or an ``ok`` may be a copy of it, so the stop is repeated.
 
     The server then knows of no motion to stop, which must not be taken for a restart of the server.
     """

@@ -24,7 +24,7 @@ SUMS = Firmware(sums=True)
     ],
 )
 def test_sums_are_those_of_the_public_hosts(line: str) -> None:
-    """The checksums in these lines are copied from the public host programs."""
+    """The checksum of each line is copied from the public host programs."""
     assert wire.checked(line)[0] is wire.Check.GOOD
     assert wire.line(line[3:], sums=True, carriage_return=False) == line.encode() + b"\n"
 

@@ -163,7 +163,7 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 
 
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
-    """A second request of a ball is ignored; a third one, 6 s later, is obeyed."""
+    """A second request for a ball is ignored; a third one, 6 s later, is obeyed."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(DistributeBall(), DistributeBall())

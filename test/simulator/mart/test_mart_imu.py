@@ -10,7 +10,7 @@ LOST = "fail MPU6050 connection lost"
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24", "SB"])
 def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
-    """With a dead IMU these requests are never answered, and neither are later ones."""
+    """With a dead IMU the request is never answered, nor is any later request."""
     rig = Rig(imu_dies_s=0.0)
     rig.say(text, "HELLO", "SM")
     rig.stop("SL")

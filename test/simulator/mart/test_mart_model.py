@@ -115,7 +115,7 @@ def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
 
 
 def test_options_choose_the_robot_and_its_faults() -> None:
-    """The same options exist on the command line and in a URL."""
+    """A sim:// URL has the same options as the command line."""
     board, lines = options.from_url(
         "sim://?firmware=documented&volts=21.5&imu-dies=3&stuck=left&speed-per-unit=0.01"
         "&metres-per-count=0.001&motor-inequality=0.05&front=2&rear=1&dock=4&encoder-inverted"
