@@ -222,7 +222,7 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """The stop comes when the angle becomes too old, not only with the next command."""
+    """The robot is stopped when the angle becomes too old, not only with the next command."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now

@@ -259,7 +259,7 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
 def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
-    """Random bytes in random pieces never raise; the buffer stays shorter than one longest line."""
+    """Random bytes in random pieces never raise; the buffer stays shorter than the longest line."""
     decoder = FejemisDecoder()
     for piece in pieces:
         feed(decoder, piece)

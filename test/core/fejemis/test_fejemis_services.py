@@ -31,7 +31,7 @@ def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
 
 
 def test_the_gyro_is_calibrated_by_the_board() -> None:
-    """The calibration succeeds when the gyro offset read back from the board has changed."""
+    """A calibration succeeds when the gyro offset that is read from the board has changed."""
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
     done = ask(bench, Job.CALIBRATE_GYRO)
     assert done.success
@@ -100,7 +100,7 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
 
 
 def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets() -> None:
-    """The parameter would undo the calibration, so the calibration is refused."""
+    """A parameter that sets the offsets would undo a calibration, so none is started."""
     offsets = (0.1, 0.2, 0.3, 1.0, 1.0, 1.0)
     bench = nominal(settings=FejemisSettings(written={Written.ACCELEROMETER: offsets}))
     bench.run(2.0)
@@ -141,7 +141,7 @@ def test_a_job_that_nothing_confirms_fails() -> None:
 
 
 def test_a_job_is_answered_when_the_port_is_lost() -> None:
-    """The job fails at once, without waiting for the port to come back."""
+    """A job fails at once when the port is lost, even if the port does not come back."""
     bench = nominal()
     token = object()
     bench.board.services.ask(Job.CALIBRATE_GYRO, token, bench.now)
@@ -239,7 +239,7 @@ def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.LOAD])
 @pytest.mark.parametrize("stop", ["e-stop", "pause"])
 def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: str) -> None:
-    """The running job fails at once on an e-stop or a pause."""
+    """An e-stop or a pause ends a running job at once, as a failure."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -284,7 +284,7 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
 
 
 def test_loading_stops_the_robot_before_it_loads() -> None:
-    """The stop is sent first, and the robot gets time to stop before ``eer`` is sent."""
+    """Before saved values are loaded (``eer``), a stop is sent, and the robot gets time to stop."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now

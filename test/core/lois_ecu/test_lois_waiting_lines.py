@@ -42,7 +42,7 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If no date confirms the settings, their rounds continue, but not while the robot drives."""
+    """If no date confirms the settings, they are written again, but not while the robot drives."""
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
     bench.drive_on(0.3, 1.0)

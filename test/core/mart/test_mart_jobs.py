@@ -124,7 +124,7 @@ def test_the_last_move_and_turn_are_downloaded_whole() -> None:
 
 
 def test_nothing_to_download_is_told() -> None:
-    """The job fails with the reason that the controller gives."""
+    """If there is nothing to download, the job fails with the reason of the controller."""
     done = MartBench().ready().job(Job.LAST_MOVE)
     assert not done.success
     assert "no file available" in done.message
@@ -132,7 +132,7 @@ def test_nothing_to_download_is_told() -> None:
 
 @pytest.mark.parametrize("spoil", ["lose", "double"])
 def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None:
-    """The job reports the damaged file as a failure and does not return it."""
+    """A download with a lost or doubled piece is a failure, and no file is returned."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -283,7 +283,7 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 
 @given(st.floats(0.0, 4e9))
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
-    """After a drive the clock is set only if it is not set back.
+    """After a drive, the clock is not set to a time before its own.
 
     The server ignores the seconds, and the datagram may take 1 s.
     """
