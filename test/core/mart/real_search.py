@@ -154,7 +154,7 @@ def pairs() -> Iterator[Trial]:
 
 
 def eights() -> Iterator[Trial]:
-    """Yield trials of eight wishes, in which each wish follows each other one, with each fate."""
+    """Yield trials of eight wishes; each wish follows each other one in some of the trials."""
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))

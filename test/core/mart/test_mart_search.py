@@ -117,7 +117,7 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """Return the visible part of the server's state; a silent port hides the rest."""
+    """Return the server's state without what a silent command port hides."""
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
     return server

@@ -30,7 +30,7 @@ def run(board: SimulatedBoard, seconds: float) -> bytes:
 
 
 def mode_of(board: SimulatedBoard) -> BoardMode:
-    """Return the board's mode; if it were read directly, a type checker would assume no change."""
+    """Return the board's mode by a call, so that a type checker does not assume it unchanged."""
     return board.mode
 
 
