@@ -110,7 +110,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The wheels' displacements add up to the distance; no step is larger than 1 m/s plus 3 cm."""
+    """The wheels' displacements add up to the distance; no step exceeds that at 1 m/s by 3 cm."""
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
     rig.order(*STOP, 2.0)

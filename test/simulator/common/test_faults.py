@@ -72,6 +72,6 @@ def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
 
 @pytest.mark.parametrize("delay", ["-0.1", "61", "nan", "long"])
 def test_a_delay_that_nobody_waits_for_is_refused(delay: str) -> None:
-    """A delay of more than 60 s is refused."""
+    """A delay that is not a number from 0 to 60 (in s) is refused."""
     with pytest.raises(options.OptionError, match="give seconds from 0 to 60"):
         options.from_words([f"--delay={delay}"], toy_udp)

@@ -37,7 +37,7 @@ def test_tf_24_slow_runs_at_normal_speed() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TF x", "TF SLOW x", "TB 0", "TB NORMAL y", "TF FAST 12"])
 def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
-    """If the distance of TF is 0 or a word, the robot drives until it is stopped."""
+    """If the distance of TF or TB is 0 or a word, the robot drives until it is stopped."""
     rig = Rig()
     assert rig.ask(text, 60.0) is None
     assert rig.moving

@@ -73,7 +73,7 @@ def test_a_question_is_answered_in_its_time(text: str, answer: str, seconds: flo
     ],
 )
 def test_what_is_not_a_command_is_refused(text: str) -> None:
-    """A command in lower case, or with a line feed, is refused."""
+    """Unknown words, and commands in lower case or with a line feed, are refused."""
     rig = Rig()
     assert rig.ask(text) == NOT_SUPPORTED
     assert not rig.moving

@@ -53,7 +53,7 @@ def test_at_rest_the_upside_down_sensor_feels_minus_one_g() -> None:
 
 
 def test_the_gyro_at_rest_reads_like_frame_headers_by_default() -> None:
-    """At rest, the mean raw counts of the gyro are -6, -5 and -4, as in frame headers."""
+    """At rest, the mean raw counts are -6, -5 and -4, whose bytes look like frame headers."""
     values = mean(readings(SimulatedBoard(RUNNING), 20.0))
     assert [rate * 131 for rate in values[3:]] == pytest.approx([-6, -5, -4], abs=0.5)
 

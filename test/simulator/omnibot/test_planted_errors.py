@@ -62,7 +62,7 @@ def test_wheel_counts_are_those_of_the_wheels() -> None:
 
 
 def test_each_motor_has_its_own_constants() -> None:
-    """If one motor has a lower constant, it is slower, and the others are unchanged."""
+    """A motor with a longer time constant is slower at first; the other motors are unchanged."""
     slow = MotorConstants(time_constant_ticks=30.0)
     board = driven(FORWARD, 0.15, motors=(slow, MotorConstants(), MotorConstants()))
     a, b, _ = board.rim_speeds_mps
