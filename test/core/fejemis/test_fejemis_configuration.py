@@ -196,7 +196,7 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """The line that writes a setting may be lost, and is not repeated while the robot is driven.
 
-    So motion is refused until the board has the setting, even if the user changes it during a drive.
+    So motion is refused until the board has the setting, even if the user changes it before that.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)
