@@ -19,7 +19,7 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """While the button is held, the driver does not release the e-stop; the board itself would."""
+    """While the button is held, the e-stop stays latched; the board would obey set points."""
     bench = Bench(firmware)
     bench.drive_on()
     bench.presses(True)
@@ -71,7 +71,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """If the tick counters were zero before, no report can prove the reset, so it is sent twice."""
+    """If the tick counters were zero before, no report proves the reset: it stays unconfirmed."""
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
