@@ -98,7 +98,7 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
 ) -> None:
     """After a restart the motors keep their last command, so the robot must be stopped soon.
 
-    Otherwise the driver would wait a minute for the end of a controlled move of 3 m.
+    A driver that missed the restart would wait a minute for the end of a move of 3 m.
     """
     bench = MartBench(firmware).ready()
     bench.go_to(x_m, y_m, 0.0)

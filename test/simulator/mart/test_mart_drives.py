@@ -86,7 +86,7 @@ def test_rm_1_to_127_drives_forward(speed: int) -> None:
 
 
 def test_a_stuck_motor_can_hang_rm() -> None:
-    """After a fast drive, RM hangs if a motor is stuck; the other motor keeps turning."""
+    """After a fast drive, RM hangs if a motor is stuck; meanwhile the other motor turns."""
     rig = Rig()
     rig.drive("RM 110")
     assert rig.ask("SRM") == "ok"

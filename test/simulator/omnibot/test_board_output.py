@@ -88,7 +88,7 @@ def test_both_sequences_count_by_themselves_and_wrap() -> None:
 
 
 def test_a_sequence_goes_on_after_a_pause() -> None:
-    """A pause does not reset SEQ, as a reboot does; motion in the pause is in the next delta."""
+    """Only a reboot sets SEQ to zero; motion during a pause is in the next delta."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
