@@ -38,9 +38,9 @@ CLOCK_RETREATS: Final = 10.0
 that is late by the same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages of a sender of which at least one is assumed to be hardly delayed. Before this
-number is reached, all of them may have been delayed; then the estimated send time of the next
-message is too late."""
+"""Among this many messages of a sender, at least one is assumed to have almost no delay. With fewer
+messages, all of them may have been delayed; then the estimated send time of the next message is too
+late."""
 
 Differences = tuple[float, float]
 """Our clock at a message's arrival minus the sender's clock at its sending, in s: by our time of

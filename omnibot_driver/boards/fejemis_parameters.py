@@ -121,8 +121,8 @@ DRIVING: Final = (
         "line_sums",
         "auto",
         "",
-        "Whether lines begin with a checksum, ;NN. auto: as the heartbeats of each Teensy do;"
-        " on: always; off: never.",
+        "Whether each line begins with a checksum (;NN). auto: if the heartbeats of that Teensy"
+        " do; on: always; off: never.",
         choices=("auto", "on", "off"),
         fixed=True,
     ),
@@ -131,9 +131,9 @@ DRIVING: Final = (
         10.0,
         "s",
         "Time from ~/power_off until the board cuts the power. This computer loses power too if"
-        " the board supplies it. The driver sends whole seconds. It increases a value whose digits"
-        " could be lost without detection, such as 120 s to 131 s. The answer of ~/power_off names"
-        " the time in use.",
+        " the board supplies it. The driver sends whole seconds, and increases a value in which the"
+        " loss of two digits could go undetected: for example, 120 s becomes 131 s. The answer of"
+        " ~/power_off states the time in use.",
         low=1.0,
         high=3600.0,
     ),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Common parts of the boards' integrity reports: damage to a line in pieces, and sums of scores.
+"""Common parts of the integrity reports: damage to bytes in pieces, and sums of scores.
 
 The module knows nothing of frames, and uses scores only by ``+=``.
 """

@@ -90,9 +90,10 @@ class Ports:
         first, second = self.halves
         heard = first.heartbeat is not None and second.heartbeat is not None
         if heard and first.role is not None and first.role == second.role:
+            missing = "front" if first.role == "drive" else "drive"
             return (
-                f"both ports lead to a {first.role} board: connect the other one, and check"
-                " `port` and `front_port`"
+                f"both ports lead to a {first.role} board: connect a {missing} board to one of"
+                " them, and check `port` and `front_port`"
             )
         return ""
 

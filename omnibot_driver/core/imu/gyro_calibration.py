@@ -133,7 +133,7 @@ class GyroCalibration:
         """Fail a running measurement that is overdue."""
         if now >= self.wake_at:
             self.give_up(
-                "the IMU did not send readings for two seconds without a gap; check"
+                "two seconds of IMU readings without a gap are needed, and did not come; check"
                 " ~/state, then call again"
             )
 

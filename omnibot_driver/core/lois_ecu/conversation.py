@@ -281,7 +281,7 @@ class LoisConversation:
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """Write all settings again, as by the manual a reset affects controllers and interfaces."""
+        """Write all settings again: the manual says a reset affects controllers and interfaces."""
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:

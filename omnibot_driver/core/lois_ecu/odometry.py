@@ -37,8 +37,8 @@ LATE_S: Final = 0.012
 """Standard deviation of an arrival time in s, while no better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""The prediction of the pose ends after a silence of ``UNHEARD_S`` and of ``UNHEARD_GROUPS``
-periods of the ticks, because the board may be switched off."""
+"""The pose is predicted for at most ``UNHEARD_S`` s after the last report, or ``UNHEARD_GROUPS``
+tick periods if that is longer; after that, the board may be switched off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 

@@ -23,7 +23,7 @@ fraction of both wheels' distances that is lost by slip."""
 
 
 class SizeErrors:
-    """Drives that are computed again with errors of the wheels' sizes and with slip."""
+    """Copies of one drive, each computed with an error of a wheel's size or with slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)

@@ -179,7 +179,7 @@ class Uncertainty:
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
-        """Return the covariance of a pose that also deviates by the known ``open_error``."""
+        """Return the covariance of a pose whose known error ``open_error`` is not yet corrected."""
         noise, levers = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
         slip = noise.wheel_slip * noise.wheel_slip

@@ -49,12 +49,12 @@ def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> 
     simulator.add_options(parser)
     serial = any(not channel.datagrams for channel in simulator.CHANNELS)
     datagrams = any(channel.datagrams for channel in simulator.CHANNELS)
-    lost = ["a byte the board sends"] * serial + ["a datagram, in either direction,"] * datagrams
+    lost = ["a byte from the board"] * serial + ["a datagram, in either direction,"] * datagrams
     _add_rate(parser, "lose", f"chance that {' or '.join(lost)} is lost")
     if serial:
         burst = "begins a burst of up to 200 lost bytes"
-        _add_rate(parser, "burst", f"chance that a byte the board sends {burst}")
-        _add_rate(parser, "flip", "chance that a byte the board sends arrives with one bit changed")
+        _add_rate(parser, "burst", f"chance that a byte from the board {burst}")
+        _add_rate(parser, "flip", "chance that a byte from the board arrives with one bit changed")
     if datagrams:
         _add_rate(parser, "duplicate", "chance that a datagram, in either direction, arrives twice")
         parser.add_argument(

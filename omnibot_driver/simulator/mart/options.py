@@ -53,7 +53,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--reference-start-fails",
         action="store_true",
-        help="the server answers fail to RM although the robot moves",
+        help="the server answers 'fail' to RM although the robot moves",
     )
 
 

@@ -71,7 +71,7 @@ def steps(odom: Series) -> Steps:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge invalid numbers, the distance and leaps."""
+    """Judge the odometry: invalid numbers, the distance driven, and leaps of the pose."""
     broken = int((~log.odom.finite).sum())
     odom = log.odom.only(log.odom.finite)
     if broken:
