@@ -165,7 +165,7 @@ class Board(Protocol):
         """Record that this process stalled, so the guard may have sent the stop commands.
 
         The guard is the process that sends ``last_words`` when this process hangs. These
-        commands may also switch off motors that do not drive wheels, such as that of a brush.
+        commands may also switch off motors that do not drive wheels, such as a brush motor.
         """
         return
 
@@ -175,7 +175,7 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the packets that are due, except commands: subscriptions, polls, relayed values.
+        """Return the subscriptions, polls and relayed values that are due; commands are excluded.
 
         The caller writes these packets, so regard them as written. Called at ``wake_at``.
         """

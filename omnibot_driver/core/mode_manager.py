@@ -159,7 +159,7 @@ class ModeManager:
                 self._wanted = Wanted.RUNNING
             self._begin(now)
             if self._wanted is not Wanted.RUNNING:
-                self._settle("the board has restarted and is paused, as it was before")
+                self._settle("the board has restarted and is paused, as before the restart")
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
             self._begin(now)  # the board has restarted, and may have missed earlier commands
 
@@ -269,8 +269,8 @@ class ModeManager:
             )
         else:
             reason = (
-                "the board keeps sending data, so it has not obeyed; check that the cable carries"
-                " data to the board"
+                "the board keeps sending data, so it has not obeyed the request; check that the"
+                " cable carries data to the board"
             )
         if self.phase is Phase.RESETTING:
             self.phase = Phase.SETTLED

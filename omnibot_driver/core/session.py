@@ -42,8 +42,8 @@ class Session:
     """The driver's core for one board, across all its connections.
 
     * ``run``: whether to start the board whenever it is connected.
-    * ``axis_signs``: 1 or -1 for x, y and yaw, where the board's body axes differ from REP-103;
-      applied to commands and odometry.
+    * ``axis_signs``: factors for x, y and yaw: -1 where the board's body axis is opposite to
+      REP-103's, else 1; applied to commands and odometry.
     * ``control``: position of the board's control switch, which no board reports; None for a board
       without one.
     * ``obeys``: whether the robot can be expected to follow commands; False for a recording.
@@ -191,7 +191,7 @@ class Session:
     ) -> None:
         """Command a body velocity. If it raises CommandRefused, nothing changes.
 
-        ``age_s``: age of the command by its sender's stamp, in s; negative for a stamp in the
+        ``age_s``: age of the command in s, from its sender's stamp; negative for a stamp in the
         future. ``planar``: False if the sender also asked for motion out of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)

@@ -16,7 +16,7 @@ class Traits:
 
     * ``channels``: names of the lines to the board; a single line needs no name.
     * ``imu_period_s``: time between two ImuReadings, of which the board sends one in each tick of
-      its clock. None for a board without an IMU; its readings are stamped by their arrival.
+      its clock. None for a board without an IMU; its readings are stamped on arrival.
     * ``authorities``: the topics that may command motion.
     * ``requests``: the requests that the board supports.
     * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in the order of its values.

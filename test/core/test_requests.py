@@ -136,7 +136,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
     bench.run(0.5)
     answer = bench.ask(Request.RESET, 10.0)
     assert answer.success
-    assert "paused, as it was" in answer.message
+    assert "paused, as before the restart" in answer.message
     bench.run(3.0)
     assert bench.board.mode is BoardMode.PAUSED
     assert [command.kind for command in bench.board.commands].count("reset") == 1

@@ -18,11 +18,11 @@ class Until(Enum):
     """The condition that ends the refusal of motion commands."""
 
     NOTHING = "Motion is allowed"
-    RELEASE = "Motion is refused until a zero command, or no command for `cmd_vel_timeout`"
-    START = "Motion is refused until ~/start is called, as this is the second stop within 60 s"
+    RELEASE = "Motion is refused until you send a zero command, or no command for `cmd_vel_timeout`"
+    START = "Motion is refused until ~/start is called, because this is the second stop within 60 s"
     ESTOP = (
-        "Motion is refused until the e-stop is latched and released, as this is the second stop"
-        " within 60 s"
+        "Motion is refused until the e-stop is latched and released, because this is the second"
+        " stop within 60 s"
     )
 
 

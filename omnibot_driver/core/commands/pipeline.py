@@ -140,7 +140,7 @@ class CommandPipeline:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Return the command for a body velocity. Raises CommandRefused if it is not allowed.
 
-        ``age_s``: age of the command by its sender's stamp, in s; it shortens the time to expiry.
+        ``age_s``: age of the command in s, from its sender's stamp; it shortens the time to expiry.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -176,7 +176,7 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Record that ``count`` displacements so far were impossible; return user notices."""
+        """Record the number of impossible displacements since the driver began; return notices."""
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
             return []
@@ -185,7 +185,7 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Return the fault that the newest estimate shows or, without one, the displacement."""
+        """Return the fault seen in the newest estimate or, without estimates, in ``reading``."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()
@@ -250,7 +250,7 @@ class CommandPipeline:
             self.interlock.trip(now)
             why = (
                 "the robot is moving away from it; check that the board's switch is set to"
-                " position."
+                " positional control."
                 f" {self.interlock.until.value}"
             )
         else:

@@ -75,7 +75,7 @@ class SetpointStream:
         self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the order in effect; if another topic commands now, Stop is sent first."""
+        """Replace the order in effect; if the commanding topic changes, Stop is sent first."""
         rested = now - self._stop_at >= PACE_S
         if wanted is None or isinstance(wanted, Stop | EmergencyStop):
             begins = wanted is not self._standing

@@ -26,7 +26,10 @@ may be damaged, or may date from before the wheels turned."""
 PROOFS: Final = 2.0
 """Factor by which the duration of standstill is multiplied to get the time to wait for a proof."""
 RAREST_S: Final = 1.0
-"""Longest assumed period of displacements, in s; a longer displacement includes lost ones."""
+"""Longest assumed period of displacements, in s.
+
+A displacement of longer duration includes the motion of lost displacements.
+"""
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s: they may describe the time before Stop
 arrived."""
@@ -68,7 +71,7 @@ class StopProof:
 
     @property
     def takes_s(self) -> float:
-        """Time to wait for a proof, given the period of the displacements, in s."""
+        """Time in s to wait for a proof, given the period of the displacements."""
         return max(PROOFS * self._needed_s, UNDER_WAY_S + (AT_LEAST + 1) * self._period_s)
 
     def look(self, reading: DisplacementReading, now: float) -> None:

@@ -31,7 +31,7 @@ class Kinematics(Protocol):
         """Return the part of this twist that the wheels can produce without slip."""
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, ...]:
-        """Return the wheel rates in rad/s that make the feasible part of this twist."""
+        """Return the wheel rates in rad/s that produce the feasible part of this twist."""
 
     def body_twist(self, wheel_rates: Sequence[float]) -> BodyTwist:
         """Return the twist of the body whose wheels turn at these rates, in rad/s."""

@@ -30,7 +30,7 @@ class ImuEstimate:
 
 
 class BiasCorrector:
-    """Removes the IMU's biases; ``calibration`` finds the gyro's bias, also on request."""
+    """Removes the IMU's biases; ``calibration`` finds the gyro's bias, at rest or on request."""
 
     def __init__(self, board: Board, correction: ImuCorrection) -> None:
         self._board = board

@@ -20,7 +20,7 @@ from omnibot_driver.core.requests import RequestDone
 
 MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0
-"""Length of an observation that was not requested, in s."""
+"""Length in s of an observation that was not requested."""
 GAP_S: Final = 0.2
 """Longest pause between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0

@@ -23,7 +23,7 @@ _RADPS_PER_COUNT: Final = {
 }
 
 ACCEL_TOLERANCE: Final = 0.1
-"""Largest relative deviation from gravity of a working sensor, due to tolerance and bias."""
+"""Largest relative error, due to tolerance and bias, of the gravity that a working sensor reads."""
 
 Counts = tuple[int, int, int]
 

@@ -43,7 +43,7 @@ CALMING: Final = 0.95
 STILL: Final = 0.08
 """Largest change of the sensor's other values in a spike, as a fraction of the spike's leap.
 
-After the spike, each value may still differ from its value before by the same fraction.
+After the spike, each value may still differ from its value before the spike by this fraction.
 """
 END_OF_SCALE: Final = 0.99996
 """Value just below the largest positive word, as a fraction of full scale."""
@@ -102,7 +102,7 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Return the readings that are certain now, those of one kind in their order of arrival."""
+        """Return the readings that are certain now; those of one kind are in order of arrival."""
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):
@@ -205,7 +205,7 @@ class OutlierFilter:
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """Return this displacement with the rejected displacements before it counted as losses."""
+        """Add the rejected displacements to the losses before this one; return the result."""
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,
@@ -242,7 +242,7 @@ class _Spikes:
         """Return whether the previous values were a spike, and whether these values leap.
 
         ``periods``: number of periods since the previous values; ``topmost_bit``: size of the
-        highest bit of the values that a knock may move.
+        highest bit, for the values that a knock may move.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False

@@ -80,7 +80,7 @@ class StreamStatistics:
                 self._sent_imu = None
 
     def _miss_imus(self, reading: DisplacementReading) -> None:
-        """Count the lost IMU readings that displacements show, beyond those already counted."""
+        """Count the IMU readings that displacements show to be lost, unless already counted."""
         if self.imu_period_s is None:
             return
         if reading.duration_s is None or reading.restarted:

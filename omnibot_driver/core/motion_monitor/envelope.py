@@ -36,9 +36,9 @@ Overshoot is allowed only if the robot leaves a set-point other than rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""Yaw rate per speed, and speed per yaw rate, allowed for wheels that differ by some per cent."""
+"""Allowed yaw rate per speed, and speed per yaw rate, for wheels that differ by some per cent."""
 CHANGING_RADPS_PER_MPS: Final = 0.4
-"""Yaw rate per change of speed that is allowed for wheels that accelerate differently."""
+"""Allowed yaw rate per change of speed, for wheels that accelerate differently."""
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 """Factor that makes a yaw rate comparable to a velocity."""
@@ -53,8 +53,8 @@ def outside(
 ) -> tuple[float, float]:
     """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
 
-    ``explained``: velocities that the set-points explain, first that of the current set-point. If
-    the heading is unknown, only the magnitude of the linear velocity is checked.
+    ``explained``: velocities that the set-points explain; the current set-point's velocity is
+    first. If the heading is unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0

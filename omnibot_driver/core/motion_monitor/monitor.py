@@ -51,8 +51,8 @@ class Fault(Enum):
         "robot exceeds `fastest_linear_speed` or `fastest_angular_speed`, its physical limits"
     )
     UNCOMMANDED = "robot is moving without a command"
-    BLOCKED = "robot does not move although it is commanded"
-    HELD_BY_ESTOP = "the e-stop is released and the robot is commanded, but it does not move"
+    BLOCKED = "robot does not move although it is commanded to move"
+    HELD_BY_ESTOP = "the e-stop is released and the robot is commanded to move, but it stands still"
 
 
 STOPPED: Final = frozenset(

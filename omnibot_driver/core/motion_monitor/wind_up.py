@@ -19,7 +19,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 MOST_M: Final = 0.6
 """Largest distance in m that is made up for: what the integrators hold at full effort."""
 LONG_S: Final = 0.06
-"""Duration in s from which a displacement is regarded as long.
+"""Duration in s above which a displacement is regarded as long.
 
 A single long displacement does not prove that the robot is held: the robot may have reversed.
 """
@@ -56,8 +56,8 @@ class WindUp:
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
         """Subtract motion outside the envelope; return whether the wind-up explains the motion.
 
-        A wind-up explains any smaller motion. ``way_mps``, ``turn_radps``: speeds outside the
-        envelope, for ``seconds``.
+        A wind-up explains any motion shorter than ``way_m``. ``way_mps``, ``turn_radps``: speeds
+        outside the envelope, for ``seconds``.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds

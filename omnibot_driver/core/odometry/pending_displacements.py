@@ -44,7 +44,7 @@ class PendingDisplacements:
 
     @property
     def lost_s(self) -> float:
-        """Board time of the displacements that are missing before the first waiting one, in s."""
+        """Board time in s of the displacements that are missing before the first waiting one."""
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
     @property
@@ -53,7 +53,7 @@ class PendingDisplacements:
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
-        """Return the time without a report before the first waiting displacement, in s.
+        """Return the time in s without a report before the first waiting displacement.
 
         ``last_stamp_s``: stamp of the last displacement before the gap. The time is measured from
         this stamp if the first waiting displacement does not give its duration.
@@ -66,7 +66,7 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """Return the part of ``unheard_s`` that fits between the stamps around the gap, in s.
+        """Return the part of ``unheard_s``, in s, that fits between the stamps around the gap.
 
         This is at most the time from ``last_stamp_s`` to the stamp of the first displacement, minus
         the duration of that displacement.
@@ -80,7 +80,7 @@ class PendingDisplacements:
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
     def before(self, board: Pose) -> Pose:
-        """Return the pose at which the waiting displacements began if they end at ``board``."""
+        """Return the pose from which the waiting displacements lead to ``board``."""
         start = Pose(
             yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)
         )

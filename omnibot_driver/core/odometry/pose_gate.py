@@ -29,7 +29,8 @@ FARTHEST_RAD: Final = 1e5
 class PoseGate:
     """Decides which poses of the board are accepted.
 
-    * ``proved``: the last accepted pose; None before the first, and after it has become invalid.
+    * ``proved``: the last accepted pose; None before the first pose is accepted, and
+      after the last one has become invalid.
     * ``doubted``: the last unexpected pose, which the next pose must confirm; it is moved along
       with the robot. None if no pose is to be confirmed.
     """
@@ -47,7 +48,7 @@ class PoseGate:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Move the unconfirmed pose ``doubted`` along with an assumed motion in its axes."""
+        """Move the unconfirmed pose ``doubted`` by an assumed motion, given in that pose's axes."""
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)
 

@@ -51,7 +51,7 @@ class PoseTracker:
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
-        """Return the twist of a motion of ``seconds``: in REP-103's axes, and in the board's."""
+        """Return the twist of a motion that took ``seconds``, in REP-103's and the board's axes."""
         rolling = _times(tangent, self._size).over(seconds)
         if self._signed_size == self._size:
             return rolling, rolling
@@ -81,7 +81,7 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add the motion of a gap, which is known now, without spreading it over time."""
+        """Add the motion in a gap, now that it is known, without spreading it over time."""
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:

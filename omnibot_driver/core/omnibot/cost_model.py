@@ -7,7 +7,7 @@ module knows what a board is likely to send next, and how likely the line is to 
 does not know how interpretations are searched (``trellis``) or when one is accepted (``decoder``).
 
 Content is soft evidence: the cost of a frame's content stays below the cost of calling the frame
-damaged, so a true shock between two complete frames is delivered.
+damaged. So the frame of a true shock is delivered if it lies between two complete frames.
 """
 
 from math import ceil, floor
@@ -26,9 +26,12 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 # Damage by the line.
 ONE_BYTE: Final = 5.5
-"""Cost of a frame that lost or gained one byte, as about one frame in 250 does."""
+"""Cost of a frame that lost or gained one byte; about one frame in 250 does so."""
 TWO_BYTES: Final = 8.5
-"""Cost of a frame that lost or gained two bytes; below twice ``ONE_BYTE``, as losses cluster."""
+"""Cost of a frame that lost or gained two bytes.
+
+It is below twice ``ONE_BYTE``, because losses cluster.
+"""
 BROKEN_OFF: Final = 9.0
 """Cost of a frame whose last three or more bytes were lost in a burst."""
 HEADER_BYTE: Final = 7.5
@@ -36,13 +39,13 @@ HEADER_BYTE: Final = 7.5
 HEADER_IN_PLACE: Final = 4.0
 """Extra cost of a frame that gained bytes, if a header is where the frame should have ended."""
 BAD_RUN: Final = 6.0
-"""Cost of the beginning of a run of unexplained bytes (a bad run), from a lost burst or noise."""
+"""Cost of beginning a run of unexplained bytes (a bad run), which a lost burst or noise causes."""
 BAD_TAIL: Final = 2.5
 """Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
 UNKNOWN_START: Final = 1.0
 """Cost if the first bytes are the rest of a frame: after a silence, a whole frame is likelier."""
 BAD_BYTE: Final = 0.35
-"""Cost of each byte of a bad run; ``BAD_RUN`` and 14 bytes cost more than any true IMU frame."""
+"""Cost of each byte of a bad run; ``BAD_RUN`` plus 14 bytes costs more than any true IMU frame."""
 BAD_HEADER: Final = 0.5
 """Cost of a header within a bad run; a header may arise by chance, or from a gyro at rest."""
 GAP: Final = 5.0
@@ -93,7 +96,7 @@ IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""Largest rounding error of a sum of deltas in 0.1 mrad: a constant part, and a part per delta.
+"""Largest rounding error of a sum of deltas, in 0.1 mrad: a constant part, and a part per delta.
 
 The error of five deltas is at most 4.
 """

@@ -2,9 +2,9 @@
 
 """The fast path for frames that no evidence speaks against, and for shocks that continue.
 
-It accepts only frames that the decoder's own loop would also accept, by their cost from ``weigh``;
-a test compares both ways. All other frames are left to that loop. A single IMU frame in a read has
-an even faster path (``single_imu``).
+It accepts a frame only if the decoder's own loop, with the cost from ``weigh``, would accept it
+too; a test compares the two results. All other frames are left to that loop. A single IMU frame in
+a read has an even faster path (``single_imu``).
 """
 
 import struct

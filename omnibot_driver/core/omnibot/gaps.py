@@ -97,7 +97,7 @@ class InterFrameGaps:
             self._trust(sharp=True, between=True)
 
     def stands_out(self, pause_s: float, arrived: int) -> bool:
-        """Return whether the line was idle before these bytes for longer than within any frame."""
+        """Return whether the line was idle before these bytes for longer than ``GAP_S``."""
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:

@@ -165,7 +165,7 @@ def _by_the_next_frame(
     """Return the cause of a pause by the frame after it, which begins at ``start``.
 
     The line was idle if that frame has a pause too, which ended whole ticks after the first pause.
-    The reader was late if that frame has another pause or none. ``first``: the read that ended the
+    The reader was late if that frame has no such pause. ``first``: the read that ended the
     first pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE

@@ -17,8 +17,8 @@ parser completes the frame with the next byte that is sent.
    bytes of its payload could swallow the header after the zeros, and such a frame commands motion
    as well.
 2. *Nothing follows a motion frame.* A motion frame that was cut has no effect until the next
-   transmission. Its zeros complete the cut frame, and the next frame replaces that one 12 bytes
-   (1.0 ms at 115200 baud) later. Zeros right after a motion frame would complete a cut frame at
+   transmission. Its zeros complete the cut frame, but 12 bytes (1.0 ms at 115200 baud) later the
+   next frame replaces the cut one. Zeros right after a motion frame would complete a cut frame at
    once, and that frame would then be in force until the next repetition. Even a parser that
    discards a cut frame after a pause would accept it.
 3. *A payload without its header is harmless.* If the header is lost, a parser looks for letters

@@ -36,7 +36,7 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""Least extra cost of any alternative to a sure frame, which makes it 30 times less likely."""
+"""Least extra cost of any alternative to a sure frame: the alternative is 30 times less likely."""
 STEP: Final = 5.5
 """First margin of the cost limit above the lower bound; increased until a path is found."""
 BEYOND: Final = 0.025

@@ -158,7 +158,7 @@ class Diagnosis:
             )
         elif waiting > BUSY_SHARE:
             message = (
-                "complete, but read late: the reader waits"
+                "measurements are complete, but read late: the reader waits"
                 f" {waiting:.0%} of the time for the processor"
             )
         values = {

@@ -60,8 +60,9 @@ class CommandFigures:
 class ImuFigures:
     """The figures of the IMU.
 
-    ``gravity_mps2`` and ``noise_radps`` were measured at the last standstill; None before it;
-    ``advice``: which parameter contradicts the measured gravity, in a sentence.
+    ``gravity_mps2`` and ``noise_radps`` were measured at the last standstill; they are None if
+    there was no standstill. ``advice``: which parameter contradicts the measured gravity, in a
+    sentence.
     """
 
     bias_radps: Vector3

@@ -15,7 +15,7 @@ of little use, and is not kept.
 
 With earliest points, every pair of a latest and an earliest point bounds the slope, and the line
 runs in the middle of all bounds. If an adapter's timer hides the true arrival times for seconds,
-the error is at most half of the time that it hides. Without earliest points, or if the bounds
+the error is at most half the gap between the bounds. Without earliest points, or if the bounds
 contradict each other (which shows that reads were late), the line is laid as closely as possible
 under the latest points: along an edge of their lower convex hull. A read that ends within a sample
 cuts that sample; a cut sample has not waited to be read. So if any latest points are of cut

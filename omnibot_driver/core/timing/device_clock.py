@@ -36,7 +36,7 @@ LARGEST_LOSS_TICKS: Final = 25
 If more are missing, everything known about the clock is forgotten.
 """
 BEAT_READS: Final = 12
-"""Number of consecutive reads of which at least one has little delay.
+"""Among this many consecutive reads, at least one has little delay.
 
 If an adapter delivers every 16 ms, the phase of the tick at which reads occur repeats after five
 reads, so 12 reads see each phase twice.
@@ -47,7 +47,7 @@ CALM: Final = 0.45
 Two reads in a row must be this near to the line. The limit must be less than half a period.
 """
 LARGEST_RISE: Final = 0.02
-"""Largest extra step of the stamps per tick, as a fraction of a period, if the line moved later."""
+"""Largest extra step of the stamps per tick, as a fraction of a period, if the line is raised."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
@@ -173,7 +173,7 @@ class DeviceClock:
         return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """Return each reading's tick, counted with the known losses; a displacement corrects it."""
+        """Return each reading's tick, counted with known losses and corrected by displacements."""
         ticks: list[int] = []
         for reading in readings:
             if isinstance(reading, ImuReading):
@@ -244,8 +244,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
 
-        If another tick was read just before, the new delay replaces that of the other tick, because
-        both had waited to be read.
+        If another tick was read just before, the new delay replaces the delay of the other tick,
+        because both had waited to be read.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
