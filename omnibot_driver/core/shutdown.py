@@ -69,7 +69,7 @@ class Shutdown:
         return packets + self._estop_again()
 
     def broken_off(self) -> Packets:
-        """Return the packets to write after a write failed half-way, before the port is closed."""
+        """Return the packets to write before the port is closed, if a write failed half-way."""
         return self._board.wake() + self._estop_again()
 
     def _estop_again(self) -> Packets:

@@ -112,7 +112,7 @@ class GyroCalibration:
         self._look = Look()
         self._token: object = None
         self.wake_at = math.inf
-        """Time at which a running measurement fails, in s; infinity while nothing is measured."""
+        """Deadline of a running measurement, in s; infinity while nothing is measured."""
 
     @property
     def measuring(self) -> bool:

@@ -57,7 +57,7 @@ BACK: Final = 0.25
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    ``force_step_mps2``: change of specific force between two readings that is always allowed;
+    ``force_step_mps2``: always allowed change of specific force between two readings;
     ``full_scale_mps2``: full scale of the accelerometer, infinite where its readings are not
     integers.
     """

@@ -29,7 +29,7 @@ row, or after two long ones, at the earliest.
 class FollowingError:
     """The sum of a robot's motion outside its envelope.
 
-    ``slack_mps``, ``slack_radps``: speeds outside the envelope that are not an error; ``outside``:
+    ``slack_mps``, ``slack_radps``: speeds outside the envelope that are tolerated; ``outside``:
     whether the last displacement was outside the envelope by more than these speeds.
     """
 

@@ -32,7 +32,7 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time in s at rest that shows that a robot has obeyed a stop; later motion has another cause."""
+"""Time in s: a robot at rest for this long has obeyed a stop; later motion has another cause."""
 STOPS_S: Final = 5.0
 """Time in s for which one Stop is repeated automatically while the robot moves."""
 

@@ -160,8 +160,8 @@ class Uncertainty:
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
         """Add a gap in the reports; ``fastest_mps`` and ``fastest_radps`` limit the motion in it.
 
-        The speeds before and after the gap are known. A robot that accelerates and brakes again in
-        between deviates by at most a·t²/4 from motion at constant speed, and never by more than its
+        The speeds before and after the gap are known. A robot that accelerates and brakes in the
+        gap deviates by at most a·t²/4 from motion at constant speed, and never by more than its
         largest speed allows.
         """
         square = duration_s * duration_s / 4

@@ -65,7 +65,7 @@ ENDS_IN_NOISE: Final = 2.0
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""Cost of an IMU frame, by the number of words that differ much from the frame before.
+"""Cost of an IMU frame, by the number of words that differ much from those of the frame before.
 
 One word that differs much makes a frame odd; a shock changes several words.
 """
