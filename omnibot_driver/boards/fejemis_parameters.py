@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of a Fejemis that not all boards have. Must not know ROS.
+"""The parameters of a Fejemis, except those that all boards have. Must not know ROS.
 
 Values that the two Teensys store are unset by default: the driver writes such a value only if the
 user sets it (`fejemis_values.py`).
@@ -19,9 +19,9 @@ FRONT_PORT: Final = (
         "front_port",
         "/dev/ttyACM1",
         "",
-        "Serial device of the front Teensy; port is that of the drive Teensy. If the two are"
-        " swapped, the driver detects it by the heartbeats. Not used if port is sim:// or"
-        " replay://.",
+        "Serial device of the front Teensy; port is the device of the drive Teensy. If the two"
+        " devices are swapped, the driver detects this from the heartbeats. Not used if port is"
+        " sim:// or replay://.",
         fixed=True,
     ),
 )
@@ -121,8 +121,8 @@ DRIVING: Final = (
         "line_sums",
         "auto",
         "",
-        "Whether each line begins with a checksum (;NN). auto: if the heartbeats of that Teensy"
-        " do; on: always; off: never.",
+        "Whether each line begins with a checksum (;NN). auto: if the Teensy's heartbeats do;"
+        " on: always; off: never.",
         choices=("auto", "on", "off"),
         fixed=True,
     ),

@@ -207,7 +207,10 @@ class FejemisTopics:
         return response
 
     def _lift(self, link: Any) -> Callable[..., None]:
-        """Return the callback of ``lift_cmd``, which obeys 0 V at any age and in any state."""
+        """Return the callback of ``lift_cmd``.
+
+        The callback obeys a command of 0 V in any state, however old the command is.
+        """
 
         def lift(session: Session, message: Float32, now: float) -> None:
             board = cast(FejemisBoard, session.board)
@@ -258,7 +261,7 @@ class FejemisTopics:
 
 
 def _why_not_connected(what: str, session: Session) -> str:
-    """Return why ``what`` is refused as the boards are not connected; empty if they are."""
+    """Return why ``what`` is refused without a connection; empty if the boards are connected."""
     if session.state in ("disconnected", "connecting"):
         return f"{what} refused: {session.board.refusal or NOT_CONNECTED}"
     return ""

@@ -44,12 +44,12 @@ _WHEELS: Final = ("wheel_radii", "gear", "encoder_ticks")
 
 
 def require_two_ports(values: Mapping[str, Any]) -> None:
-    """Reject the same device for both Teensys, as each Teensy has its own port."""
+    """Reject the same device for both Teensys, because each Teensy has its own port."""
     port, front = (str(values[name]) for name in ("port", "front_port"))
     if port == front or (port.startswith("/") and _same(port, front)):
         raise ParameterError(
-            f"parameter 'front_port' must not be '{front}', which is 'port': the drive and the"
-            " front Teensy have a port each; `ls /dev/serial/by-id/` shows them"
+            f"parameter 'front_port' must not be '{front}', the value of 'port': the drive"
+            " and the front Teensy have a port each; `ls /dev/serial/by-id/` shows the ports"
         )
 
 
@@ -63,8 +63,8 @@ def require_whole_settings(values: Mapping[str, Any]) -> None:
         values[name] is not None for name in (*_WHEELS, "steering_distance")
     ):
         raise ParameterError(
-            "parameter 'track' must be set together with others: set 'steering_distance' too, or"
-            " 'wheel_radii', 'gear' and 'encoder_ticks', or leave 'track' unset"
+            "parameter 'track' must be set together with others: either set 'steering_distance'"
+            " too, or set 'wheel_radii', 'gear' and 'encoder_ticks' too, or leave 'track' unset"
         )
 
 

@@ -148,8 +148,8 @@ DRIVING: Final = (
         "checksum",
         True,
         "",
-        "Whether the board verifies checksums (0x11). It cannot change while the driver runs,"
-        " because the stop command of the guard process depends on it.",
+        "Whether the board verifies checksums (0x11). This parameter cannot change while the driver"
+        " runs, because the stop command of the guard process depends on the parameter.",
         fixed=True,
     ),
 )
@@ -218,8 +218,8 @@ def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
         name,
         default_s,
         "s",
-        f"Period of the {what}; 0 turns it off. The board cannot receive while it sends, so it"
-        f" misses more commands with a shorter period.{note}",
+        f"Period of the {what}; 0 turns it off. The board cannot receive while it sends, so"
+        f" with a shorter period it misses more commands.{note}",
         low=0.0,
         high=LONGEST_PERIOD_S,
         unset=not default_s,
@@ -260,7 +260,7 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_possible_periods(values: Mapping[str, Any]) -> None:
-    """Reject periods below ``SHORTEST_PERIOD_S``, and a ``ticks_period`` above 0.5 s or 0 (off).
+    """Reject periods below ``SHORTEST_PERIOD_S``, and a ``ticks_period`` of 0 (off) or above 0.5 s.
 
     With a period near 0 the public firmware would always be sending, and would miss all commands.
     """

@@ -74,7 +74,7 @@ def remark(reading: RecordReading) -> str:
 
 
 def file_name(kind: RecordKind, at_s: float) -> str:
-    """Return the file name of a record that ended at this time, in s of UTC since 1970."""
+    """Return the file name of a record that ended at ``at_s``, in s of UTC since 1970."""
     return f"{kind.value}_{datetime.fromtimestamp(at_s, UTC):%Y%m%dT%H%M%S_%f}.csv"
 
 

@@ -170,7 +170,7 @@ class LoisEcuTopics:
         return float(self._values["cmd_vel_timeout"])
 
     def _drive(self, session: Session, message: Float32MultiArray, now: float) -> None:
-        """Command the wheel rates for the motor duties, in percent, in the message."""
+        """Command the wheel rates that correspond to the message's motor duties, in percent."""
         duties = list(message.data)
         require_finite("duty_cmd", duties)
         if len(duties) != 2:

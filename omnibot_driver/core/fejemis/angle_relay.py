@@ -4,9 +4,10 @@
 
 If two characters whose codes add up to 99 are lost, the sum (checksum) of a line does not change.
 So the driver sends an angle in digits without such a pair; to get these digits, it rounds the angle
-by at most half a degree. The rounding error is added to the next angles, so the mean is right. Some
-angles to the right contain a ``6`` that rounding cannot avoid. If the minus sign and this ``6`` are
-both lost, the sum does not change, and the board receives an angle of less than 10° to the left.
+by at most half a degree. The rounding error is added to the next angles, so the mean is correct.
+Some angles to the right contain a ``6`` that rounding cannot avoid. If the minus sign and this
+``6`` are both lost, the sum does not change, and the board receives an angle of less than 10° to
+the left.
 
 Without sums, the board does not detect any loss. So the driver sends whole degrees: the loss of a
 digit never makes a whole number larger, so the received angle never exceeds 90°. Beyond 90°, the
@@ -28,8 +29,7 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""A damaged angle to the right may arrive as an angle to the left only below this limit, in
-degrees."""
+"""Largest angle to the left, in degrees, that damage may make of an angle to the right."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

@@ -143,7 +143,7 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines, as the ports are closed; return the failure of a job."""
+        """Discard incomplete lines, because the ports are closed; return a failed job's result."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -171,7 +171,7 @@ class FejemisBoard(Board):
             self._upkeep.machine.off()
 
     def leave(self) -> None:
-        """Switch brush and lift off at once, as the driver ends; the wheels may stop later."""
+        """Switch brush and lift off at once, because the driver ends; the wheels may stop later."""
         self._upkeep.machine.off()
 
     def elapse(self, now: float) -> list[Reading]:

@@ -38,7 +38,7 @@ ON: Final[Mapping[Role, tuple[Written, ...]]] = {
 EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
-"""Relative difference allowed when a number is read back, as boards print few digits."""
+"""Relative difference allowed when a number is read back, because boards print few digits."""
 DIGIT: Final = 6e-4
 
 
@@ -56,7 +56,7 @@ class Configuration:
         self.begin()
 
     def begin(self) -> None:
-        """Read all numbers and write the settings again, as the board may have other values now."""
+        """Read all numbers and write the settings again: the board may have other values now."""
         self.told.clear()
         self._once.clear()
         self._next_at = -math.inf

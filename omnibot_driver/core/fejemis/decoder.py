@@ -84,7 +84,7 @@ class FejemisDecoder:
         return found
 
     def flush(self, now: float) -> list[Message]:
-        """Discard an incomplete line, as the port is closed; return an empty list."""
+        """Discard an incomplete line, because the port is closed; return an empty list."""
         if self._held or self._cut:
             self._damaged(len(self._held))
         self._held, self._cut = b"", False
@@ -114,7 +114,7 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """Learn whether lines have sums from a heartbeat, which a board sends without a request."""
+        """Learn from a heartbeat, which comes without a request, whether lines have sums."""
         if self._line_sums != "auto":
             self.contradicted = with_sum is not self.sums
             return

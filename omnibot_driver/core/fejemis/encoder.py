@@ -62,7 +62,7 @@ class Pair(Protocol):
 
 
 class Encoder:
-    """Encodes orders; ``held``: the speed is limited, as the front wheel is not at its angle yet.
+    """Encodes orders; ``held``: the speed is limited until the front wheel is at its angle.
 
     ``restless``: whether to send the lines again with each front angle: while the speed is limited,
     and always if lines have no checksums, so that a damaged line is replaced after 15 ms.

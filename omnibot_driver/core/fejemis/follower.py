@@ -15,7 +15,7 @@ FOLLOWS_WITHIN_S: Final = 1.0
 is found."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
-"""Deviation in rad from the commanded angle that is not a fault while the robot drives."""
+"""Deviation from the commanded angle, in rad, that is tolerated while the robot drives."""
 MOVED_RAD: Final = math.radians(3.0)
 """Angle in rad by which a stuck wheel must turn before motion is allowed again."""
 AGAIN_WITHIN_S: Final = 60.0
@@ -48,7 +48,7 @@ class Follower:
         self._since, self._from_rad = math.inf, math.nan
 
     def start(self) -> None:
-        """Forget all faults, as the user has called ~/start."""
+        """Forget all faults, because the user has called ~/start."""
         self.refusal, self._fault_at = "", -math.inf
 
     def aim(self, angle_rad: float, within_rad: float = FOLLOWS_RAD) -> None:

@@ -17,7 +17,7 @@ HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all but the frame counter."""
 SICK_LINES: Final = 3
-"""Number of lines in a row that must report a fault of the sensor, as a few may be damaged."""
+"""Number of lines in a row that must report a fault of the sensor: a few lines may be damaged."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Accepted jump of the angle in degrees, in addition to the motion of the fastest servo."""
@@ -101,7 +101,7 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Return whether the wheel can have reached the angle, or two angles confirm a jump."""
+        """Return True if the wheel can have reached the angle, or if two angles confirm a jump."""
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (

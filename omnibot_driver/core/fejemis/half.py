@@ -38,7 +38,7 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 ``confs`` is subscribed, not requested: if the request ``confsi`` loses its last letter, the board
 reads it as a command that sets the geometry to zero."""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
-"""The stream of each board without which the robot must not be driven."""
+"""For each board: the stream without which the robot must not be driven."""
 TOGETHER: Final = ("gyro", "acc")
 """Streams subscribed in one packet, so that the board sends both in the same cycle."""
 AGAIN_S: Final = 0.5
@@ -96,7 +96,7 @@ class Half:
 
     @property
     def unsure(self) -> bool:
-        """Whether the board may have restarted, so it may lack the user's settings."""
+        """Whether the board may have restarted, and so may lack the user's settings."""
         return self._unsure_at is not None
 
     @property
@@ -144,7 +144,7 @@ class Half:
         self._at[keyword] = now
 
     def subscribe_again(self) -> None:
-        """Subscribe to all streams again, as the board may have forgotten its subscriptions."""
+        """Subscribe to all streams again: the board may have forgotten its subscriptions."""
         self._at = {key: at for key, at in self._at.items() if key == "hbt"}
         self._next_at = -math.inf
         self.ready = False
@@ -217,7 +217,7 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """Accept the first identity at once, and another one only if two heartbeats agree."""
+        """Accept the first identity at once, a different identity only if two heartbeats agree."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self.identity:
@@ -246,7 +246,7 @@ class Half:
 
 
 def keyword_of(message: Message) -> str:
-    """Return the keyword of the stream to which a message belongs; empty if it is in no stream."""
+    """Return the keyword of the stream to which a message belongs; empty without such a stream."""
     if isinstance(message, Distance):
         return message.keyword
     return _KEYWORDS.get(type(message).__name__, "")

@@ -43,7 +43,7 @@ class ImuSamples:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the count and the phase, as the board's streams start again."""
+        """Forget the count and the phase, because the board's streams start again."""
         self._count = 0
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
@@ -63,8 +63,8 @@ class ImuSamples:
         """Return the board's time of the next sample, in s.
 
         ``arrived_s``: the sample's arrival in the board's time. ``not_before_s``: the board's time
-        of the pose that came before the sample. ``skipped``: count of samples before this one that
-        were left out.
+        of the pose that came before the sample. ``skipped``: count of samples that were left out
+        before this one.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()

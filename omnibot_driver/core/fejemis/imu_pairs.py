@@ -31,7 +31,7 @@ Kind = Literal["gyro", "acc"]
 
 PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
-"""Longest delay in s between two lines that are a pair without further evidence."""
+"""Longest delay in s between two lines that are accepted as a pair without further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """The evidence for which line comes first is a sum of pauses in s. From the sum ``KNOWN_S`` on, the
@@ -78,7 +78,7 @@ class ImuPairs:
         self.begin()
 
     def begin(self) -> None:
-        """Forget all lines and their order, as the board's streams start again."""
+        """Forget all lines and their order, because the board's streams start again."""
         self.first: Kind | None = None
         """The keyword of a sample's first line; None while unknown."""
         self._evidence_s = 0.0
@@ -107,7 +107,10 @@ class ImuPairs:
         self._line("acc", acceleration, now)
 
     def other(self, kind: str) -> None:
-        """Take a line other than gyro and acceleration; it is sent with every second sample."""
+        """Take a line of a ``kind`` other than gyro and acceleration.
+
+        The board sends such lines with every second sample.
+        """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
             self._waiting = None

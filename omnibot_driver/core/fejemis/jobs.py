@@ -3,10 +3,10 @@
 """Requests to the boards other than motion, one job at a time, and how their success is proved.
 
 The boards do not acknowledge requests. A calibration has succeeded when new offsets were read twice
-with the same result; a single answer is not enough, as 1 in 99 damaged answers passes its checksum.
-Loading a configuration has succeeded when the configuration was read after the request. Saving
-cannot be checked: the job only waits until both boards have sent heartbeats after the request. The
-module does not read a clock.
+with the same result; a single answer is not enough, because 1 in 99 damaged answers passes its
+checksum. Loading a configuration has succeeded when the configuration was read after the request.
+Saving cannot be checked: the job only waits until both boards have sent heartbeats after the
+request. The module does not read a clock.
 """
 
 import math
@@ -29,8 +29,8 @@ AGAIN_S: Final = 0.4
 SAID: Final = 3
 """How many times the request of a job is sent, except for a calibration."""
 UNCHANGED_S: Final = 2.4
-"""If the offsets are unchanged this time in s after the request for a calibration, the request is
-regarded as lost."""
+"""If the offsets are still unchanged ``UNCHANGED_S`` s after the request for a calibration, the
+request is regarded as lost."""
 CALIBRATIONS: Final = 2
 """Largest number of requests for one calibration; it is requested again while the offsets are
 unchanged."""
@@ -122,7 +122,7 @@ class Jobs:
             self.cancel(why)
 
     def restarted(self, role: Role) -> None:
-        """Fail the running job, as the board ``role`` has restarted.
+        """Fail the running job, because the board ``role`` has restarted.
 
         A power-off fails, and is cancelled, only if the drive board has restarted.
         """
@@ -133,7 +133,7 @@ class Jobs:
             self.powering_off = False
 
     def keep_power(self) -> None:
-        """Cancel a requested power-off, as the user has called ~/start."""
+        """Cancel a requested power-off, because the user has called ~/start."""
         if self.powering_off:
             self._stay_on(SAID)
         if self.job is Job.POWER_OFF:
@@ -141,7 +141,7 @@ class Jobs:
         self.powering_off = False
 
     def begin(self) -> None:
-        """Fail the running job, as the connection is new; a requested power-off stays in force."""
+        """Fail the running job: the connection is new. A requested power-off stays in force."""
         self.cancel("the port was lost meanwhile; call again once it is back")
 
     def due(self, now: float) -> Lines:
@@ -231,7 +231,7 @@ class Jobs:
         which = "both boards" if self.job in (Job.SAVE, Job.LOAD) else "the drive board"
         then = "call again"
         if self.job is Job.POWER_OFF:
-            then = "it may still cut the power: call ~/start to keep it on, or call again"
+            then = "the board may still cut the power: call ~/start to prevent this, or call again"
         self._finish(False, f"{self.job.value} was not confirmed by {which}; {then}")
 
     def _finish(self, success: bool, message: str) -> None:

@@ -19,7 +19,7 @@ OFF: Final = (b"motv 0 0", b"brush 0")
 TIMES: Final = 3
 BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
-"""Period in s at which ``brush 1`` is repeated while the brush is on, as a line may be lost."""
+"""Period in s at which ``brush 1`` is repeated while the brush is on: a line may be lost."""
 PACE_S: Final = 0.05
 """Shortest time in s between two lift commands, or between two light commands. If more commands
 come within this time, only the newest is sent."""
@@ -93,7 +93,7 @@ class Machine:
         self._led_at = max(now, self._led_again_at)
 
     def begin(self) -> None:
-        """Switch brush and lift off and send the colour again, as a board has restarted."""
+        """Switch brush and lift off and send the colour again, because a board has restarted."""
         self.off()
         self._led_left = TIMES if self.colour else 0
         self._led_at = -math.inf if self.colour else math.inf

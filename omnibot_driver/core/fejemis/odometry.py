@@ -9,9 +9,9 @@ difference of the two poses differ by more than rounding explains, lines were lo
 turned quickly; then the displacement is the difference of the poses. The displacements add up to
 the pose.
 
-A pose that the robot cannot have reached is held back until the next pose comes. If both poses
-agree, either the last accepted pose was wrong, or the board has begun a new frame (command
-``enc0``).
+A pose that the robot cannot have reached is held back until the next pose comes. If the next pose
+agrees with the held pose, either the last accepted pose was wrong, or the board has begun a new
+frame (command ``enc0``).
 """
 
 import math
@@ -22,7 +22,7 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between pose and speeds that one displacement corrects.
+"""Each displacement corrects this fraction of the difference between pose and speeds.
 
 The fraction applies if rounding alone explains the difference.
 """

@@ -16,7 +16,7 @@ from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, STOP
 
 
 def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Return the front board's line with few digits, as short lines are damaged less often."""
+    """Return the front board's line with few digits, because short lines are damaged less often."""
     return b"rc 2 %s %s" % (_short(speed_mps, 4), _short(math.degrees(turn_radps), 2))
 
 

@@ -36,7 +36,7 @@ class Polls:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the answers and start again with the first request, as the board is new."""
+        """Forget the answers and start again with the first request, because the board is new."""
         self.told.clear()
         self._turn = 0
         self._next_at = self._sonar_at = -math.inf

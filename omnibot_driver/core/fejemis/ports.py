@@ -85,7 +85,7 @@ class Ports:
             if half.identity is not None and half.role is None:
                 return (
                     f"the board at `{name}` has the id {half.identity}; a Fejemis has 90 (drive)"
-                    " and 91 (front): connect the right board, or set its id"
+                    " and 91 (front): connect the correct board, or set its id"
                 )
         first, second = self.halves
         heard = first.heartbeat is not None and second.heartbeat is not None
@@ -93,7 +93,7 @@ class Ports:
             missing = "front" if first.role == "drive" else "drive"
             return (
                 f"both ports lead to a {first.role} board: connect a {missing} board to one of"
-                " them, and check `port` and `front_port`"
+                " these ports, and check `port` and `front_port`"
             )
         return ""
 

@@ -139,7 +139,7 @@ class StampedReadings:
         self._stamps.append(stamp_s)
 
     def restart(self) -> None:
-        """Do nothing, as the timestamps come from the board's own times."""
+        """Do nothing, because the timestamps come from the board's own times."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None

@@ -31,7 +31,7 @@ class Watch:
         self.begin()
 
     def begin(self) -> None:
-        """Forget earlier timeouts, as new connections begin."""
+        """Forget earlier timeouts, because new connections begin."""
         self.blind = self.unposed = self._sick = self._stalled = False
         self._begun_at = math.inf
         self._patient_until = -math.inf

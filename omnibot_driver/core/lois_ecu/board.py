@@ -264,7 +264,7 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """Return RPM 0/0, as the board has no e-stop command; nothing in a terminal mode."""
+        """Return RPM 0/0, because the board has no e-stop command; nothing in a terminal mode."""
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
@@ -290,7 +290,7 @@ class LoisEcuBoard(Board):
     # Functions that only this board has
 
     def set_led(self, on: bool, now: float) -> None:
-        """Switch the board's LED on or off; send the line several times, as lines may be lost."""
+        """Switch the board's LED on or off; send the line several times: lines may be lost."""
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:

@@ -14,8 +14,8 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of groups of ticks after which odometry with its own command byte (0x20) shows a board as
-in the manual."""
+"""Number of groups of ticks that must have come before odometry with its own command byte (0x20)
+proves that the board is one as in the manual."""
 UNCOUNTED_M: Final = 0.06
 """Distance in m that wheels roll backward without a negative count before the driver concludes that
 ticks do not count backward."""

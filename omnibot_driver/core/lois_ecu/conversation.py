@@ -225,7 +225,7 @@ class LoisConversation:
 
     @property
     def wake_at(self) -> float:
-        """Next time at which to call ``due``, and also ``receive`` with b""."""
+        """Time at which to call ``due`` next, and to call ``receive`` with b""."""
         return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property

@@ -174,8 +174,8 @@ class SetTerminalMode:
 class Reset:
     """A command that resets the board.
 
-    By the manual, the reset affects controllers, interfaces and counters; the firmware resets only
-    the ticks.
+    The manual says that the reset affects controllers, interfaces and counters; the firmware resets
+    only the ticks.
     """
 
 
@@ -204,7 +204,7 @@ Command = (
 
 @dataclass(frozen=True, slots=True)
 class EStopButton:
-    """A press or release of the e-stop button; at either, the board zeroes its set-points."""
+    """A press or release of the e-stop button; at both events the board zeroes its set-points."""
 
     pressed: bool
 
@@ -246,7 +246,8 @@ class Heading:
 class Ticks:
     """Encoder ticks since the board started or was reset, and the board's time of sending them.
 
-    ``time_counts``: ns by the manual, ms in the firmware; wraps at 2³². Ticks are signed.
+    ``time_counts``: in ns by the manual, in ms by the public firmware; wraps at 2³². Ticks are
+    signed.
     """
 
     time_counts: int

@@ -77,8 +77,8 @@ def _advice(seen: bytes) -> str:
         )
     if len(_NMEA.findall(seen)) >= 3:
         return (
-            "the port carries NMEA sentences: it is a GPS or a compass, or the board is in a"
-            " terminal mode; set terminal_mode to host, or choose another port"
+            "the port carries NMEA sentences: they come from a GPS or a compass, or from the"
+            " board in a terminal mode; set terminal_mode to host, or choose another port"
         )
     lengths = [len(line.replace(b"\r", b"")) for line in _LINE.findall(seen)]
     if len(lengths) >= 5:

@@ -36,8 +36,7 @@ MOST_RPM: Final = 50
 """Largest set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""Number of set-points after a Stop before each of which RPM 0/0 is sent, because lines may be
-lost."""
+"""RPM 0/0 is sent before each of this many set-points after a Stop, because lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

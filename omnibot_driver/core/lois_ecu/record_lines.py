@@ -67,7 +67,7 @@ class RecordAssembler:
         self._damaged = self.begun
 
     def cut_off(self) -> None:
-        """Discard an unfinished record, as another message came before its end."""
+        """Discard an unfinished record, because another message came before its end."""
         if self.begun:
             self._drop()
 

@@ -65,7 +65,7 @@ class ReportedSpeed:
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """Subtract the distance since the reported speed last changed, as the wheel was at rest.
+        """Subtract the distance since the reported speed last changed: the wheel was at rest.
 
         If the wheel has not turned since it was commanded to start, subtract the distance since the
         start.

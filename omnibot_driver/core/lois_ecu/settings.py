@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of a LOIS ECU and its robot that a user must give, as the board does not report them."""
+"""Settings of a LOIS ECU and its robot that the user must give: the board does not report them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

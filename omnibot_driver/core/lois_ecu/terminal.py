@@ -33,7 +33,7 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """Mode of a sensor that was written to the board; None once the board's own messages arrive
+        """The sensor's mode that was written to the board; None once the board's own messages arrive
         again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""

@@ -37,8 +37,8 @@ TRAITS: Final = Traits(
             "check `wheel_radius`, `track` and `ticks_per_revolution`; in duty mode, `duty_scale`"
         ),
         Fault.BLOCKED: (
-            "check motor power, and whether the wheels are blocked; check the gains that were set"
-            " and `low_pass`, or in duty mode `duty_scale`"
+            "check motor power, and whether the wheels are blocked; check `low_pass` and the gains"
+            " that were set, or in duty mode `duty_scale`"
         ),
         Fault.HELD_BY_ESTOP: (
             "check motor power, and whether the e-stop button is held; the board reports each"

@@ -15,7 +15,7 @@ HEARD_S: Final = 0.008
 """Time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""Period of the speed controller in s: ``STEP_S`` by the manual, ``FIRMWARE_STEP_S`` in the public
+"""Period of the speed controller in s: ``STEP_S`` in the manual, ``FIRMWARE_STEP_S`` in the public
 firmware."""
 
 CommandKind = Literal["rpm", "duty"]

@@ -39,7 +39,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=get_args(Reverse),
         default="mirrored",
         help="front wheel's angle at a negative speed: mirrored (the default) takes the angle of"
-        " the same curve, clamped stays at 90 degrees",
+        " the same curve driven forward, clamped stays at 90 degrees",
     )
     for name, effect in _SWITCHES:
         parser.add_argument(f"--{name}", action="store_true", help=effect)
@@ -96,8 +96,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="SECONDS:HALF:WHAT",
-        help="fault of the drive or the front half, SECONDS after the start; may be repeated."
-        f" WHAT for both: {', '.join(FAULTS)}; for front only: {', '.join(SENSOR_FAULTS)}",
+        help="fault of the drive or the front half, SECONDS after the start; the option"
+        f" may be repeated. WHAT for both halves: {', '.join(FAULTS)}; for the front half only:"
+        f" {', '.join(SENSOR_FAULTS)}",
     )
 
 

@@ -32,10 +32,10 @@ class Firmware:
     shows_source: the heartbeat of the drive Teensy has the source of the last ``rc``; otherwise
         only 10 or -1.
     single_precision: times are float32, so after an hour they have steps of 0.2 ms.
-    says_start: a boot ends with the line ``# Starting main loop``. If that line is damaged, the
-        host sees the same as from a firmware without it.
+    says_start: a boot ends with the line ``# Starting main loop``. If this line is damaged, the
+        boot looks to the host like that of a firmware without the line.
     exact_words: a command without numbers is recognised only if its line has nothing else, not even
-        a space, as related firmware compares ``stop``.
+        a space; related firmware compares ``stop`` in this way.
     """
 
     sums: bool = True

@@ -158,7 +158,7 @@ class SimulatedLois:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
-        """Block the wheels whose argument is true; release the others."""
+        """Block each wheel whose argument is true; release each wheel whose argument is false."""
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
