@@ -68,7 +68,7 @@ def settings(values: Mapping[str, Any]) -> FejemisSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
-    """Return a function that opens both serial devices, even if one of them is missing."""
+    """Return a function that opens both serial devices, or one if the other device is missing."""
     return partial(
         Several,
         [partial(SerialPort, values[name], USB_BAUDRATE, name) for name in ("port", "front_port")],

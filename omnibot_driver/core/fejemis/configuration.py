@@ -83,7 +83,7 @@ class Configuration:
 
     @property
     def pending(self) -> bool:
-        """Whether the board is new: it may lack the user's settings, and must not be driven."""
+        """Whether the board is new, so that it may lack the user's settings and must not drive."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new

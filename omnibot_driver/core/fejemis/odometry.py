@@ -46,7 +46,7 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""Count of rejected poses in a row, each agreeing with the one before, that prove a new frame."""
+"""If this many rejected poses in a row agree, the board has begun a new frame."""
 
 
 class PoseOdometry:

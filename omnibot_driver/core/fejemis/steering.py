@@ -106,7 +106,7 @@ def steer(
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
     """Return the body's twist from the outer wheel's speed and the front angle.
 
-    The equations are those of the manual. A negative ``outer_mps`` is backward.
+    The equations are those of the manual. A negative ``outer_mps`` means driving backward.
     """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)

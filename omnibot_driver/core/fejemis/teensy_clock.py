@@ -71,7 +71,7 @@ class TeensyClock:
         return near_s + (host_s - self.host_s(near_s))
 
     def see(self, board_s: float, now: float) -> bool:
-        """Take the board time of a line that came at ``now``; return False if it is implausible."""
+        """Take the board time of a line that came at ``now``; return False if implausible."""
         self.restarted = False
         if self._fit is not None:
             late_s = now - self.host_s(board_s)

@@ -106,7 +106,7 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """The reason why a new board must not be driven yet; empty once the board is configured."""
+        """The reason why a new board must not drive the robot yet; empty once it is configured."""
         for configuration in self.configurations.values():
             if configuration.pending:
                 return (

@@ -268,7 +268,7 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and a reset of the counters, which ``due`` repeats until it is confirmed."""
+        """Return Stop and a reset of the counters; ``due`` repeats the reset until confirmed."""
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own
         self._resets_left, self._reset_shown = RESETS, False

@@ -42,7 +42,7 @@ CLEARED_TIMES: Final = 3
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
     """Return the pair as integers of at most ``most``, and whether the pair was scaled down.
 
-    If one value exceeds ``most``, both are scaled by the same factor.
+    If a value exceeds ``most``, both values are scaled by one factor.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0
