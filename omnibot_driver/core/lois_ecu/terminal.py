@@ -33,8 +33,8 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """The sensor's mode that was written to the board; None once the board's own messages arrive
-        again."""
+        """The sensor's mode that was written to the board; None once the board's own messages
+        arrive again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
         self._stopping_since_s: float | None = None
