@@ -146,7 +146,7 @@ class Messages:
 
 
 def difference(settings: MessageSettings) -> str:
-    """Return the type of a message that rclpy serialises differently; empty if all are the same."""
+    """Return the type of a message that rclpy serialises differently; empty if there is none."""
     reading = ImuEstimate(0.0, (1.1, -2.2, 3.3), (-4.4, 5.5, -6.6))
     noise = Covariance(1.2, 2.3, 3.4, 4.5, 5.6, 6.7)
     tangent, twist = Pose(7.7, -8.8, 9.9), BodyTwist(0.1, -0.2, 0.3)

@@ -91,7 +91,7 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
 def _check(
     node: Node, table: parameters.Table, changed: list[rclpy.Parameter]
 ) -> SetParametersResult:
-    """Return whether the changed values are valid, alone and together with the others."""
+    """Return whether the changed values are valid, each alone and all values together."""
     for item in changed:
         if item.type_ is rclpy.Parameter.Type.NOT_SET and item.name in table.by_name:
             reason = f"parameter '{item.name}' cannot be deleted; give it another value"

@@ -28,9 +28,9 @@ Publish = Callable[[Sequence[Status]], None]
 class Diagnostics:
     """The publisher of the diagnostics of one link.
 
-    ``refusals`` is called for each message and returns the refused commands so far. ``hardware_id``
-    distinguishes robots. ``to_check`` says what may be wrong with a board whose data is not
-    understood.
+    ``refusals`` is called for each message and returns the number of refused commands and the last
+    refusal. ``hardware_id`` distinguishes robots. ``to_check`` says what may be wrong with a board
+    whose data is not understood.
     """
 
     def __init__(

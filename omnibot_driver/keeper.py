@@ -69,7 +69,7 @@ class Keeper:
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
         if self._process is not None and (trouble := self._beat(self._process, word)):
-            self._tell(f"{trouble}; starting another one")
+            self._tell(f"{trouble}; starting another guard process")
         if self._process is None and now >= self._restart_at and len(self._dying) < MOST_DYING:
             self._restart_at = now + RESTART_S
             self._start()

@@ -18,7 +18,7 @@ _OVERRUN, _BUFFER_OVERRUN = 7, 10
 
 
 def overruns(descriptor: int) -> int | None:
-    """Return how often the kernel has lost bytes of the port so far; None without a count.
+    """Return how often the kernel has lost bytes of the port; None without a count.
 
     Pseudo-terminals and sockets lose no bytes and have no count; some USB adapters have no count.
     """

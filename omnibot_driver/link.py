@@ -49,7 +49,7 @@ class Link:
     sentence whenever the port, or one of its lines, cannot be opened or is lost, and None when the
     port and all its lines are open. ``on_read`` and ``on_write`` get each packet that was read or
     written. These functions are called one at a time, in the order of the events, on the reader's
-    thread or on another one.
+    thread or on another thread.
 
     ``failed`` gets the exception that ended a thread, which only a defect can cause.
     """

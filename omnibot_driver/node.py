@@ -125,8 +125,8 @@ class OmniBotDriver(Node):
         if not self._link.close(self._values["on_exit"]):
             if self._link.unstopped:
                 self.get_logger().warning(
-                    "the stop could not be sent, as the port is lost or accepts no data; check by"
-                    " eye that the robot has stopped"
+                    "the stop could not be sent, because the port is lost or accepts no data;"
+                    " check by eye that the robot has stopped"
                 )
             return
         if self._link.stands:

@@ -4,8 +4,8 @@
 
 A thread puts a call while it holds the lock under which the event occurred, and delivers after it
 has released that lock, so a slow listener delays no command. One thread delivers at a time; another
-thread that wants to deliver meanwhile leaves its calls to the first. This module knows threads; it
-does not know what is delivered.
+thread that wants to deliver meanwhile leaves its calls to the first thread. This module knows
+threads; it does not know what is delivered.
 """
 
 import threading

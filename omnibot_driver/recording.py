@@ -61,7 +61,7 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording at a URL, of a board with these channels.
+    """Return the recording that the URL names; its board has these channels.
 
     Raises ParameterError, which says what is wrong with the URL or the bag.
     """

@@ -73,8 +73,8 @@ def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
     if names.count(name) < 2:
         return ""
     return (
-        f"another node has the name {name}, and both obey the same commands; end one, or start one"
-        " in its own namespace (--ros-args -r __ns:=/robot2)"
+        f"another node has the name {name}, and both obey the same commands; end one node, or"
+        " start one node in its own namespace (--ros-args -r __ns:=/robot2)"
     )
 
 

@@ -61,7 +61,8 @@ class Services:
             return response
         if active and state != DISCONNECTED and self._link.blocked:
             response.message = (
-                "e-stop latched; port is not accepting data; the stop will be sent after it reopens"
+                "e-stop latched; port is not accepting data; the stop will be sent when the port is"
+                " open again"
             )
         response.success = True
         return response

@@ -31,11 +31,11 @@ HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
 """Longest pause, in s, between messages that are regarded as late without interruption."""
 LARGEST_DRIFT: Final = 5e-4
-"""Largest drift between two clocks, in s/s: a crystal is off by a tenth of this, NTP corrects a
-clock at most at this rate."""
+"""Largest drift between two clocks, in s/s. A crystal is off by a tenth of this value, and NTP
+corrects a clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""A message that seems early is less likely by this factor to come from a sender than a message
-that is late by the same time."""
+"""A sender is this many times less likely to have sent a message that seems early than one that
+seems late by the same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Among this many messages of a sender, at least one is assumed to have almost no delay. With fewer
@@ -82,8 +82,8 @@ class Delay:
             return
         if 2 * self.waited_s > self.total_s:
             where = (
-                f"it waited {self.waited_s:.1f} s of that in this driver's queue: check the load of"
-                " this computer"
+                f"it waited {self.waited_s:.1f} s in this driver's queue: check the load of this"
+                " computer"
             )
         else:
             where = "check the network, and the load and the clock of the sending computer"
@@ -100,7 +100,7 @@ class Transit:
         self._senders: list[_Sender] = []
 
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
-        """Return the delay of this message; a delay above ``longest_s`` is regarded as late.
+        """Return the delay of this message; above ``longest_s`` the message is regarded as late.
 
         The first message of each sender is taken to have no delay.
         """

@@ -46,7 +46,7 @@ def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
     os.kill(first, signal.SIGKILL)
     told = beat_until(keeper, lambda: replaced(line, first))
     assert "exit code -9" in told
-    assert told.count("starting another one") == 1
+    assert told.count("starting another guard process") == 1
     (second,) = line.children()
     os.kill(second, signal.SIGKILL)
     assert beat_until(keeper, lambda: replaced(line, second)) == ""
@@ -78,7 +78,7 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
     os.waitid(os.P_PID, first, os.WSTOPPED)
     assert [keeper.beat(1000.0) for _ in range(HANGS_AFTER)] == [""] * HANGS_AFTER
     assert line.children() == [first]
-    assert keeper.beat(1000.0) == "the guard process hung; starting another one"
+    assert keeper.beat(1000.0) == "the guard process hung; starting another guard process"
     beat_until(keeper, lambda: first not in line.children())
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
@@ -100,7 +100,9 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     with monkeypatch.context() as undying:
         undying.setattr("subprocess.Popen.kill", lambda _process: None)
         told = [keeper.beat(1000.0 + n * BEAT_S) for n in range(HANGS_AFTER + 2)]
-        assert [text for text in told if text] == ["the guard process hung; starting another one"]
+        assert [text for text in told if text] == [
+            "the guard process hung; starting another guard process"
+        ]
         assert len(line.children()) == 2
         assert first in line.children()
     os.kill(first, signal.SIGKILL)

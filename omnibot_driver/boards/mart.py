@@ -37,8 +37,9 @@ PARAMETERS: Final = table(
         },
         "port": {
             "default": "udp://192.168.1.50:5000",
-            "description": "Address of the controller, udp://host:port; its stop port is one"
-            " higher. sim:// is a simulated board inside the driver, replay://bag a recorded wire.",
+            "description": "Address of the controller, udp://host:port; the stop port has the next"
+            " higher number. sim:// is a simulated board inside the driver, and replay://bag plays"
+            " a recorded bag.",
         },
     },
 )
@@ -73,12 +74,12 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], UdpPorts]:
-    """Return a function that opens the command port, and the stop port one above it."""
+    """Return a function that opens the command port, and the stop port with the next number."""
     return partial(UdpPorts, values["port"], len(TRAITS.channels))
 
 
 def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
-    """Return a left and a right wheel, with the sizes that calibration found."""
+    """Return the kinematics of a left and a right wheel, with the calibrated sizes."""
     linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
     return DifferentialKinematics(
         wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]

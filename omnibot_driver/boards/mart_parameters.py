@@ -29,7 +29,7 @@ WHEELS: Final = (
         "metres_per_count",
         0.0004,
         "m",
-        "Distance of the right wheel for one count of its encoder.",
+        "Distance that the right wheel rolls for one count of its encoder.",
         low=1e-6,
         high=1.0,
         calibrated=True,
@@ -59,8 +59,9 @@ DRIVING: Final = (
         "motor_balance",
         1.0,
         "",
-        "Speed of the left motor divided by that of the right one at equal units, as used before"
-        " the first drive forward; then the driver measures it, and shows it in /diagnostics.",
+        "Speed of the left motor divided by that of the right one at equal units. The driver uses"
+        " this value until the first drive forward has measured the ratio, which is then shown in"
+        " /diagnostics.",
         low=0.8,
         high=1.25,
         fixed=True,
@@ -96,8 +97,9 @@ DRIVING: Final = (
         "spin_speed",
         "custom",
         "",
-        "Speed of turns on the spot: as commanded (custom, by the undocumented SSP and R CUSTOM),"
-        " or the controller's own SLOW (fixed), which is faster than most commands.",
+        "Speed of turns on the spot. With custom, it is the commanded speed, set by the"
+        " undocumented commands SSP and R CUSTOM. With fixed, it is the controller's own speed"
+        " SLOW, which is faster than most commands.",
         choices=("custom", "fixed"),
         fixed=True,
     ),
@@ -119,7 +121,8 @@ DRIVING: Final = (
         "odom_rate",
         20.0,
         "Hz",
-        "How often odom and its transform are published, predicted between the polls.",
+        "How often odom and its transform are published. Between two polls the driver predicts"
+        " them.",
         low=1.0,
         high=50.0,
     ),
@@ -134,7 +137,8 @@ DRIVING: Final = (
         "gyro_drift",
         0.001,
         "rad/s",
-        "Bias of the controller's gyro after a calibration, for the covariance of odom.",
+        "Bias of the controller's gyro that remains after a calibration, for the covariance of"
+        " odom.",
         low=0.0,
         high=0.1,
     ),

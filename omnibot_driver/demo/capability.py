@@ -19,10 +19,10 @@ class Capability:
     """The abilities of a board that drives by ``cmd_vel`` and has ``odom``.
 
     ``title``: the board's name in the sentence "A simulated ... drives". ``imu``: whether the board
-    has ``imu/data_raw``. ``sideways``: whether it can move along y as well. ``ports``: for each
-    address that the simulator prints, the name of the driver's parameter; empty if another
-    address determines this one.
-    ``real``: arguments that a driver needs for the real robot; ``page``: the board's document.
+    has ``imu/data_raw``. ``sideways``: whether the board can move along y, as well as along x.
+    ``ports``: for each address that the simulator prints, the name of the driver's parameter; empty
+    if another address determines this one. ``real``: arguments that a driver needs for the real
+    robot; ``page``: the board's document.
     """
 
     title: str

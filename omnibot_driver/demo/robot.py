@@ -31,7 +31,7 @@ ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
 class Robot:
     """The robot as a ROS program uses it: subscribed topics in, ``cmd_vel`` out.
 
-    After every other odometry message it publishes a command, which is a halt unless ``driving``.
+    After every second odometry message it publishes a command, which is a halt unless ``driving``.
     ``imu``: whether the robot has an IMU. ``sideways``: whether it can drive along its y axis.
     """
 

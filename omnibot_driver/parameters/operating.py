@@ -115,8 +115,8 @@ COMMANDS: Final = (
         "max_linear_acceleration",
         0.0,
         "m/s²",
-        "Largest acceleration with which cmd_vel changes the linear velocity, as a vector. 0 turns"
-        " the limit off. Zero commands and wheel_cmd are not limited.",
+        "Largest acceleration (length of the vector) with which cmd_vel changes the linear"
+        " velocity. 0 turns the limit off. Zero commands and wheel_cmd are not limited.",
         low=0.0,
         high=100.0,
     ),

@@ -23,8 +23,8 @@ ROBOT: Final = (
         "odom_linear_scale",
         1.0,
         "m/m",
-        "True distance divided by the distance that the board reports, which assumes nominal"
-        " wheels. calibrate geometry measures this ratio.",
+        "True distance divided by the distance that the board reports for nominal wheels."
+        " calibrate geometry measures this ratio.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -33,7 +33,7 @@ ROBOT: Final = (
         "odom_angular_scale",
         1.0,
         "rad/rad",
-        "True angle divided by the angle that the board reports, which assumes nominal wheels."
+        "True angle divided by the angle that the board reports for nominal wheels."
         " calibrate geometry measures this ratio.",
         low=0.5,
         high=2.0,
@@ -44,8 +44,8 @@ ROBOT: Final = (
         2.0,
         "m/s",
         "Highest linear speed that the robot can reach, even if it is pushed. The driver rejects"
-        " faster displacements, and never corrects odom faster than this. It must not be below"
-        " max_linear_speed.",
+        " faster displacements, and never corrects odom faster than this speed. The value must"
+        " not be below max_linear_speed.",
         low=0.1,
         high=10.0,
     ),
@@ -54,7 +54,7 @@ ROBOT: Final = (
         8.0,
         "rad/s",
         "Highest yaw rate that the robot can reach, even if it is pushed. The driver rejects"
-        " faster displacements. It must not be below max_angular_speed.",
+        " faster displacements. The value must not be below max_angular_speed.",
         low=0.1,
         high=100.0,
     ),
@@ -63,7 +63,7 @@ ROBOT: Final = (
         15.0,
         "m/s²",
         "Highest linear acceleration that the robot can reach, even in a collision. The driver"
-        " rejects a displacement that exceeds it for a single sample.",
+        " rejects a displacement that exceeds this value for a single sample.",
         low=0.1,
         high=1000.0,
     ),
@@ -72,7 +72,7 @@ ROBOT: Final = (
         50.0,
         "rad/s²",
         "Highest angular acceleration that the robot can reach, even in a collision. The driver"
-        " rejects a displacement or gyro reading that exceeds it for a single sample.",
+        " rejects a displacement or gyro reading that exceeds this value for a single sample.",
         low=1.0,
         high=10_000.0,
     ),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of one board's parameters: the common ones that it can use, and its own.
+"""The table of one board's parameters: the common ones that the board can use, and the board's own.
 
 This module does not use ROS, and does not name any board. A board's profile makes its table from
 the board's traits and from the rows that it adds.

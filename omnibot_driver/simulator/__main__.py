@@ -96,8 +96,9 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             "--link",
             metavar="PATH",
             action="append",
-            help="make a symbolic link to the pseudo-terminal; if the board has several, repeat the"
-            " option, or give it once: each link then ends in a hyphen and the port's name",
+            help="make a symbolic link to the pseudo-terminal; if the board has several"
+            " pseudo-terminals, repeat the option for each, or give the option once: a hyphen and"
+            " the port's name are then appended to each link",
         )
     if any(channel.datagrams for channel in module.CHANNELS):
         parser.add_argument(

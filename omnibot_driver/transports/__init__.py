@@ -28,7 +28,7 @@ class Transport(Protocol):
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """File descriptors by channel, which another process may inherit to write the same bytes.
+        """File descriptors by channel; another process may inherit them to write the same bytes.
 
         None if descriptors cannot be inherited. The item of a missing line is None.
         """

@@ -80,7 +80,7 @@ class Several:
 
     @property
     def overruns(self) -> int | None:
-        """Number of times the kernel has lost bytes of open lines; None if one has no counter."""
+        """Number of times the kernel lost bytes of open lines; None if a line has no counter."""
         counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))
 

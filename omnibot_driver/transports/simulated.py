@@ -71,7 +71,7 @@ class SimulatedTransport:
             self._board.write(packet)
 
     def write_if_room(self, packets: Iterable[Packet]) -> int:
-        """Write all packets, as there is always room; return the number of bytes."""
+        """Write all packets, because there is always room; return the number of bytes."""
         packets = tuple(packets)
         self.write(packets)
         return sum(len(data) for _, data in packets)

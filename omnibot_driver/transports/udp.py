@@ -28,7 +28,7 @@ UNREACHABLE: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH,
 
 
 class UdpPorts:
-    """A ``Transport`` with ``channels`` connected sockets, one for each channel."""
+    """A ``Transport`` of connected sockets, one for each of ``channels`` channels."""
 
     ends_with_us = False
     missing = NONE_MISSING

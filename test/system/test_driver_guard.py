@@ -220,7 +220,7 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     with probe.commanding(0.3):
         (first,) = driver.guards()
         os.kill(first, signal.SIGKILL)
-        driver.wait_for_line("the guard process died.*starting another one")
+        driver.wait_for_line("the guard process died.*starting another guard process")
         wait_until(lambda: driver.guards() not in ([], [first]))
         assert board.wait_for(lambda b: not still(b), PATIENCE_S)
         driver.end(signal.SIGKILL)

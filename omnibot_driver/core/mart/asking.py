@@ -86,5 +86,5 @@ class Asking(Stops):
         self._halt(now)
 
     def _unanswered(self, word: Word) -> None:
-        """Ask for the server's name again, as a server that did not answer ``word`` may be gone."""
+        """Ask for the server's name again, because a server that did not answer may be gone."""
         self._named_s = -math.inf

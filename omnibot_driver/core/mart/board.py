@@ -133,12 +133,12 @@ class MartBoard(Board):
         return readings
 
     def silence(self) -> None:
-        """Set the mode to unknown, as the silent server may have been restarted."""
+        """Set the mode to unknown, because the silent server may have been restarted."""
         self._mode = Mode.UNKNOWN
         self._pilot.fell_silent()
 
     def flush(self, now: float) -> list[Reading]:
-        """End the present job, as the port is closed; return the readings and the job's result."""
+        """End the present job after the port has closed; return the readings and the result."""
         self._pilot.jobs.cancel("the port was lost meanwhile; call again once it is back")
         return self._pilot.take()
 
@@ -208,7 +208,7 @@ class MartBoard(Board):
 
     @property
     def resting(self) -> bool:
-        """Whether measurements show that the robot is at rest, and the server is free."""
+        """Whether the server is free, and measurements show that the robot is at rest."""
         return self._pilot.state is State.STILL and self._pilot.proof.proved
 
     @property

@@ -255,7 +255,7 @@ class Conversation:
         )
 
     def _owes_until(self, word: Word, sent_s: float) -> None:
-        """Record that the reply to ``word``, sent at ``sent_s``, may still come."""
+        """Record that the reply to a ``word`` that was sent at ``sent_s`` may still come."""
         until_s = sent_s + word.takes_s + 2 * self.delay_s
         for form in word.forms:
             self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)

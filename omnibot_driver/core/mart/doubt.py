@@ -41,7 +41,7 @@ ASTRAY: Final = 0.7
 SPREAD: Final = 0.3
 """Standard deviation of a time that is uniform in an interval of length 1 (1/√12)."""
 CLOCK_S: Final = 0.01
-"""Least uncertainty of a reply's time, in s, as on a good network."""
+"""Uncertainty of a reply's time on a good network, in s; on other networks it is larger."""
 Errors = list[tuple[float, float, float, float]]
 
 
@@ -135,10 +135,10 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
-        """Return the errors of a turn on the spot so far.
+        """Return the errors of a turn on the spot, from its beginning until now.
 
-        ``spun_rad``: the turn by the wheel; ``told_rad``: the turn that the server has reported, or
-        None. The robot also moves a little aside if its motors are unequal.
+        ``spun_rad``: the turn that the wheel has measured; ``told_rad``: the turn that the server
+        has reported, or None. The robot also moves a little aside if its motors are unequal.
         """
         variance = (WHEEL_HEADING * spun_rad) ** 2
         if told_rad is not None:
@@ -155,7 +155,7 @@ class Doubt:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return independent errors: the standard deviation of x and y, and that of the heading."""
+    """Return independent errors of x, y and heading with these standard deviations."""
     return _around(way_m * way_m, turn_rad * turn_rad)
 
 

@@ -27,14 +27,14 @@ ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 To come nearer, the robot would have to turn towards the goal first.
 """
 STRETCH: Final = 1.3
-"""Initial ratio of the driven to the requested length of straight moves: 15.8 in for 12 in."""
+"""Initial ratio of driven to requested length of straight moves: 12 inches become 15.8 inches."""
 DOCK_STRETCH: Final = 1.6
-"""Largest ratio of the driven to the requested length of docking moves: 0.73 m for 19 in."""
+"""Largest ratio of the driven to the requested length of docking moves: 19 inches become 0.73 m."""
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Least improvement of the heading in degrees for which a turn is made."""
 WIDER: Final = 0.5
-"""Part of NEAR_RAD that each turn in a row adds to the heading's tolerance, as turns overshoot."""
+"""Part of NEAR_RAD that each turn in a row adds to the heading's tolerance: turns overshoot."""
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal; after them the goal is given up."""
 
@@ -73,7 +73,7 @@ class Done:
         return number * INCH_M if self.is_straight else math.radians(number)
 
     def may_have_run_twice(self, delay_s: float) -> bool:
-        """Return whether the server may have run the move twice, as its datagram was duplicated.
+        """Return whether the server may have run the move twice, after its datagram was duplicated.
 
         If the move has run twice, the encoder count covers only the second run.
         """
@@ -144,7 +144,7 @@ class Move:
     failed: bool = False
 
     def fail(self) -> None:
-        """Give the goal up, as a move has failed."""
+        """Give the goal up, because a move has failed."""
         self.given_up = self.failed = True
 
     def repeated(self) -> "Move":

@@ -43,7 +43,7 @@ The server opens its ports before it has started up completely. VOLTS and most m
 server that has just started; a crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""Longest silence of a server that was not absent: in s, plus a number of exchange durations."""
+"""Longest silence of a server that was not absent: seconds, plus a number of exchange durations."""
 ABSENT_BUSY_S: Final = 2.5
 """Longest silence, in s, of a server that may be busy but was not absent.
 

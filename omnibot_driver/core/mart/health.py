@@ -146,7 +146,7 @@ class Health:
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
-        """Record a change of RMRA; HEADING_CHANGES changes prove that RMRA works in this motion."""
+        """Record a change of RMRA; HEADING_CHANGES of them prove that RMRA works in this motion."""
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)

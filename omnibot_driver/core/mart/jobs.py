@@ -74,7 +74,7 @@ class Jobs:
         self._clear()
 
     def forget_log(self) -> None:
-        """Record that the server has no log, as it was restarted."""
+        """Record that the server has no log, because it was restarted."""
         self.logging = self.log_may_be_lost = self.ended = False
 
     def _clear(self) -> None:
@@ -126,13 +126,14 @@ class Jobs:
             )
         if job is Job.LOG_FILE and not self.logging:
             raise RequestRefused(
-                "no log was started: call ~/start_log first; without a log the server would end"
-                " and send no file"
+                "no log was started: call ~/start_log first; without a log, this request"
+                " would end the server, and no file would come"
             )
         if job is Job.LOG_FILE and self.log_may_be_lost:
             raise RequestRefused(
-                "the server may have been restarted; it would then end and send no file: copy"
-                " the file from the controller, or begin a new log by ~/start_log"
+                "the server may have been restarted; if so, this request would end the server, and"
+                " no file would come: copy the file from the controller, or begin a new log by"
+                " ~/start_log"
             )
         self.job, self._token = job, token
         self._request = WORD_OF[job].request(*arguments)
@@ -168,7 +169,7 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """If ``word`` was the job's request, repeat or end the job, as no reply came in time."""
+        """Repeat or end the job if ``word``, to which no reply came in time, was its request."""
         if not self._waiting or self._request is None or word is not self._request.word:
             return
         if self.job in REPEATED and self._tries < TIMES:

@@ -38,7 +38,7 @@ class MeanSpeeds:
         self._yaw_rad += turn_rad
 
     def forget(self) -> None:
-        """Forget the counts, as the next counts belong to another motion."""
+        """Forget the counts, because the next counts belong to another motion."""
         self._track.clear()
 
     @property

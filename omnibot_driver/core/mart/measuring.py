@@ -20,7 +20,7 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS
 
 STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
-"""Time in s for which a robot may roll out after a stop, and after a controlled move.
+"""Times in s for which a robot may roll out: after a stop, and after a controlled move.
 
 If a controlled move fails, the server reports the failure at once, before the robot is at rest.
 """
@@ -143,7 +143,7 @@ class Measuring(Starts):
             self._rescue = True
             self._notice(
                 "robot moves, but the server knows of no motion; the driver starts a turn by 1"
-                " degree; at its end the server switches the motors off",
+                " degree; at the end of the turn the server switches the motors off",
                 halt=True,
             )
             return

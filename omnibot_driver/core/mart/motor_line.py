@@ -57,7 +57,7 @@ class MotorLine:
     def stood(self, units: float) -> None:
         """Record that the motor does not turn with ``units``.
 
-        Afterwards the offset is uncertain again, as the robot may only have been held.
+        Afterwards the offset is uncertain again, because the robot may only have been held.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2
@@ -78,7 +78,7 @@ class MotorLine:
         self.__dict__.update(before.__dict__)
 
     def rescale(self, factor: float) -> None:
-        """Multiply the learned speeds by ``factor``, as the nominal units have changed."""
+        """Multiply the learned speeds by ``factor``, because the nominal units have changed."""
         if self._learned and factor != 1.0:
             self._ss, self._so, self._oo = (
                 each * factor * factor for each in (self._ss, self._so, self._oo)

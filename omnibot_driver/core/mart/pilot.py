@@ -83,7 +83,7 @@ class Pilot(Hearing):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server is expected to be silent now, as it is busy."""
+        """Return whether the server is expected to be silent now, because it is busy."""
         if self._stopping is not None:
             return self.greeted and now < self._stopping.began_s + STOPS_S
         if self.state is State.MOVING:

@@ -34,7 +34,7 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 }
 """Period in s of each query by state, the most urgent query first.
 
-States that are not listed have no queries, as the command port is busy.
+States that are not listed have no queries, because the command port is busy in them.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
 """The two sonars, and the least time in s between their queries.
@@ -64,7 +64,7 @@ class Polls:
         return sorted(late, key=lambda word: self._at(word, state) + periods[word])
 
     def asked(self, word: Word, now: float) -> None:
-        """Record that the query was sent; a sonar's query also delays the other sonar's."""
+        """Record that the query was sent; the query of one sonar delays that of the other sonar."""
         self._asked_s[word] = now
         if word in SONARS:
             for each in SONARS:

@@ -22,7 +22,7 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest difference of a reported turn from the turn by the wheel: in rad, plus a part.
+"""Largest difference of a reported turn from the wheel's turn: in rad, plus a part of that turn.
 
 A number that differs by more is regarded as the answer to another query.
 """
@@ -38,7 +38,7 @@ ACCELERATION_RADPS2: Final = 3.0
 FRESH_S: Final = 0.2
 """Age in s up to which the last heading shows the present turn rate."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations in m and rad of the unmeasured end of a motion that lost the connection."""
+"""Standard deviations in m and rad of the unmeasured end of a motion, after a lost connection."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 
@@ -163,7 +163,7 @@ class Reckoning:
         """Process a count of the right wheel; return the displacement since the last count.
 
         Returns None if the count is implausible or may belong to an earlier motion, and
-        NOTHING_MEASURED if the displacement is unknown, as at the first count.
+        NOTHING_MEASURED if the displacement is unknown, for example at the first count.
         """
         if when.from_s < self._began_s:
             return None
@@ -201,7 +201,7 @@ class Reckoning:
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Return the turn in rad that moves the wheel by ``wheel_m``; zero if not on the spot."""
+        """Return the turn on the spot, in rad, that moves the wheel by ``wheel_m``; else zero."""
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property

@@ -17,7 +17,7 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest turn acceleration (rad/s²) and rate (rad/s) with which a heading is plausible."""
 OLD_RAD: Final = 0.01
-"""Largest difference, in rad, of a heading measured before RM from the last heading before RM."""
+"""A heading may be from before RM if it is this near, in rad, to the last heading before RM."""
 MOST_RAD: Final = 1e7
 """Largest heading in rad that still resolves small turns.
 
@@ -65,7 +65,7 @@ class RelativeHeading:
         return self._angle_rad == 0.0
 
     def forget(self) -> None:
-        """Forget the heading, as the next reported heading may have another zero point."""
+        """Forget the heading, because the next reported heading may have another zero point."""
         self._angle_rad = None
 
     def begin(self, now: float, *, anew: bool) -> None:

@@ -77,7 +77,7 @@ class MartDecoder:
         return [reply]
 
     def flush(self, now: float) -> list[Reply]:
-        """Return an empty list, as no data is kept between calls."""
+        """Return an empty list, because no data is kept between calls."""
         return []
 
 

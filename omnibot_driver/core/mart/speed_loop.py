@@ -17,9 +17,9 @@ from omnibot_driver.core.mart.motors import MOST_UNITS, UNEQUAL, Motors
 from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_CHANGE: Final = 15
-"""Largest change in units by one command; it is small, as a duplicated command acts twice."""
+"""Largest change in units by one command; it is small, because a duplicated command acts twice."""
 MOST_BACKWARD: Final = 5
-"""Largest change in units while reversing on a slow network, where duplicates are unnoticed."""
+"""Largest change in units while reversing on a slow network, which hides duplicates."""
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s: pause in learning after a large change, and shortest window of learning."""
 LARGE_UNITS: Final = 3
@@ -38,7 +38,7 @@ MORE_TIMES: Final = 3
 """Factor by which the units of a start grow after a start that moved nothing."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""Time in s after a change of the turn rate for which the heading error is not integrated."""
+"""For this time in s after a change of the turn rate, the heading error is not integrated."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Variances per squared change of units: if the change may arrive twice; if it is unanswered.
@@ -124,7 +124,7 @@ class SpeedLoop(Motors):
 
     @property
     def units(self) -> int:
-        """The larger of the units of both sides."""
+        """The larger of the two sides' units."""
         return max(self._right.units, self._left.units)
 
     @property
@@ -154,7 +154,7 @@ class SpeedLoop(Motors):
 
     @property
     def measured_balance(self) -> float | None:
-        """The ratio ``balance`` as measured in a drive, unlimited; None before the first drive."""
+        """The ratio ``balance`` from a drive, without its limits; None before the first drive."""
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
     @property
@@ -171,10 +171,10 @@ class SpeedLoop(Motors):
         *,
         right_only: bool = False,
     ) -> None:
-        """Learn from a measured displacement of this duration, and hold the heading.
+        """Learn from a displacement measured over ``seconds``, and hold the heading.
 
         ``right_only``: only the right wheel was measured, so the left motor's line is changed by as
-        much as the right motor's.
+        much as the right motor's line.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
@@ -245,7 +245,7 @@ class SpeedLoop(Motors):
             self._clear(now + SETTLE_S)
 
     def missed(self) -> None:
-        """Add uncertainty, as the last change was not answered and may not have arrived."""
+        """Add uncertainty, because the last change was not answered and may not have arrived."""
         self._unsure += MISSED * self.part**2
 
     @property

@@ -18,9 +18,9 @@ from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
-"""Relative change of the commanded rate from which a turn is begun anew."""
+"""Relative change of the commanded rate at which a turn is begun anew."""
 OFF, OFF_AGAIN = 0.05, 0.12
-"""Relative errors of the rate from which a turn is begun anew, with other units.
+"""Relative errors of a turn's rate at which the turn is begun anew, with other units.
 
 OFF holds until a turn has shown how fast the motors turn; then OFF_AGAIN holds, because a
 correction would often cost more than the error.
@@ -37,9 +37,9 @@ HINDERED, TOO_FAST = 0.8, 1.12
 """Parts of the commanded rate. If a turn slower than HINDERED is followed by one faster than
 TOO_FAST, something held the robot in the slow turn, and what was learned from it is false."""
 SAME, CORRECTIONS = 0.2, 2
-"""Largest relative difference of rates that are regarded as equal; most corrections of a rate."""
+"""Largest relative difference of rates that count as equal; largest number of corrections."""
 STEADY: Final = 0.03
-"""Relative change of the commanded rate from which the rate is regarded as a new one."""
+"""Relative change of the commanded rate at which the rate is regarded as a new one."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Shortest turn that shows how fast the motors turn: a time in s, and angles in rad.
 
@@ -47,7 +47,7 @@ The time is added to the averaging time of speeds. From TOLD_RAD on, the angle t
 reports in whole degrees is more precise than the wheel.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Largest difference of a turn reported by a stop from the expected turn: rad, plus a part.
+"""Largest difference of a turn reported by a stop from the expected one: in rad, plus a part of it.
 
 The expected turn comes from the encoder count and the commanded rate.
 """
@@ -56,8 +56,8 @@ JUST_SET_S: Final = 2.0
 SLOW_UNITS: Final = 20
 """Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 SETTING_REFUSED: Final = (
-    "the server does not set the speed of turns on the spot; all of them use its speed SLOW,"
-    " which is faster than most commands, as with `spin_speed: fixed` (reported once)"
+    "the server does not set the speed of turns on the spot; as with `spin_speed: fixed`,"
+    " all of them use the server's speed SLOW, which is faster than most commands (reported once)"
 )
 
 
@@ -134,7 +134,7 @@ class SpotTurns:
             self.units = SLOW_UNITS
 
     def fits(self, rate_radps: float, now: float, *, turned_s: float, disturbed: bool) -> bool:
-        """Return whether the present turn may continue under the command of this rate.
+        """Return whether the present turn may continue while this rate is commanded.
 
         ``turned_s``: time since the turn began; ``disturbed``: whether measurements may be
         missing.
@@ -183,7 +183,7 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the measured rate for learning, raised to a minimum, as the robot may be held."""
+        """Return the measured rate for learning, or a minimum if the measured rate is lower."""
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
@@ -225,7 +225,7 @@ class SpotTurns:
         self._has_learned = True
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget the lesson of a slow turn if this turn shows that the robot was held in it.
+        """Forget the lesson of the slow turn if the present turn shows that the slow one was held.
 
         ``part``: rate of this turn as a part of the commanded one. From the slow and the fast turn
         together, the driver would learn a dead zone that the motors do not have.

@@ -208,7 +208,7 @@ class Starts(Adjusting):
         self._polls.press(words.ENC)
 
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
-        """Stop the robot after a failed start, as it may move nevertheless.
+        """Stop the robot after a failed start, because it may move nevertheless.
 
         ``arrived``: whether the reply certainly belongs to this start, and a copy of the start is
         unlikely.

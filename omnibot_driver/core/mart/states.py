@@ -61,7 +61,9 @@ class State(Enum):
     MOVING = "controlled move by TF, TB, MCR or MCL"
     SERVING = "at rest; the server is busy"
     STOPPING = "stopping"
-    ASKING = "not known: the driver used the stop port, and asks the server what is in progress"
+    ASKING = (
+        "not known: the driver used the stop port, and is asking the server what is in progress"
+    )
     LOST = "lost: the server must be restarted"
 
 

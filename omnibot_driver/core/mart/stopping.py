@@ -6,9 +6,9 @@ The stop command is sent at once, even if another request is pending, and repeat
 answered. The stop may overtake a start that is still on its way. So a reply is accepted only if it
 certainly answers a stop that was sent when no duplicate of the start could come any more. A bare
 ``ok`` is accepted only if it cannot be the reply to the start; else the stop is repeated. The stop
-port is the last resort. It is not used right after SM or SRM, because both commands would run at
-the same time and could hang a port. This module knows commands, replies and times; it does not know
-why the robot is stopped.
+port is the last resort. It is not used right after SM or SRM, because its command would then run at
+the same time as SM or SRM, and a port could hang. This module knows commands, replies and times; it
+does not know why the robot is stopped.
 """
 
 import math
@@ -30,7 +30,7 @@ ANSWERS: Final = {
 }
 """The forms of the reply ``ok`` with which the server reports that it has stopped each motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s after the first stop of a controlled move by which the move should have ended."""
+"""Time in s within which a controlled move should end after it was first told to stop."""
 
 
 class Stopping:
@@ -92,7 +92,7 @@ class Stopping:
         return HALTS[self.motion]
 
     def asks_name(self, now: float) -> bool:
-        """Return whether to ask for the server's name too, as the move's reply may be lost.
+        """Return whether to ask for the server's name too, because the move's reply may be lost.
 
         A server that gives its name has finished the move.
         """

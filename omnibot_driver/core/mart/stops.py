@@ -84,7 +84,8 @@ class Stops(Ground, ABC):
     def _why_stop(self, now: float) -> str:
         """Return why the present motion must not continue: a sentence, "wanted", or empty.
 
-        "wanted" means that another motion is wanted; an empty text, that the motion may continue.
+        "wanted" means that another motion is wanted; an empty text means that the motion may
+        continue.
         """
         if self.state not in (State.STARTING, State.MOVING, *ROLLING):
             return ""
@@ -175,7 +176,7 @@ class Stops(Ground, ABC):
         return packets
 
     def _stopped(self, now: float) -> None:
-        """End the stop, as the server has answered it, and evaluate its result."""
+        """End the stop after the server has answered it, and evaluate its result."""
         stopping, self._stopping = self._stopping, None
         self._moved_by = None  # the move was cut short
         self.conversation.settle(now)

@@ -17,11 +17,11 @@ from omnibot_driver.core.mart.moment import Moment
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
 """Largest accepted error of a count that may answer another query.
 
-The error is DOUBT_M (m), plus DOUBT_MPS (m/s) times the driving time since the last count and the
-time uncertainty of the reply.
+The error is DOUBT_M (m), plus DOUBT_MPS (m/s) times the sum of two times: the driving time since
+the last count, and the time uncertainty of the reply.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
-"""Largest distance of a wheel between two counts, in m, plus m/s times the time between them.
+"""Largest distance of a wheel between two counts: MOST_M, plus MOST_MPS times the time.
 
 A larger distance shows that one of the two counts is false.
 """
@@ -144,7 +144,7 @@ class WheelCount:
         return Step(wheel_m, seconds, lost, unsure)
 
     def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
-        """Discard an implausible count and return None; accept the third, returning ``step``."""
+        """Return None for an implausible count; accept the third in a row, and return ``step``."""
         self._odd += 1
         if self._odd < ODD_TIMES:
             return None

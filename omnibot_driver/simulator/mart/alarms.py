@@ -180,9 +180,9 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 
 
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
-    """Change both speeds, in register units with forward positive.
+    """Change the speeds of both wheels, in register units with forward positive.
 
-    Each speed is limited to stop and full speed; an excess over full speed slows the other wheel.
+    Each speed is kept between stop and full speed; an excess over full speed slows the other wheel.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

@@ -35,9 +35,9 @@ class Kind(IntEnum):
     CONTROLLED_SPIN = 3
     """Spin by an angle (MCR, MCL)."""
     CONTROLLED_LINEAR = 4
-    """Move over a distance, by time (TF, TB, PTF)."""
+    """Move over a distance that the server measures by time (TF, TB, PTF)."""
     MEASURED_LINEAR = 5
-    """Move over a distance, by the accelerometer (MCF, MCB)."""
+    """Move over a distance that the server measures by the accelerometer (MCF, MCB)."""
 
 
 SPEEDS = {"NORMAL": 30, "FAST": 60, "SLOW": 20}
@@ -85,7 +85,7 @@ class Motion:
         self.stop_samples = STOP_SAMPLES
 
     def limit(self, inches: int) -> None:
-        """Compute the time after which the motion stops, from a distance and the calibration."""
+        """Compute, from a distance and the calibration, the time after which the motion stops."""
         up_s, down_s = RAMPS_S[self.word]
         top_inps = TOP_SPEED_INPS[self.word]
         self.stop_after_s = (inches - (up_s + down_s) / 2 * top_inps) / top_inps + up_s

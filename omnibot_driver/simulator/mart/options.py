@@ -105,7 +105,7 @@ _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
     ("speed_mps_per_unit", _within(0.0001, 1.0), "M/S", "speed for one unit, at 24 V"),
     ("metres_per_count", _within(1e-6, 1.0), "M", "distance for one encoder count"),
     ("track_m", _within(0.01, 10.0), "M", "distance between the wheels"),
-    ("volts", _within(0.0, 40.0), "V", "battery voltage; the speed grows with it"),
+    ("volts", _within(0.0, 40.0), "V", "battery voltage; a higher voltage gives a higher speed"),
     (
         "dead_zone_units",
         _within(0.0, 127.0),
@@ -116,7 +116,7 @@ _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
         "motor_inequality",
         _within(-1.0, 1.0),
         "PART",
-        "how much faster the left motor is, as a fraction",
+        "fraction by which the left motor is faster than the right motor",
     ),
     (
         "gyro_bias_dps",

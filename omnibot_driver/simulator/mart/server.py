@@ -152,7 +152,7 @@ class MartServer(ServerState):
         self._wake()
 
     def watch(self, kind: Kind) -> None:
-        """Supervise this kind of motion, unless another one is supervised already."""
+        """Supervise this kind of motion, unless another kind is supervised already."""
         if self.alarm is None:
             self.alarm = kind
         self._wake()

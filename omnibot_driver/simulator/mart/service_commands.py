@@ -45,7 +45,7 @@ def fine(server: "MartServer", text: str) -> str | None:
 
 
 def bare_fail(server: "MartServer", text: str) -> str | None:
-    """Answer fail, because calibration files do not exist (MNLV)."""
+    """Answer ``fail``, because calibration files do not exist (MNLV)."""
     return "fail"
 
 
@@ -79,7 +79,7 @@ def _ask_board(server: "MartServer", then: Callable[["MartServer"], None]) -> No
 
 
 def encoder(server: "MartServer", text: str) -> str | None:
-    """Answer with the encoder count, or fail if the motor board is silent (ENC)."""
+    """Answer with the encoder count, or with ``fail`` if the motor board is silent (ENC)."""
     _ask_board(server, _tell_encoder)
     return None
 
@@ -246,7 +246,7 @@ def stop_record(server: "MartServer", text: str) -> str | None:
 
 
 def set_motors(server: "MartServer", text: str) -> str | None:
-    """Write the motor registers directly, right first, once (MCS)."""
+    """Write the motor registers directly, the right one first, once (MCS)."""
     numbers = wire.fields(text)
     if len(numbers) < 2:
         return missing(server, "MCS with one number")

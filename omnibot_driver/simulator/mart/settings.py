@@ -30,8 +30,8 @@ class Quirks:
         around, which RMCS then clamps.
     reference_start_counts_on: RM counts samples until the wheel turns. The count does not begin at
         zero, but continues from the count of the samples during the last stop of RM. After a stop
-        of 0.56 to 0.6 s RM fails at once; after a longer stop RM waits for a stuck motor without
-        end. The reason in the reply to RM is that of the last F or B.
+        of 0.56 to 0.6 s RM fails at once; after a longer stop RM waits endlessly for a stuck
+        motor. The reason in the reply to RM is that of the last F or B.
     speed_word_first: a speed word has an effect only before the number; after the number it is
         ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB with 0 inches, or with a word instead of a

@@ -2,8 +2,8 @@
 
 """State of a simulated server and its robot: true values, and the values that the server assumes.
 
-This module holds values, and computes others from them; it does not know how time passes, or
-commands.
+This module holds values, and computes others from them; it does not know commands, or how time
+passes.
 """
 
 import time
@@ -22,7 +22,7 @@ NEAR_READINGS_S = 0.15
 """Duration of the three readings that confirm a near obstacle, in s."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Time in s that the server adds to a negative duration, as it counts unsigned milliseconds."""
+"""Time in s that the server, which counts unsigned milliseconds, adds to a negative duration."""
 FILES = 100
 
 Then = Callable[..., None]
@@ -114,7 +114,7 @@ class ServerState:
 
     @property
     def driven_m(self) -> float:
-        """Distance of the right wheel in m since the encoder was reset, by the encoder counts."""
+        """Distance in m that the right wheel's encoder has counted since it was reset."""
         return self.chassis.counts * self.settings.metres_per_count
 
     @property
@@ -123,7 +123,7 @@ class ServerState:
         return self.manual or self.recording or any(each.running for each in self.motions)
 
     def save(self, note: FileNote) -> None:
-        """Store a file as that of the last move or turn; beyond 100 files, delete the oldest."""
+        """Store the file of the last move or turn; beyond 100 files, delete the oldest."""
         self.files[note.name] = note
         if len(self.files) > FILES:
             del self.files[next(iter(self.files))]

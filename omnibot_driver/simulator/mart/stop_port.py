@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stop port: stop commands that work while the command port is busy, without a reply.
+"""The stop port: commands that work while the command port is busy, and are never answered.
 
 This module knows the three commands of the stop port; it does not know those of the command port.
 """

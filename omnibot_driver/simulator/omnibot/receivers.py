@@ -71,7 +71,7 @@ def window(held: bytes, byte: int, pause_s: float) -> Step:
     """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
     Bytes of an accepted frame are searched again, so an FF FE within a frame may begin another
-    one. A byte may belong to a frame if an FF FE is among the last nine bytes.
+    frame. A byte may belong to a frame if an FF FE is among the last nine bytes.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
