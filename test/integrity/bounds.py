@@ -19,10 +19,10 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 class Bound:
     """Limits of a parser's errors under one fault of the line.
 
-    ``one_wrong_in_visible``, ``one_wrong_in_hidden``: at most one decoded frame in this many is
-    wrong (None: none is), where the chunking keeps the line's idle gaps and where it hides them.
-    ``delivered``: least share of the intact frames to decode; 1.0 means all after the first two of
-    a stream. ``chunkers``: the chunkings to which the limits apply.
+    ``one_wrong_in_visible``: at most one decoded frame in this many is wrong (None: none is), if
+    the chunking keeps the line's idle gaps. ``one_wrong_in_hidden``: this limit if the chunking
+    hides the gaps. ``delivered``: least share of the intact frames to decode; 1.0 means all after
+    the first two of a stream. ``chunkers``: the chunkings to which the limits apply.
     """
 
     one_wrong_in_visible: int | None

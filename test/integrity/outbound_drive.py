@@ -3,8 +3,8 @@
 """The driver's side of an outbound trial: what the real session writes, and when.
 
 A ``Scene`` is what the driver is asked to do. ``rehearse`` runs the session through a scene in
-simulated time, with the states that the board shows. This module imitates how a driver ends by its
-link and its guard.
+simulated time, with the states that the board shows. This module imitates what the driver's link
+and guard do when the driver ends.
 """
 
 import contextlib

@@ -75,7 +75,10 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 
 def test_what_the_driver_tells_is_explained() -> None:
-    """For each message, a sentence of the guide has its beginning or consists of its parts."""
+    """Each message has a sentence in the guide.
+
+    The sentence contains the message's beginning, or each part of the sentence is in the message.
+    """
 
     def is_explained(template: str) -> bool:
         begin = next((part for part in template.split(GAP) if len(part) > 9), template)

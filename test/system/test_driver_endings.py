@@ -42,7 +42,7 @@ import omnibot_driver.driver as driver, omnibot_driver.link as link
 link.STANDS_WITHIN_S = link.SILENCE_S = link.JOIN_TIMEOUT_S = 10.0
 driver.LONGEST_END_S = 50.0
 """
-"""Code that sets longer time limits, as a busy computer delays the board's report of rest.
+"""Code that sets longer time limits, because a busy computer delays the board's report of rest.
 
 On an idle computer the report comes early, and the limits have no effect.
 """

@@ -86,7 +86,7 @@ def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
 ) -> None:
     """For a wrong namespace the message names the running drivers, and the option for the first."""
     said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
-    assert "no driver /elsewhere/omnibot_driver here, but /fake/omnibot_driver" in said
+    assert "/elsewhere/omnibot_driver is running, but these are: /fake/omnibot_driver; try" in said
     assert said.endswith("try --namespace /fake")
 
 
@@ -162,7 +162,7 @@ def test_without_ros_one_sentence_says_so() -> None:
     command = [sys.executable, "-ES", "-m", "omnibot_driver.tools.monitor", "--once"]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=20.0)
     assert ended.returncode == 1
-    assert ended.stderr.startswith("monitor: this needs ROS 2 Jazzy's Python packages")
+    assert ended.stderr.startswith("monitor: this program needs ROS 2 Jazzy's Python packages")
     assert ended.stderr.count("\n") == 1
 
 

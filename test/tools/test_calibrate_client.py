@@ -38,7 +38,7 @@ def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) ->
     twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
     assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
     name = re.escape(robot.driver)
-    with pytest.raises(ToolError, match=f"there are several drivers here: {name}, {name}; end all"):
+    with pytest.raises(ToolError, match=f"several drivers in this namespace: {name}, {name}; end"):
         robot.drive(steady((0.1, 0.0, 0.0), 1.0), Bounds(speed=0.1, way=0.5, seconds=5.0))
     assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[before:])
 

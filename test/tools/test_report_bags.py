@@ -69,7 +69,7 @@ def test_a_bag_of_any_kind_tells_the_same(
 def test_a_single_file_of_a_bag_is_enough(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """A single file of a bag is read without metadata.yaml, as a killed recorder leaves it."""
+    """A file of a bag is read without metadata.yaml, which a killed recorder does not write."""
     (file,) = (
         file
         for file in write(tmp_path / "bag", [drive], plugin).iterdir()

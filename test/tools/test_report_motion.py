@@ -81,7 +81,7 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
-    """A gap in the odometry is not taken for rest, as the robot may turn during the gap."""
+    """A gap in the odometry is not regarded as rest, because the robot may turn in the gap."""
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
@@ -160,7 +160,7 @@ def test_an_estop_is_noted_and_what_it_stops_is_not_trouble(drive: Drive) -> Non
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
     drive.odom.values[rows, 3:] = 0.0
     drive.imu.values[drive.imu.stamp_s > 10.1, 2] = 0.001
-    assert "1 time, 9 s in all, first at 10.0 s" in said(drive, "E-stop", "Latched").text
+    assert "1 time, 9 s in all, first at 10.0 s" in said(drive, "E-stop", "The e-stop was").text
     assert not troubles(drive)
 
 
@@ -169,7 +169,7 @@ def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
     drive.estops += [(10.0, True)]
     moved = said(drive, "E-stop", "moved while")
     assert moved.level is Level.BAD
-    assert "still latched at the end" in said(drive, "E-stop", "Latched").text
+    assert "still latched at the end" in said(drive, "E-stop", "The e-stop was").text
 
 
 def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
@@ -186,7 +186,7 @@ def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None
     way = said(drive, "Odometry", "Driven").text.split(",")[0]
     drive.odom.values[450:, :3] = 0.0
     assert not troubles(drive)
-    assert "1 time" in said(drive, "Odometry", "began again").text
+    assert "1 time" in said(drive, "Odometry", "set back to zero").text
     assert said(drive, "Odometry", "Driven").text.startswith(way)
 
 

@@ -18,7 +18,7 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 NOISE_RADPS = 0.05
-"""Noise of a wheel rate, in rad/s, as the resolution of encoder and protocol causes it."""
+"""Noise of a wheel rate, in rad/s, caused by the resolution of encoder and protocol."""
 TOLERANCE = 0.01
 """Relative tolerance of a motor's constants, except its delay, whose tolerance is 1 ms."""
 

@@ -131,7 +131,7 @@ def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) 
 
 
 def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
-    """A long write is completed: the kernel takes the rest as the other end is read."""
+    """A long write is completed: the kernel takes the rest while the other end is read."""
     port = SerialPort(terminal.path, 115200)
     message = b"".join(b"%05d" % number for number in range(8000))
     reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))

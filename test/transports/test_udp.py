@@ -136,7 +136,7 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
     ],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
-    """The message for an invalid URL has the right form; the stop port, one higher, must exist."""
+    """The error shows the form of a URL; port 65535 is refused, because no port is one higher."""
     with pytest.raises(LinkError, match=r"give udp://HOST:PORT"):
         UdpPorts(url, 2)
 

@@ -83,8 +83,8 @@ def command_line() -> argparse.ArgumentParser:
         subparser.add_argument(
             "--apply",
             action="store_true",
-            help="also set the results in the running driver, except for parameters that it reads"
-            " only at its start",
+            help="set the results in the running driver as well as in the file, except for"
+            " parameters that the driver reads only at its start",
         )
         subparser.add_argument(
             "--namespace",
@@ -208,7 +208,8 @@ def _step(parser: argparse.ArgumentParser) -> None:
         "--steps",
         type=_whole,
         default=8,
-        help="number of steps in each direction, speeding up and slowing down (default 8)",
+        help="number of steps in each direction of rotation; steps up and steps down alternate"
+        " (default 8)",
     )
     parser.add_argument(
         "--gains",

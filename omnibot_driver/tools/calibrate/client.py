@@ -58,8 +58,8 @@ class Client:
         own = self._namespace()
         place = f"in the namespace {own}" if own else "without a namespace"
         raise ToolError(
-            f"no driver is running {place}, but elsewhere: {', '.join(others)}; choose one with"
-            " --namespace"
+            f"no driver is running {place}, but these drivers run elsewhere: {', '.join(others)};"
+            " choose one with --namespace"
         )
 
     def _require_alone(self) -> None:
@@ -70,7 +70,9 @@ class Client:
             for _ in self._node.get_publishers_info_by_topic(f"{name}/state")
         ]
         if len(here) > 1:
-            raise ToolError(f"there are several drivers here: {', '.join(here)}; end all but one")
+            raise ToolError(
+                f"there are several drivers in this namespace: {', '.join(here)}; end all but one"
+            )
 
     def _here(self) -> list[str]:
         return [

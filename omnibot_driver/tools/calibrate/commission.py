@@ -106,16 +106,16 @@ class Walk:
         slow, fast, found.control_method = self._mode_switch(slow_mps)
         if found.control_method == "position":
             say(
-                f"The commands were {slow_mps:.3f} m/s, then {2 * slow_mps:.3f} m/s. At their ends"
-                f" the robot moved at {slow.late_mps:.3f} m/s and {fast.late_mps:.3f} m/s, so the"
-                " switch is on positional control."
+                f"The commands were {slow_mps:.3f} m/s, then {2 * slow_mps:.3f} m/s. At the end"
+                f" of each command the robot moved at {slow.late_mps:.3f} m/s and"
+                f" {fast.late_mps:.3f} m/s, so the switch is on positional control."
             )
             return
         say(
             f"The robot moved at {slow.speed_mps:.3f} m/s, then at {fast.speed_mps:.3f} m/s, so the"
             " switch is on velocity control."
         )
-        say("Checking the odometry deltas: a turn on the spot, then forward once more.")
+        say("Checking the odometry deltas: a turn on the spot, then another drive forward.")
         seconds = TURN_RAD / TURN_RADPS
         log = self._drive([(seconds, (0.0, 0.0, TURN_RADPS))], obeys=False)
         began_s = log.commands.stamp_s[0]
@@ -166,10 +166,10 @@ class Walk:
     def wheels(self, found: Found) -> None:
         """Check the order of the wheels, and find the signs of the axes."""
         self._console.say(
-            "Look at each wheel from outside, towards the robot's centre. By the manual A is front"
-            " right, B front left, C at the back.\nAnswer with three signs, for A, B and C: + for"
-            " counter-clockwise, - for clockwise, 0 for still. An example is +00. Answer r to see"
-            " the motion again."
+            "Look at each wheel from outside, towards the robot's centre. According to the"
+            " manual, A is front right, B front left, C at the back.\nAnswer with three signs, for"
+            " A, B and C: + for counter-clockwise, - for clockwise, 0 for still. An example is +00."
+            " Answer r to see the motion again."
         )
         signs = [self._until_possible(lambda n=wheel: self._wheel(n)) for wheel in range(3)]  # type: ignore[misc]
         a, b, c = signs

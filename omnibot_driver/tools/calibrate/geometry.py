@@ -125,7 +125,7 @@ def _reading(
     else:
         far_mm = 3000.0 * arguments.side
         for axis, question in enumerate(("forward of", "to the left of")):
-            asked = f"How far {question} its mark is the robot's centre"
+            asked = f"How far is the robot's centre {question} its mark"
             end[axis] = console.number(asked, "mm", -far_mm, far_mm) / 1000.0
     sigma = np.array([arguments.tape / 1000.0] * 2 + [math.radians(arguments.angle)])
     return Reading(drive.name, path, end, sigma)

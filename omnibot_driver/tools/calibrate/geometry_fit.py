@@ -102,8 +102,8 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
     if not found.success or max(abs(wheels - 1), abs(base - 1)) > UNKNOWN:
         raise ToolError(
             "the readings do not fit this robot (wheel or base radius off by more than"
-            f" {UNKNOWN:.0%}): check their signs and units, and that a forward command drives the"
-            " robot forward, then try again"
+            f" {UNKNOWN:.0%}): check the signs and units of the readings, and that a forward"
+            " command drives the robot forward, then try again"
         )
     excess = max(1.0, 2 * found.cost / max(1, count + 3 - 4)) ** 0.5
     covariance = excess**2 * np.linalg.inv(found.jac.T @ found.jac)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 AXES: Final = "xyz"
 COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
 DRAWN: Final = 1000
-"""Largest number of readings to draw; more make the file larger, but not the picture clearer."""
+"""Largest number of readings to draw; more would enlarge the file, but not improve the picture."""
 GRAVITY_SIGMA: Final = 0.01
 """Standard deviation of the local gravity that the user gives, in m/s²."""
 

@@ -28,7 +28,7 @@ A, B, C for ``wheel_cmd``; None ends the motion.
 LOOK_S: Final = 1.0
 """Time, in s, over which commanded and measured motion are compared."""
 SLOW_LOOK_S: Final = 3.0
-"""Value of ``LOOK_S`` for boards that measure rarely, so that odometry is partly a prediction."""
+"""Value of ``LOOK_S`` for boards that measure so rarely that odometry is partly a prediction."""
 OBEYED_PART: Final = 0.2
 """The robot is regarded as not moving if it moves less than this fraction of its command."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"

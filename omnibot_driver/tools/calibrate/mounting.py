@@ -36,7 +36,7 @@ SNAP_RAD: Final = math.radians(15)
 HAND_RAD: Final = math.radians(2)
 """Least standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
-"""Weight of the level posture relative to a tilted one, as a floor is more exact than a hand."""
+"""Weight of the level posture relative to a tilted one; a floor is more exact than a hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def up(imu: Imu) -> Array:
     Raises Contradiction if the sensor moved, or did not measure gravity.
     """
     if not len(imu.stamp_s):
-        raise Contradiction("nothing was measured")
+        raise Contradiction("no reading of the IMU was received")
     trembling = float(np.max(np.std(imu.rate_radps, axis=0)))
     force: Array = np.mean(imu.force_mps2, axis=0)
     length = float(np.linalg.norm(force))
@@ -104,7 +104,7 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     if abs(square_rad - math.pi / 2) > SQUARE_RAD:
         raise Contradiction(
             f"the angle between the two tilts is {math.degrees(square_rad):.0f}° instead of 90°:"
-            " repeat both"
+            " repeat both tilts"
         )
     body = np.array(
         [

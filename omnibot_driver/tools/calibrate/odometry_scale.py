@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Number of straight drives; if the tape is misread after one of them, their results disagree."""
+"""Number of straight drives; if the tape is misread once, the results of the drives disagree."""
 UNLIKE: Final = 4.0
 """Two ratios disagree if they differ by more than this number of standard deviations."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
@@ -169,7 +169,7 @@ def result(
         one, other = mine
         if abs(one.value - other.value) > UNLIKE * math.hypot(one.value_sigma, other.value_sigma):
             notes.append(
-                f"{one.drive.name} and {other.drive.name} differ by"
+                f"The results of {one.drive.name} and {other.drive.name} differ by"
                 f" {abs(one.value / other.value - 1):.1%}: a reading is wrong, or the robot slips."
             )
     return Result(

@@ -262,7 +262,7 @@ class Robot(Listener):
             } - {self._node.get_fully_qualified_name()}
             raise ToolError(
                 f"another node commands the robot on {self._foreign}"
-                f" ({', '.join(sorted(others))}): end it first"
+                f" ({', '.join(sorted(others))}): end that node first"
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:

@@ -69,9 +69,9 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
         )
     if turned != [wheel]:
         raise Contradiction(
-            f"wheel {name} was commanded, but wheel {WHEELS[turned[0]]} was seen to turn. By the"
-            " manual A is front right, B front left, C at the back. Perhaps another side of the"
-            " robot is the front: look again from there. No parameter corrects the order of the"
+            f"wheel {name} was commanded, but wheel {WHEELS[turned[0]]} was seen to turn. According"
+            " to the manual, A is front right, B front left, C at the back. Perhaps another side of"
+            " the robot is the front: look again from there. No parameter corrects the order of the"
             " wheels"
         )
     return seen[wheel]

@@ -139,8 +139,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
         )
     if abs(gain - 1.0) > UNLIKE_ONE:
         remarks.append(
-            f"Wheel {wheel.name} turns {gain:.3f} times as fast as commanded, by the board's own"
-            " odometry: run `calibrate scale` to correct `linear_scale`."
+            f"Wheel {wheel.name} turns {gain:.3f} times as fast as commanded, according to the"
+            " board's own odometry: run `calibrate scale` to correct `linear_scale`."
         )
     return remarks
 

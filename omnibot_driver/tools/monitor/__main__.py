@@ -69,7 +69,7 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         type=float,
         default=10.0,
         metavar="S",
-        help="wait this many seconds for the driver, inf for ever (default: %(default)g)",
+        help="wait this many seconds for the driver; inf waits for ever (default: %(default)g)",
     )
     ours, ros = split_ros_arguments(arguments)
     options = parser.parse_args(ours)
@@ -77,7 +77,7 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     if not options.timeout > 0.0:
         parser.error("--timeout must be a number above 0")
     if options.once and options.teleop:
-        parser.error("--teleop needs the screen: leave --once and --json out")
+        parser.error("--teleop needs the screen: omit --once and --json")
     return options, ros
 
 
@@ -96,7 +96,7 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
         from omnibot_driver.tools.monitor.feed import Feed
     except ImportError as error:
         raise ToolError(
-            f"this needs ROS 2 Jazzy's Python packages ({error}): source its setup.bash"
+            f"this program needs ROS 2 Jazzy's Python packages ({error}): source its setup.bash"
         ) from error
     dead_man = DeadMan() if options.teleop else None
     feed = Feed(ros_arguments, options.namespace, options.driver, dead_man)
@@ -135,7 +135,9 @@ def _find(feed: "Feed", timeout_s: float) -> None:
     others = f"--namespace {namespace or '/'}" + (
         f" --driver {name}" if name != feed.driver.rpartition("/")[2] else ""
     )
-    raise ToolError(f"no driver {feed.driver} here, but {', '.join(there)}: try {others}")
+    raise ToolError(
+        f"no driver {feed.driver} is running, but these are: {', '.join(there)}; try {others}"
+    )
 
 
 def _gather(feed: "Feed", timeout_s: float) -> View:
@@ -156,8 +158,8 @@ def _print(view: View, feed: "Feed", as_json: bool) -> int:
         )
     if strange := view.not_finite():
         troubles.append(
-            f"not a finite number: {', '.join(strange)}; fix the node that publishes this before"
-            " you drive"
+            f"not a finite number: {', '.join(strange)}; before you drive, fix the node that"
+            " publishes such values"
         )
     print(
         text.as_json(view, troubles) if as_json else text.report(view), end="\n" if as_json else ""

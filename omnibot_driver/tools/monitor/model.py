@@ -34,8 +34,8 @@ JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
 """Largest speed, in m/s, that is regarded as motion of the robot.
 
-A pose that is further from the pose before than ``JUMP_M`` and this speed allow shows a reset of
-the odometry, and begins a new path.
+Between two poses the robot can move ``JUMP_M`` plus the distance at this speed. A pose further away
+shows a reset of the odometry, and begins a new path.
 """
 
 

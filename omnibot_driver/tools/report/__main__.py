@@ -29,7 +29,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
         epilog="Exit codes: 0 with a report, 3 if it finds something wrong, 1 with a message if"
         " there is nothing to report on, 2 on wrong usage. See docs/tools/report.md.",
     )
-    parser.add_argument("bag", nargs="?", type=Path, help="folder of a rosbag2, or a file of it")
+    parser.add_argument("bag", nargs="?", type=Path, help="folder or file of a rosbag2")
     parser.add_argument(
         "--live",
         type=float,

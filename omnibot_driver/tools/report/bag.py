@@ -55,7 +55,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
     if damaged:
         troubles.append(f"{counted(damaged, 'message')} damaged and skipped")
     if not recorder.count:
-        why = "; ".join(troubles) or "its topics are empty"
+        why = "; ".join(troubles) or "the topics of this robot are empty"
         raise ToolError(f"{path} has no message of the robot {robot}: {why}")
     return recorder.log(tuple(troubles), alone=len(robots) == 1)
 

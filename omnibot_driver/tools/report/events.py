@@ -45,7 +45,8 @@ def _states(log: Log) -> Iterator[Finding]:
             "State",
             f"The board was out of reach {counted(len(lost), 'time')}, first at"
             f" {lost[0].begin_s:.1f} s. Time in each state: {told}.",
-            "If you did not reset it or pull the cable, check cable, hub and the board's power.",
+            "If you did not reset the board or pull its cable, check cable, hub and the board's"
+            " power.",
         )
     elif "imu_only" in lengths:
         yield Finding(
@@ -89,9 +90,9 @@ def _estop(log: Log) -> Iterator[Finding]:
     yield Finding(
         Level.NOTE,
         "E-stop",
-        f"Latched {counted(len(log.latched), 'time')}, {span(length_s)} in all, first at"
-        f" {log.latched[0].begin_s:.1f} s{still}.",
-        "Release it with the service ~/estop (data: false) when it is safe to drive."
+        f"The e-stop was latched {counted(len(log.latched), 'time')}, {span(length_s)} in all,"
+        f" first at {log.latched[0].begin_s:.1f} s{still}.",
+        "Release the e-stop with the service ~/estop (data: false) when it is safe to drive."
         if still
         else "",
     )

@@ -145,7 +145,7 @@ def judge(log: Log) -> Iterator[Finding]:
                 Level.WARN,
                 "Commands",
                 f"{counted(broken, 'message')} of {name} with NaN, infinity or a wrong length.",
-                "The driver rejects them; fix the node that publishes them.",
+                "The driver rejects such messages; fix the node that publishes them.",
             )
     found = pairs(log)
     for pair in found:
@@ -207,7 +207,7 @@ def _ceased(log: Log, pair: Pair) -> Iterator[Finding]:
             f"{pair.topic} paused {counted(len(ceased), 'time')} for more than"
             f" {COMMAND_TIMEOUT_S:g} s while the robot moved, first at"
             f" {commands.arrived_s[ceased[0]]:.1f} s: the driver stopped the robot.",
-            "If that was not meant, publish at a steady rate of 10 Hz or more.",
+            "If you did not intend the pause, publish at a steady rate of 10 Hz or more.",
         )
 
 
@@ -264,8 +264,8 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
             Level.BAD,
             "E-stop",
             f"The robot moved while the e-stop was latched, first at {stopped[0].begin_s:.1f} s.",
-            "If it was not pushed, use the switch in the power line, and do not drive it before you"
-            " know the cause.",
+            "If the robot was not pushed, use the switch in the power line, and do not drive the"
+            " robot before you know the cause.",
         )
     elif untold:
         yield Finding(
@@ -273,6 +273,6 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
             "Commands",
             f"The robot moved {counted(len(untold), 'time')} without a command, first at"
             f" {untold[0].begin_s:.1f} s.",
-            "Someone may have pushed it, or a topic that is not in the recording may have"
+            "Someone may have pushed the robot, or a topic that is not in the recording may have"
             " commanded it. Otherwise see docs/safety.md.",
         )

@@ -57,7 +57,7 @@ def listen(
             executor.spin_once(timeout_sec=0.1)
         progress(int(seconds), int(seconds))
     except ExternalShutdownException as error:
-        raise ToolError("ROS was shut down meanwhile") from error
+        raise ToolError("ROS was shut down during the recording") from error
     finally:
         rclpy.try_shutdown()
     if not recorder.count:

@@ -17,7 +17,7 @@ from omnibot_driver.tools.report.log import Log, Series, Span, Status
 
 NO_STAMP: Final = -1
 WHEEL: Final = "wheel"
-"""Part of the name of every driven wheel's joint; no other joint has it in its name."""
+"""Part of the name of every driven wheel's joint; the names of other joints do not contain it."""
 DIAGNOSTICS: Final = "/diagnostics"
 
 Row = tuple[float, ...]

@@ -164,7 +164,7 @@ def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
             Level.BAD,
             "Timing",
             f"{counted(unstamped, 'message')} of {stream.name} without a stamp.",
-            "Find out who publishes it: this driver stamps all its messages.",
+            "Find out which node publishes such messages: this driver stamps all its messages.",
         )
     if len(rhythm.steps_s) < FEWEST:
         yield Finding(
@@ -185,8 +185,8 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         yield Finding(
             Level.BAD,
             "Timing",
-            f"{counted(back, 'stamp')} of {stream.name} not later than the one before.",
-            "Was the computer's clock set back meanwhile, or do two drivers publish?",
+            f"{counted(back, 'stamp')} of {stream.name} not later than the stamp before.",
+            "Was the computer's clock set back during the drive, or do two drivers publish?",
         )
     if len(rhythm.leap_s):
         yield Finding(
@@ -194,7 +194,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
             "Timing",
             f"Stamps of {stream.name} jumped {counted(len(rhythm.leap_s), 'time')}, by up to"
             f" {1e3 * (rhythm.leap_s.max() - rhythm.period_s):.0f} ms, first at"
-            f" {rhythm.leap_at_s[0]:.1f} s, and came back: nothing is missing.",
+            f" {rhythm.leap_at_s[0]:.1f} s, and later were right again: no message is missing.",
             "The driver could not read for a while: reduce the load of the computer.",
         )
     even = rhythm.steps_s[(rhythm.steps_s > 0.0) & (rhythm.steps_s <= GAP * rhythm.period_s)]
@@ -218,7 +218,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         Level.WARN if uneven else Level.GOOD,
         "Timing",
         f"The steps between stamps of {stream.name} vary by {1e3 * jitter_s:.3f} ms rms.",
-        "They should be sampling times: see docs/internals/time.md, and Time in /diagnostics."
+        "Stamps should be sampling times: see docs/internals/time.md, and Time in /diagnostics."
         if uneven
         else "",
     )
@@ -241,11 +241,14 @@ def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         )
     elif counted_lost == 0:
         advice = (
-            "The driver counts no loss, so the network, the recorder or a busy computer lost them:"
-            " record on the robot."
+            "The driver counts no loss, so the network, the recorder or a busy computer lost the"
+            " messages: record on the robot."
         )
     else:
-        advice = f"The driver counts {counted_lost} lost on the line: check cable, hub and ground."
+        advice = (
+            f"The driver's count of messages lost on the line is {counted_lost}: check cable, hub"
+            " and ground."
+        )
     yield Finding(
         Level.BAD if rhythm.gap_s[longest] > LONG_GAP_S or share > MANY_LOST else Level.WARN,
         "Gaps",

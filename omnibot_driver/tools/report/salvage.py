@@ -2,9 +2,9 @@
 
 """Repair files of bags whose recording was never finished; only a copy is changed.
 
-An mcap (mcap.dev/spec) is a sequence of records: an operation of one byte, a length of eight bytes,
-and that many bytes of content. An index follows; the records can also be read without it. The
-latest changes of an sqlite3 database are in a separate file beside it.
+An mcap (mcap.dev/spec) is a sequence of records. A record is an operation of one byte, the length
+of the content as a number of eight bytes, and the content. An index follows; the records can also
+be read without it. The latest changes of an sqlite3 database are in a separate file beside it.
 """
 
 import shutil

@@ -106,7 +106,8 @@ def judge(log: Log) -> Iterator[Finding]:
             Level.BAD,
             "IMU",
             f"{counted(broken, 'message')} of imu/data_raw with NaN or infinity.",
-            "This driver publishes none: find out who else publishes imu/data_raw.",
+            "This driver never publishes NaN or infinity: find out who else publishes"
+            " imu/data_raw.",
         )
     imu = log.imu.only(log.imu.finite & np.isfinite(log.imu.stamp_s))
     if len(imu) < BLOCK:
@@ -174,7 +175,8 @@ def _gravity(force: Array) -> Iterator[Finding]:
                 Level.WARN,
                 "IMU",
                 f"{figure}.",
-                "Put the robot on level ground. If it was level, set imu_rpy in the description.",
+                "Put the robot on level ground. If the ground in this recording was level, set"
+                " imu_rpy in the description.",
             )
         else:
             yield Finding(Level.GOOD, "IMU", f"{figure}.")
@@ -225,7 +227,7 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
         return
     ratio, total = found
     figure = (
-        f"The gyro measured {abs(ratio):.3f} times the rotation by the wheels,"
+        f"The gyro measured {abs(ratio):.3f} times the rotation in odom,"
         f" over {np.degrees(total):.0f}°"
     )
     if abs(abs(ratio) - 1.0) > TURN_TOLERANCE:

@@ -18,7 +18,7 @@ LEAP_RAD: Final = 0.35
 """Largest difference, in rad, between a pose and the pose that the twist leads to.
 
 ``LEAP_M`` is the same in m. A larger difference is a leap: the driver never corrects odom by more
-than this in one step (fastest_linear_speed limits it).
+than this in one step, because fastest_linear_speed limits its corrections.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
@@ -79,7 +79,7 @@ def judge(log: Log) -> Iterator[Finding]:
             Level.BAD,
             "Odometry",
             f"{counted(broken, 'message')} of odom with NaN or infinity.",
-            "This driver never publishes them: find the other publisher"
+            "This driver never publishes such values: find the other publisher"
             " (ros2 topic info --verbose odom).",
         )
     if len(odom) < 2:
@@ -104,7 +104,7 @@ def _leaps(odom: Series, found: Steps) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Odometry",
-            f"The pose began again at zero {counted(int(found.reset.sum()), 'time')}, first at"
+            f"The pose was set back to zero {counted(int(found.reset.sum()), 'time')}, first at"
             f" {at_s[found.reset][0]:.1f} s: ~/reset_odometry was called, or"
             " another driver was started.",
         )
@@ -117,7 +117,7 @@ def _leaps(odom: Series, found: Steps) -> Iterator[Finding]:
         Level.BAD,
         "Odometry",
         f"The pose jumps {counted(int(leap.sum()), 'time')} in a way that the twist does not"
-        f" explain: at {at_s[worst]:.1f} s by {found.off_m[worst]:.2f} m and"
+        f" explain; the largest jump was at {at_s[worst]:.1f} s, by {found.off_m[worst]:.2f} m and"
         f" {np.degrees(found.off_rad[worst]):.0f}°.",
         "Do two nodes publish odom? If not, look at the gaps and at fastest_linear_speed.",
     )

@@ -112,7 +112,7 @@ def test_a_robot_that_moves_is_not_proved_to_stand(
 
 
 def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) -> None:
-    """A displacement of unknown duration, as after a pause, does not prove rest."""
+    """A displacement of unknown duration, for example after a pause, does not prove rest."""
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
         proof.look(unknown, 10.1 + number * PERIOD_S)

@@ -141,7 +141,7 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
 def test_a_board_that_restarts_ends_the_motion_in_odom(
     firmware: Firmware, pair: tuple[int, int]
 ) -> None:
-    """Set points that are sent during a restart must not move the pose further than the robot."""
+    """The pose must not move further than the robot if set points are sent during a restart."""
     rig = settled(firmware)
     rig.order(*pair, 4.0)
     first = rig.driver.predicted(rig.now)

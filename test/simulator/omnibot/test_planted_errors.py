@@ -77,7 +77,7 @@ def test_a_motors_delay_holds_its_effort_back() -> None:
 
 
 def test_the_controllers_gains_are_those_given() -> None:
-    """The expected effort is calculated by hand, a tick after a step of 10: 5·10 + 2·10 + 1·10."""
+    """One tick after a step of 10, the effort is 5·10 + 2·10 + 1·10, calculated by hand."""
     gains = WheelGains(feed_forward=5.0, proportional=2.0, integral=1.0)
     assert WheelController(gains).update(10.0, 0.0) == 80.0
 
