@@ -48,7 +48,7 @@ def test_a_planted_motor_is_found(
     assert "The driver cannot set the gains" in table
     assert set(robot.written()) <= set(calibration.RECORDED)
     written = robot.written()["step"]
-    found, _ = written["wheels"]["B"]["motor in the manual's loop"]["PWM per count"]
+    found, _ = written["wheels"]["B"]["motor in the manual's control loop"]["PWM per count"]
     assert found == pytest.approx(35.0, abs=1.75)
     assert written["better_gains"][1] <= found + 0.01  # both are rounded values
     assert (tmp_path / "calibrate_step.png").stat().st_size > 20_000

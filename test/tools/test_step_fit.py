@@ -57,7 +57,7 @@ def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed:
 def test_a_motor_is_found_in_the_manuals_loop(
     pwm_per_count: float, lag_s: float, delay_s: float, seed: int
 ) -> None:
-    """The parameters of a motor in the manual's loop are found within five claimed sigmas.
+    """The parameters of a motor in the manual's control loop are found within five claimed sigmas.
 
     A model of first order does not fit better.
     """

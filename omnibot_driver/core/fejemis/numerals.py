@@ -23,7 +23,7 @@ LARGEST: Final = 4
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all usable numbers from 0.0001 to 10000 in rising order, and their texts.
 
-    ``negative``: the line has a minus sign.
+    ``negative``: whether the numbers are for a text with a minus sign; they then contain no ``6``.
     """
     digits = "024789" if negative else "0246789"
     mantissas = [

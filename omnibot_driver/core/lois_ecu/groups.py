@@ -87,9 +87,9 @@ class Assembler:
         self._payloads: list[int] = []
         self._done = False
         self._begun_at: dict[int, float] = {}
+        """Time at which the last group began, by command byte."""
         self._late_s: dict[int, float] = {}
-        """For each command byte: when its last group began, and the longest pause within a group,
-        in s."""
+        """Longest pause allowed within a group, in s, by command byte."""
         self._astray = False
         self._after_ticks = False
         self._appends = True
@@ -166,7 +166,7 @@ class Assembler:
     # Groups
 
     def _begin(self, code: int, now: float) -> None:
-        """Begin a group; compute its longest pause from the time since the group before."""
+        """Begin a group. Its longest allowed pause depends on the time since the previous group."""
         since_s = now - self._begun_at.get(code, -math.inf)
         if since_s > QUIET_S and not self._after_ticks:  # neither read nor sent together
             self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))

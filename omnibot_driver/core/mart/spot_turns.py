@@ -32,7 +32,7 @@ If the motors are known, a robot that turns slower than HELD is regarded as held
 LEAST_LESSON is learned as LEAST_LESSON, so that the next turn has at most 1.7 times the units.
 """
 EVEN: Final = 0.15
-"""Largest change of the rate, relative to its mean, with which a turn shows the motors' speed."""
+"""A turn shows the motors' speed only if its rate changes by less than this part of the mean."""
 HINDERED, TOO_FAST = 0.8, 1.12
 """Parts of the commanded rate. If a turn slower than HINDERED is followed by one faster than
 TOO_FAST, something held the robot in the slow turn, and what was learned from it is false."""

@@ -36,9 +36,10 @@ ASK_NAME_S: Final = 0.9
 class Stopping:
     """The stop of one motion.
 
-    ``began_s``: time of the first stop; ``started_s``: time at which the start was sent; ``owed``:
-    number of other requests whose reply is still to come and looks like a reply to the stop;
-    ``move``: the controlled move to stop, or None; the reply to the move itself ends the stop.
+    ``began_s``: time of the first stop command; ``started_s``: time at which the motion's start
+    was sent; ``owed``: number of other requests whose reply is still to come and looks like a
+    reply to the stop; ``move``: the controlled move to stop, or None; the reply to the move itself
+    ends the stop.
     """
 
     def __init__(

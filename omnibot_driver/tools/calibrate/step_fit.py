@@ -215,8 +215,8 @@ class WheelFound:
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
     """Fit the three models to a wheel's steps.
 
-    The models are those of first order, of second order, and of a motor in the manual's loop.
-    ``now``: the gains in the firmware.
+    The models are those of first order, of second order, and of a motor in the manual's control
+    loop. ``now``: the gains in the firmware.
     """
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (

@@ -112,7 +112,7 @@ SECOND_ORDER: Final = Model(
 def motor_model(gains: Gains) -> Model:
     """Return the model of a motor in the manual's control loop with the firmware's gains."""
     return Model(
-        "motor in the manual's loop",
+        "motor in the manual's control loop",
         ("gain", "PWM per count", "motor time constant", "motor delay"),
         ("", "PWM/(count/tick)", "s", "s"),
         (1.0, 45.0, 0.06, 0.005),

@@ -117,8 +117,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
     remarks = [
         f"Wheel {wheel.name}: the residuals are {first.rms_radps:.3f} rad/s with the model of first"
         f" order, {second.rms_radps:.3f} with that of second order, and {motor.rms_radps:.3f} with"
-        f" a motor in the manual's loop. Of the first two, {wheel.answer.model.title} fits better"
-        " by AIC."
+        " a motor in the manual's control loop. Of the first two,"
+        f" {wheel.answer.model.title} fits better by AIC."
     ]
     if wheel.left_out:
         remarks.append(
@@ -133,8 +133,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
         )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
-            f"Wheel {wheel.name}: no motor in the manual's loop explains these steps, so the"
-            " results for motor and gains are not valid. If the firmware was built with other gains"
+            f"Wheel {wheel.name}: no motor in the manual's control loop explains these steps, so"
+            " the results for motor and gains are not valid. If the firmware was built with other gains"
             " than those of --gains, give its gains."
         )
     if abs(gain - 1.0) > UNLIKE_ONE:

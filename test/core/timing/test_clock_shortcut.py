@@ -85,7 +85,7 @@ surprises = st.tuples(
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """Surprises follow a normal start, which enables the shortcut; all later reads are late."""
+    """Odd readings after a normal start get the same stamps with the shortcut as without it."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:
