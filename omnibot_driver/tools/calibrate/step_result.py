@@ -134,8 +134,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
             f"Wheel {wheel.name}: no motor in the manual's control loop explains these steps, so"
-            " the results for motor and gains are not valid. If the firmware was built with other gains"
-            " than those of --gains, give its gains."
+            " the results for motor and gains are not valid. If the firmware was built with gains"
+            " other than those of --gains, give its gains."
         )
     if abs(gain - 1.0) > UNLIKE_ONE:
         remarks.append(
