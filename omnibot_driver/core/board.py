@@ -30,7 +30,7 @@ class Mode(Enum):
     IMU_ONLY = "imu_only"
 
     running: bool
-    """True in the modes in which the board sends data and obeys motion commands."""
+    """Whether the board sends data and obeys motion commands in this mode."""
 
     def __init__(self, name: str) -> None:
         self.running = name in ("nominal", "imu_only")

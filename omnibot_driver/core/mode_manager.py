@@ -146,7 +146,7 @@ class ModeManager:
     def heard_paused(self, now: float, *, continues: bool) -> None:
         """Record that the board is paused.
 
-        ``continues``: the board was paused before as well, so it has not restarted.
+        ``continues``: whether the board was already paused before, and has not restarted since.
         """
         in_flight = now - self._said_at < IN_FLIGHT_S
         running_wanted = self._wanted is Wanted.RUNNING

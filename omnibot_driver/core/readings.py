@@ -33,8 +33,8 @@ class DisplacementReading:
     * ``duration_s``: None if unknown, as for the first displacement after a pause, which includes
       all motion during the pause.
     * ``lost``: number of displacements that are missing before this one.
-    * ``restarted``: the board's counters, and with them its earth frame, seem to start again with
-      this displacement.
+    * ``restarted``: whether the board's counters, and with them its earth frame, seem to start
+      again with this displacement.
     * ``measured``: False if the board cannot measure motion; the values are then the commanded
       ones.
     """
@@ -58,8 +58,8 @@ class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
     ``lost``: number of lost displacements whose motion this pose includes; the next displacement
-    does not count these losses again. ``restarted``: the counter of the poses starts again with
-    this pose; the counter of the displacements has restarted earlier.
+    does not count these losses again. ``restarted``: whether the counter of the poses starts again
+    with this pose; the counter of the displacements has then restarted earlier.
     """
 
     x_m: float
@@ -73,7 +73,8 @@ class PoseReading:
 class PausedReading:
     """The board reports that it is paused (or still initialising).
 
-    ``continues``: the board was paused at the previous report too, and has not restarted since.
+    ``continues``: whether the board was paused at the previous report too, and has not restarted
+    since.
     """
 
     continues: bool = False
@@ -118,7 +119,7 @@ class ResetReading:
 
 @dataclass(frozen=True, slots=True)
 class NoticeReading:
-    """A notice for the user; ``halt``: the robot must be stopped.
+    """A notice for the user; ``halt``: whether the robot must be stopped.
 
     An empty text means that the user already has this notice.
     """

@@ -54,7 +54,8 @@ class SafetyStops:
         self._liveness, self._reporter = liveness, reporter
         self._task = task
         self._button_held = False
-        """State of the e-stop button after its last event; the event may predate the connection."""
+        """Whether the e-stop button was held after its last event; the event may predate the
+        connection."""
 
     def react(self, measured: list[Measured], now: float) -> None:
         """Process the readings in order: report estimates, and stop the robot where necessary."""

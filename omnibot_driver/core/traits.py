@@ -22,13 +22,13 @@ class Traits:
     * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in the order of its values.
     * ``unheard_s``: after this time without data the robot is stopped.
     * ``silence_s``: after this time without data the mode of the board is unknown.
-    * ``own_odometry``: OdometryReadings give the robot's pose, and displacements only show whether
-      the robot obeys. Otherwise the driver integrates the displacements.
+    * ``own_odometry``: whether OdometryReadings give the robot's pose. If they do, displacements
+      only show whether the robot obeys; if not, the driver integrates the displacements.
     * ``stands_after_s``: if displacements show no motion for this time, the robot stands still.
     * ``unproved_s``: longest time for which Stop is repeated while the standstill is not shown.
     * ``baudrate``: whether the line has a baud rate to set.
-    * ``calibrates_gyro``: the board subtracts the gyro's bias itself, so its profile offers
-      ``~/calibrate_gyro``.
+    * ``calibrates_gyro``: whether the board subtracts the gyro's bias itself; its profile then
+      offers ``~/calibrate_gyro``.
     * ``stops_within_s``: longest time until the board obeys a stop, if it acknowledges stops.
     * ``slack_mps``, ``slack_radps``: how far the measured velocity may differ from the commanded
       one, in addition to the motion monitor's tolerance for any robot; for coarse displacements, or

@@ -18,8 +18,8 @@ from omnibot_driver.core.requests import Request
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    ``leaving``: the driver is shutting down, and refuses everything. ``missing``: which of the
-    board's lines are not open, as a sentence; empty if all are open.
+    ``leaving``: whether the driver is shutting down, and therefore refuses everything. ``missing``:
+    which of the board's lines are not open, as a sentence; empty if all are open.
     """
 
     def __init__(

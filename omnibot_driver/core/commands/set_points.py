@@ -23,8 +23,9 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""Largest growth of the distance (m) and the angle (rad) to a goal. No controller overshoots that
-far, so beyond these limits the robot is driving away from the goal."""
+"""``LEAVING_M``, ``LEAVING_RAD``: largest allowed growth of the distance in m, and of the angle in
+rad, to a goal. No controller overshoots that far, so beyond these limits the robot is driving away
+from the goal."""
 
 
 class Authority(Enum):

@@ -14,8 +14,9 @@ from omnibot_driver.core.readings import DisplacementReading
 
 STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
-"""Largest speeds that count as standstill, in m/s and rad/s: more than two encoder counts of a
-wheel in 40 ms, and less than the slowest linear command (0.014 m/s)."""
+"""``STILL_MPS``, ``STILL_RADPS``: largest speeds in m/s and rad/s that count as standstill. They
+are more than two encoder counts of a wheel in 40 ms, and less than the slowest linear command
+(0.014 m/s)."""
 STILL_S: Final = 0.1
 """Default duration of standstill for a proof, in s: three displacements of 40 ms, rounded down."""
 SLACK_S: Final = 1e-6
@@ -38,10 +39,10 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: Stop was sent, no motion was sent since, and the robot has stood still for
+    * ``proved``: whether Stop was sent, no motion was sent since, and the robot has stood still for
       ``still_s``.
-    * ``owed``: motion was sent, and nothing has proved since then that the robot stands still.
-    * ``measured``: a measured displacement has arrived since Stop was sent.
+    * ``owed``: whether motion was sent, and nothing has proved a standstill since then.
+    * ``measured``: whether a measured displacement has arrived since Stop was sent.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:

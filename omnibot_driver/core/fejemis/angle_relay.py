@@ -25,11 +25,12 @@ from omnibot_driver.core.fejemis.outbound import robust
 from omnibot_driver.core.fejemis.sums import MODULUS
 
 ROUNDED: Final = 5
-"""Largest rounding of an angle, in tenths of a degree."""
+"""Largest allowed rounding of an angle, in tenths of a degree."""
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Largest angle to the left, in degrees, that damage may make of an angle to the right."""
+"""A text of an angle to the right that damage can turn into angles to the left is accepted only if
+these angles are less than ``ACROSS`` degrees."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

@@ -42,23 +42,25 @@ LONGEST_TIME_S: Final = 1e7
 FARTHEST_M: Final = 1e5
 Range = tuple[float, float]
 TURN: Final[Range] = (-180.0, 180.0)
-"""Range of an angle, in degrees."""
+"""Accepted range of an angle, in degrees."""
 SPEED: Final[Range] = (-10.0, 10.0)
-"""Range of the speed of a wheel's rim, in m/s."""
+"""Accepted range of the speed of a wheel's rim, in m/s."""
 RATE: Final[Range] = (-4000.0, 4000.0)
-"""Range of a turn rate, in degrees per second; the gyros of such boards do not measure more."""
+"""Accepted range of a turn rate, in degrees per second; the gyros of such boards do not measure
+more."""
 FORCE: Final[Range] = (-320.0, 320.0)
-"""Range of the specific force, in m/s²; 320 m/s² are about 32 g."""
+"""Accepted range of the specific force, in m/s²; 320 m/s² are about 32 g."""
 FIELD: Final[Range] = (-5000.0, 5000.0)
-"""Range of the magnetic field, in µT."""
+"""Accepted range of the magnetic field, in µT."""
 ANGLE: Final[Range] = (-7.0, 7.0)
-"""Range of an attitude angle, in rad; wide enough for any convention of wrapping."""
+"""Accepted range of an attitude angle, in rad; wide enough for any convention of wrapping."""
 HEADING: Final[Range] = (-1e4, 1e4)
-"""Range of a pose's heading, in rad; wide, because a board may count full turns."""
+"""Accepted range of a pose's heading, in rad; wide, because a board may count full turns."""
 VOLTS: Final[Range] = (-1.0, 60.0)
 AMPS: Final[Range] = (-100.0, 100.0)
 NEAR: Final[Range] = (-1.0, 100.0)
-"""Range of a distance sensor's value, in m; a negative value reports a failed measurement."""
+"""Accepted range of a distance sensor's value, in m; a negative value reports a failed
+measurement."""
 TIME: Final[Range] = (0.0, LONGEST_TIME_S)
 PLACE: Final[Range] = (-FARTHEST_M, FARTHEST_M)
 ANY: Final[Range] = (-1e10, 1e10)
@@ -217,7 +219,8 @@ STATUS: Final = {
     "cpsteer": 1, "gyroo": 3, "acco": 3, "magw": 3, "mago": 3, "enc": 1, "mot": 1, "svp": 1,
     "svjt": 1, "tof1": 1, "gyroc": 1, "acccal2": 1, "brush": 1,
 }  # fmt: skip
-"""Keywords of status lines and of answers to requests, each with its smallest count of numbers."""
+"""Keywords of status lines and of answers to requests, each with the least accepted count of
+numbers."""
 WORDS: Final = ("id", "ver", "log", "confirm")
 _PARSERS: Final[dict[str, Parse]] = {
     "hbt": _heartbeat,

@@ -22,7 +22,7 @@ from omnibot_driver.core.fejemis.settings import LineSums
 from omnibot_driver.core.fejemis.sums import without_sum
 
 LONGEST_LINE: Final = 200
-"""Longest line in characters, equal to the size of the boards' own buffers."""
+"""Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
 """Number of heartbeats in a row that prove that the board began or ceased to send sums. A single
 heartbeat may be damaged."""
@@ -41,9 +41,10 @@ class DecoderStatistics:
 class FejemisDecoder:
     """Decoder of one board's lines; ``sums``: whether the lines have sums, None while unknown.
 
-    ``changed``: the lines began or ceased to have sums; the caller resets this flag. ``doubtful``:
-    the last line did not agree with ``sums``; lines to the board are then sent without a sum.
-    ``contradicted``: the last line contradicts the setting ``line_sums``.
+    ``changed``: whether the lines began or ceased to have sums; the caller resets this flag.
+    ``doubtful``: whether the last line did not agree with ``sums``; lines to the board are then
+    sent without a sum. ``contradicted``: whether the last line contradicts the setting
+    ``line_sums``.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -62,10 +62,11 @@ class Pair(Protocol):
 
 
 class Encoder:
-    """Encodes orders; ``held``: the speed is limited until the front wheel is at its angle.
+    """Encoder of orders.
 
-    ``restless``: whether to send the lines again with each front angle: while the speed is limited,
-    and always if lines have no checksums, so that a damaged line is replaced after 15 ms.
+    ``held``: whether the speed is limited until the front wheel is at its angle. ``restless``:
+    whether to send the lines again with each front angle: while the speed is limited, and always if
+    lines have no checksums, so that a damaged line is replaced after 15 ms.
     """
 
     def __init__(self, pair: Pair, settings: FejemisSettings) -> None:

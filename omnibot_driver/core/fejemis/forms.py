@@ -29,7 +29,10 @@ class Forms:
         self._kinds: dict[bytes, _Kind] = {}
 
     def admit(self, text: bytes, *, summed: bool) -> bool:
-        """Return whether the line has the form of its kind; ``summed``: its sum is correct."""
+        """Return whether the line has the form of its kind.
+
+        ``summed``: whether the line has a correct sum.
+        """
         keyword, *fields = text.split()
         form = tuple(map(_shape, fields))
         kind = self._kinds.get(keyword)

@@ -55,7 +55,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
 class Half:
-    """State of one board; ``identity``: from its heartbeats, None before the first one.
+    """State of one board; ``identity``: as in its heartbeats, None before the first heartbeat.
 
     ``restarted``: whether the board has restarted; the caller resets this flag.
 

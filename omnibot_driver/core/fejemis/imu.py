@@ -25,7 +25,7 @@ REGULAR: Final = 0.6
 If two samples in a row are late by a period, and arrive at least this interval apart, a sample was
 lost before them. If both samples had waited for a stalled host, they would have arrived at once."""
 CYCLE_S: Final = 0.0015
-"""Longest time in s in which one control cycle sends its lines, in any order."""
+"""Longest assumed time in s that one control cycle takes to send its lines, in any order."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 

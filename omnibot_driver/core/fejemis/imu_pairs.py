@@ -31,7 +31,8 @@ Kind = Literal["gyro", "acc"]
 
 PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
-"""Longest delay in s between two lines that are accepted as a pair without further evidence."""
+"""Longest allowed delay in s between two lines that are accepted as a pair without further
+evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """The evidence for which line comes first is a sum of pauses in s. From the sum ``KNOWN_S`` on, the
@@ -44,8 +45,8 @@ PATIENCE: Final = 60
 
 Neither order gains evidence if the board sends both lines half a period apart."""
 MOST: Final = 10
-"""Limit, positive and negative, of a difference of counts: lines of a kind that came outside of
-pairs, minus lines of the kind that came within pairs."""
+"""The difference of two counts is kept between ``-MOST`` and ``MOST``: the lines of a kind that
+came outside of pairs, minus the lines of that kind that came within pairs."""
 UNPOSED: Final = 20
 """Largest count of gyro or acceleration lines for which a pair waits for the next pose; after more
 lines, the pair is rejected."""
@@ -82,8 +83,7 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of a sample's first line; None while unknown."""
         self._evidence_s = 0.0
-        """Evidence that gyro lines come first; negative values: that acceleration lines come
-        first."""
+        """Evidence in s that gyro lines come first; if negative, that acceleration lines do."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None

@@ -80,7 +80,7 @@ class Inbound:
             self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
 
     def look(self, now: float, *, driving: bool) -> None:
-        """Check the timeouts, and update the mode; ``driving``: a motion is commanded."""
+        """Check the timeouts, and update the mode; ``driving``: whether a motion is commanded."""
         machine = self._upkeep.machine
         was_unheard, self._front_unheard = self._front_unheard, now >= self.watch.front_unheard_at
         if self.watch.look(now, driving=driving):

@@ -21,7 +21,8 @@ from omnibot_driver.core.fejemis.readings import Job, JobDone
 POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
 """The reason why nothing may move after a power-off was requested."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
-"""Pairs of digits whose codes add up to 99, so that a sum does not detect the loss of both."""
+"""Pairs of digits whose codes add up to 99, so that a sum does not detect the loss of both
+digits."""
 WITHIN_S: Final = 8.0
 CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
@@ -32,8 +33,8 @@ UNCHANGED_S: Final = 2.4
 """If the offsets are still unchanged ``UNCHANGED_S`` s after the request for a calibration, the
 request is regarded as lost."""
 CALIBRATIONS: Final = 2
-"""Largest number of requests for one calibration; it is requested again while the offsets are
-unchanged."""
+"""Largest number of requests for one calibration; while the offsets are unchanged, the calibration
+is requested again."""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
@@ -54,8 +55,8 @@ def whole_seconds(delay_s: float) -> int:
 class Jobs:
     """The running job; ``done``: results for the caller to take.
 
-    ``powering_off``: the power will be cut soon. ``reload``: the boards may have loaded a
-    configuration; the caller must read the configuration again and reset this flag.
+    ``powering_off``: whether the power will be cut soon. ``reload``: whether the boards may have
+    loaded a configuration; the caller must read the configuration again and reset this flag.
     """
 
     def __init__(self) -> None:

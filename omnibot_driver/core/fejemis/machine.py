@@ -26,8 +26,8 @@ come within this time, only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest fraction of the wanted voltage that the driver sends: the driver reduces the voltage if
-the sum of a line with the wanted voltage does not detect damage."""
+"""Smallest allowed fraction of the wanted voltage: the driver reduces the voltage if the sum of a
+line with the wanted voltage does not detect damage."""
 LEAST_TIME_S: Final = 0.04
 
 
@@ -44,8 +44,8 @@ class Machine:
         self._lift_line = b""
         """Lift line that is still to be sent; empty if no line is waiting."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """Times in s: when to send ``_lift_line``, when the next lift line may follow, and when the
-        lift stops."""
+        """``_lift_at``: time in s at which to send ``_lift_line``. ``_lift_again_at``: time from
+        which the next lift line may be sent. ``_lift_until``: time at which the lift stops."""
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf

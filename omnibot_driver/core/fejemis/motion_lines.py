@@ -30,9 +30,9 @@ ANGLE_COST: Final = 1e4
 """Cost of an angle error of 1 rad; numbers that are e (2.718) times too large have a cost of 1.
 """
 SLOWEST: Final = 30.0
-"""Largest ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
+"""Largest allowed ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
 SCALES: Final = 4.0
-"""Largest factor between a number in the front board's line and the commanded number."""
+"""Largest allowed factor between a number in the front board's line and the commanded number."""
 Candidate = tuple[float, str, str]
 """A possible line: cost, and texts of the speed (m/s) and turn rate (degrees/s) without signs."""
 

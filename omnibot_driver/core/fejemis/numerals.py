@@ -16,7 +16,7 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""The first digit of a number has a power of ten from ``SMALLEST`` to below ``LARGEST``."""
+"""The power of ten of a number's first digit is at least ``SMALLEST`` and less than ``LARGEST``."""
 
 
 @cache

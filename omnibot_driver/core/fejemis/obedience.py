@@ -21,8 +21,8 @@ START_AGAIN_S: Final = 0.2
 class Obedience:
     """Obedience of the drive board; ``source``: the last rcSource, None before the first.
 
-    ``estopped``: the driver's e-stop is latched. ``pause_said``: a pause was requested after the
-    last start.
+    ``estopped``: whether the driver's e-stop is latched. ``pause_said``: whether a pause was
+    requested after the last start.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Obedience:
             self.start_at = math.inf
 
     def latch(self, *, running: bool) -> None:
-        """Latch the driver's e-stop; ``running``: the board obeyed until now."""
+        """Latch the driver's e-stop; ``running``: whether the board obeyed until now."""
         if not self.estopped:
             self._resume = running
         self.estopped = True

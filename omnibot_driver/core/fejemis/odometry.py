@@ -22,7 +22,8 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Each displacement corrects this fraction of the difference between pose and speeds.
+"""Each displacement corrects this fraction of the difference between the pose and the integral of
+the speeds.
 
 The fraction applies if rounding alone explains the difference.
 """
@@ -40,7 +41,7 @@ SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
 FRESH_S: Final = 0.1
-"""Largest age in s of wheel speeds that are still used."""
+"""Largest allowed age in s of wheel speeds that are still used."""
 LEAST_S: Final = 0.001
 STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
@@ -66,7 +67,7 @@ class PoseOdometry:
         """Begin a new connection; keep the last pose, whose frame the board may still use."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
-        """Count of rejected poses in a row that agreed with the one before."""
+        """Count of rejected poses in a row, each of which agreed with the pose before it."""
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf

@@ -24,7 +24,10 @@ SWAPPED: Final = replace(TRAITS, channels=TRAITS.channels[::-1])
 
 
 class Ports:
-    """The two boards (halves) by channel; ``swapped``: the drive board is at the second port."""
+    """The two boards (halves) by channel.
+
+    ``swapped``: whether the drive board is at the second port.
+    """
 
     def __init__(self, settings: FejemisSettings) -> None:
         self.halves = Half(settings.line_sums), Half(settings.line_sums)

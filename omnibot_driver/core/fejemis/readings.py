@@ -51,9 +51,10 @@ class MagneticReading:
 
 @value(frozen=True, slots=True)
 class BatteryReading:
-    """State of the battery; ``amps``: negative while discharging, NaN if unknown.
+    """State of the battery.
 
-    ``cells``: 0 if unknown.
+    ``amps``: current in A, negative while discharging, NaN if unknown. ``cells``: count of cells, 0
+    if unknown.
     """
 
     volts: float

@@ -15,7 +15,7 @@ class Written(Enum):
     """Settings that a user may write to a board, each with its command and count of numbers."""
 
     WHEELS = "confw", 5
-    """Radius of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
+    """Radii of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
     STEERING = "confs", 2
     """Track and distance of the steered wheel from the axle, in m; written to both boards."""
     FRONT_WHEEL = "fwoffset", 2

@@ -12,7 +12,7 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest count of lines shown among the lines that a firmware does not know: the latest ones."""
+"""Of the lines that a firmware does not know, at most this number is shown: the latest lines."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

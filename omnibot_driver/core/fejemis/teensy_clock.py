@@ -15,11 +15,11 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Longest time in s by which a line may seem to arrive before it was sent; if it seems to arrive
-earlier, the board time in the line is implausible."""
+"""Longest allowed time in s by which a line may seem to arrive before it was sent; if it seems to
+arrive earlier, the board time in the line is implausible."""
 LATE_S: Final = 1.0
-"""Longest delay of a line in s, even if the host was busy; if the delay seems longer, the board
-time in the line is implausible."""
+"""Longest plausible delay of a line in s, even if the host was busy; if the delay seems longer, the
+board time in the line is implausible."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
@@ -44,8 +44,8 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """Count of implausible times in a row; ``_odd``: the first such time, and when it
-        arrived."""
+        """``_odds``: count of implausible times in a row. ``_odd``: the first of these times, and
+        when it arrived."""
         self._last_s = 0.0
 
     @property

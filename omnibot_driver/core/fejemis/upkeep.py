@@ -87,7 +87,7 @@ class Upkeep:
         return min(times)
 
     def due(self, now: float, *, stands: bool) -> Packets:
-        """Return the packets to send now; ``stands``: motion is not commanded."""
+        """Return the packets to send now; ``stands``: whether no motion is commanded."""
         packets = self._ports.ending("front", *self.machine.due(now))
         for role, texts in self.jobs.due(now).items():
             packets += self._ports.line(role, *texts)

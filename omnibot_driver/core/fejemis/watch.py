@@ -24,7 +24,10 @@ SLACK_S: Final = 1e-6
 
 
 class Watch:
-    """The timeouts; ``blind``: the front angle is too old. ``unposed``: the pose is too old."""
+    """The timeouts.
+
+    ``blind``: whether the front angle is too old. ``unposed``: whether the pose is too old.
+    """
 
     def __init__(self, ports: Ports, front: FrontWheel, told: Told) -> None:
         self._ports, self._front, self._told = ports, front, told

@@ -22,7 +22,7 @@ MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0
 """Length in s of an observation that was not requested."""
 GAP_S: Final = 0.2
-"""Longest pause between two readings of one observation, in s."""
+"""Longest allowed pause between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
 """Time in s within which a request is answered.
 
@@ -30,15 +30,17 @@ A service call may take five seconds; the remaining second is for writing a file
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
-"""Largest standard deviations of the gyro and the accelerometer at rest: ten times their noise.
+"""``STILL_RADPS``, ``STILL_MPS2``: largest standard deviations of the gyro and the accelerometer
+that are accepted as rest: ten times their noise.
 
 If the robot is touched, the deviations are larger."""
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
-"""Largest displacement at rest, in m and rad: resting wheels may report one count back and
-forth."""
+"""``STILL_M``, ``STILL_RAD``: largest displacement, in m and rad, that is accepted as rest: resting
+wheels may report one count back and forth."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
-"""Largest bias: the initial zero-rate output in the MPU-6050 product specification, section 6.1."""
+"""Largest accepted bias: the initial zero-rate output in the MPU-6050 product specification,
+section 6.1."""
 REFINEMENT: Final = 0.05
 """Fraction of the bias error that one block of ``BLOCK_S`` corrects; in 14 s, half is corrected."""
 

@@ -23,7 +23,7 @@ _RADPS_PER_COUNT: Final = {
 }
 
 ACCEL_TOLERANCE: Final = 0.1
-"""Largest relative error, due to tolerance and bias, of the gravity that a working sensor reads."""
+"""Largest accepted relative error of the measured gravity; tolerance and bias can explain it."""
 
 Counts = tuple[int, int, int]
 

@@ -15,7 +15,7 @@ from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
 """Number of groups of ticks that must have come before odometry with its own command byte (0x20)
-proves that the board is one as in the manual."""
+proves that the board behaves as the manual says."""
 UNCOUNTED_M: Final = 0.06
 """Distance in m that wheels roll backward without a negative count before the driver concludes that
 ticks do not count backward."""
@@ -24,8 +24,8 @@ ticks do not count backward."""
 class BoardKind:
     """Kind of the board; it selects how ``motion`` models the board.
 
-    ``appends``: the board sends odometry after each group of ticks, with the same command byte, as
-    the public firmware does.
+    ``appends``: whether the board sends odometry after each group of ticks, with the same command
+    byte, as the public firmware does.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -41,7 +41,10 @@ class BoardKind:
             self._motion.signed = self._seen_signed = True
 
     def took_odometry(self, *, appended: bool) -> None:
-        """Record a group of odometry; ``appended``: the group has the command byte of the ticks."""
+        """Record a group of odometry.
+
+        ``appended``: whether the group has the command byte of the ticks.
+        """
         motion = self._motion
         if appended and not self.appends:
             self.appends, motion.holds = True, True

@@ -22,10 +22,11 @@ class Told:
     """Changes that an odometry group (0x20) reports since the group before.
 
     ``turned_m``: distance of the right rim minus that of the left rim. ``along_m``: distance of the
-    middle of the axle. ``still``: position and heading did not change. ``same_velocity``: the
-    velocity did not change. If ``still`` and ``same_velocity`` are both true, no wheel has ticked,
-    unless both wheel speeds are equal. ``speeds_mps``: speeds of the left and right rim at the last
-    tick, rounded down to whole RPM; None if no wheel speeds in whole RPM give this velocity.
+    middle of the axle. ``still``: whether position and heading are unchanged. ``same_velocity``:
+    whether the velocity is unchanged. If ``still`` and ``same_velocity`` are both true, no wheel
+    has ticked, unless both wheel speeds are equal. ``speeds_mps``: speeds of the left and right rim
+    at the last tick, rounded down to whole RPM; None if no wheel speeds in whole RPM give this
+    velocity.
     """
 
     turned_m: float

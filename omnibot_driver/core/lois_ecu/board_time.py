@@ -27,11 +27,12 @@ LATEST_S: Final = 0.25
 """Longest plausible delay in s; a longer delay means that the board has restarted, or that its
 clock has another unit."""
 UNKNOWN_S: Final = 0.012
-"""Standard deviation of an arrival time in s, while the unit of the board's clock is unknown."""
+"""Assumed standard deviation of an arrival time in s, while the unit of the board's clock is
+unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Longest time in s between groups that were read together after a pause of the reader. Only the
-last of these groups is stored, because its delay is the smallest."""
+"""Longest assumed time in s between groups that were read together after a pause of the reader.
+Only the last of these groups is stored, because its delay is the smallest."""
 Point = tuple[float, float]
 """Arrival time in s, and how far the board's clock is behind the arrival time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}

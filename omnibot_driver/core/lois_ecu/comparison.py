@@ -33,7 +33,8 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Age in s of ticks when their last line arrives; ``ODOMETRY_AGE_S`` is the age of odometry."""
+"""Assumed age in s of ticks when their last line arrives; ``ODOMETRY_AGE_S`` is that of
+odometry."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
@@ -41,7 +42,8 @@ ALONG_VARIANCE: Final = 0.15
 in 0x20 (odometry), and ``ALONG_VARIANCE`` of the distance in 0x20."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Residual in ticks that shows a change of the wheel's speed without a change of its set-point."""
+"""Residual in ticks above which the wheel's speed is assumed to have changed without a change of
+its set-point."""
 SAME_TICKS: Final = 0.6
 """Residual in ticks below which an unchanged count is not used as a measurement."""
 LEAP: Final = 5.0

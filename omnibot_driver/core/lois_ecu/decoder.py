@@ -22,7 +22,7 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
 from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
 
 LONGEST_LINE: Final = 256
-"""Limit of a line in bytes: longer than any line of a serial sensor."""
+"""Largest accepted length of a line in bytes: longer than any line of a serial sensor."""
 
 
 @dataclass(slots=True)
@@ -42,10 +42,10 @@ class DecoderStatistics:
 class LoisDecoder:
     """Decoder of the bytes from one serial port.
 
-    If ``sum_required`` is false, lines without a checksum are accepted too. ``terminal``: the board
-    passes on a sensor's lines, so text is returned and not regarded as damage. ``times``: for each
-    report that the last call returned, the arrival time of the report's last line, which may be
-    earlier than the call.
+    If ``sum_required`` is false, lines without a checksum are accepted too. ``terminal``: whether
+    the board passes on a sensor's lines, so text is returned and not regarded as damage. ``times``:
+    for each report that the last call returned, the arrival time of the report's last line, which
+    may be earlier than the call.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:

@@ -20,7 +20,7 @@ class FusedOdometry:
     ``twist_covariance``: variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
     ``displacement``: motion since the previous estimate, in the robot's axes. ``wheel_ways_m``:
     distances of the board's left and right wheel since the previous estimate, for wheels of nominal
-    size. ``blind``: the motion is known from commands, because ticks do not show it.
+    size. ``blind``: whether the motion is known only from commands, because ticks do not show it.
     """
 
     stamp_s: float

@@ -52,8 +52,8 @@ QUIET_S: Final = 0.05
 group 1.2 ms apart, and a reader usually delivers them within ``QUIET_S``."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest pause within a group: ``LATE_S`` in s, and ``LATE_PART`` as a fraction of the time
-between the markers of the group and the group before."""
+"""Longest allowed pause within a group: ``LATE_S`` in s, or if that is shorter, ``LATE_PART`` times
+the time between the markers of the previous group and of this group; at least ``QUIET_S``."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),

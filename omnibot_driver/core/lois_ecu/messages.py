@@ -246,8 +246,8 @@ class Heading:
 class Ticks:
     """Encoder ticks since the board started or was reset, and the board's time of sending them.
 
-    ``time_counts``: in ns by the manual, in ms by the public firmware; wraps at 2³². Ticks are
-    signed.
+    ``time_counts``: the board's time, in ns according to the manual, but in ms in the public
+    firmware; wraps at 2³². Ticks are signed.
     """
 
     time_counts: int
@@ -259,8 +259,8 @@ class Ticks:
 class BoardOdometry:
     """The board's own dead reckoning, in its earth frame; velocities may be NaN or infinite.
 
-    ``appended``: the group came directly after a group of ticks, with the command byte of the
-    ticks.
+    ``appended``: whether the group came directly after a group of ticks, with the command byte of
+    the ticks.
     """
 
     x_m: float

@@ -46,9 +46,9 @@ LONGEST_STEP_S: Final = 2.0
 """Longest time in s that one call of ``advance`` predicts; of a longer time, it predicts only the
 last part."""
 ROLLED_OUT_S: Final = 0.15
-"""Time in s for which a wheel rolls on at its last speed after it has lost power."""
+"""Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
-"""Standard deviation of the time at which a command takes effect, in controller periods."""
+"""Assumed standard deviation of the time at which a command takes effect, in controller periods."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
 """``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the fraction of an RPM that the
@@ -70,8 +70,8 @@ class MotionFilter:
 
     ``tick_m``, ``rpm_mps``: distance that the rim of a wheel moves in one tick, and the speed of
     the rim at one RPM. ``turn_sign``: -1 if the board's left wheel is the robot's right one.
-    ``signed``: ticks always count in both directions. ``holds``: the board keeps the last measured
-    speed of a wheel at rest.
+    ``signed``: whether ticks always count in both directions. ``holds``: whether the board keeps
+    the last measured speed of a wheel at rest.
 
     ``tuned``: whether the controllers have gains that the user set. If a wheel is halted soon after
     a change of its set-point, it did not roll at the speed of the model, and perhaps rolled in the
@@ -176,8 +176,8 @@ class MotionFilter:
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
         """Add an error to a wheel's distance, and to all states that depend on that distance.
 
-        ``stddev_m``: standard deviation of the error. ``counted``: the error arose before the board
-        stopped counting the wheel's ticks.
+        ``stddev_m``: standard deviation of the error. ``counted``: whether the error arose before
+        the board stopped counting the wheel's ticks.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)

@@ -34,7 +34,7 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 WHEEL_DRIFT: Final = 0.0035
 """Random walk of a wheel on the ground: standard deviation in m after 1 m."""
 LATE_S: Final = 0.012
-"""Standard deviation of an arrival time in s, while no better value is known."""
+"""Assumed standard deviation of an arrival time in s, while no better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
 """The pose is predicted for at most ``UNHEARD_S`` s after the last report, or ``UNHEARD_GROUPS``
@@ -53,7 +53,7 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._may_roll_mps = [0.0, 0.0]
-        """Greatest speed that each wheel may have had since the last report, in m/s."""
+        """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
         self._uncertainty = Uncertainty(OdometryNoise())
         self._source: Source = "standing"

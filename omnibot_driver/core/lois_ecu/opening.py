@@ -191,7 +191,7 @@ class SettingsWriter:
         return outbound.lines(*found, with_sum=self.settings.with_sum)
 
     def _begin_round(self, now: float) -> None:
-        """Queue all settings, unless those of the round before are still being sent."""
+        """Queue all settings, unless some settings of the previous round are not sent yet."""
         if self._queue or not self._rounds_left:
             return
         self._rounds_left -= 1

@@ -33,10 +33,11 @@ from omnibot_driver.core.lois_ecu.messages import (
 STOP: Final = SetDuty(0, 0)
 EMERGENCY_STOP: Final = SetRpm(0, 0)
 MOST_RPM: Final = 50
-"""Largest set-point in RPM; the firmware does not drive faster."""
+"""Largest allowed set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""RPM 0/0 is sent before each of this many set-points after a Stop, because lines may be lost."""
+"""After a Stop, RPM 0/0 is sent before each of the first ``CLEARED_TIMES`` set-points, because
+lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

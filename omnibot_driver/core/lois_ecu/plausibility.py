@@ -24,10 +24,10 @@ POSE_MARGIN_RAD: Final = 1.0
 FARTHEST: Final = 1e5
 """Largest plausible position in m, and yaw in rad, of a robot on one charge."""
 LATEST_S: Final = 0.3
-"""Longest time in s from the sending of a group to its arrival."""
+"""Longest plausible time in s from the sending of a group to its arrival."""
 SLOWEST_CLOCK: Final = 0.5
-"""Lowest rate of the board's clock, as a fraction of real time; the clock stops while the board
-sends."""
+"""Lowest plausible rate of the board's clock, as a fraction of real time; the clock stops while the
+board sends."""
 SURE_AFTER: Final = 2
 """Number of further clock steps in the same unit after which the unit is accepted."""
 LEARNT_FROM_S: Final = 0.15

@@ -16,7 +16,7 @@ from omnibot_driver.core.readings import DisplacementReading
 class FixReading:
     """GPS position in degrees, north and east positive.
 
-    ``valid``: the position is not 0/0, and the GPS has a date.
+    ``valid``: whether the position is not 0/0, and the GPS has a date.
     """
 
     latitude_deg: float

@@ -31,8 +31,8 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s at which the request is sent. The intervals are longer than the board can be deaf, and
-are not multiples of its usual periods."""
+"""Times in s, from the first time on, at which the request is sent. The intervals are longer than
+the board can be deaf, and are not multiples of its usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 """Time unit in s of an RPM record, by the unit of the time in 0x12. The public firmware uses other
 units than the manual, for the time and for the record."""

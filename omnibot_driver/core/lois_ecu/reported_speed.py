@@ -16,10 +16,10 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Age in s of odometry when its last line arrives: a line of 14 characters takes 1.2 ms, and the
-values are from the time at which the first line began."""
+"""Assumed age in s of odometry when its last line arrives: a line of 14 characters takes 1.2 ms,
+and the values are from the time at which the first line began."""
 DOUBT: Final = 3.0
-"""Residual, in standard deviations, that shows an error of the estimate instead of noise."""
+"""Residual, in standard deviations, above which an error of the estimate is assumed, not noise."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used: at a lower speed the wheel may have been at rest
 between the last two ticks."""
@@ -32,9 +32,9 @@ JUMP_RPM_PER_S: Final = 200.0
 larger change shows a tick that was delayed while the board sent something else."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""Largest difference from the expected speed, for a wheel with a constant set-point and gains that
-the user set: ``STRAY_RPM``, plus the fraction ``STRAY_PART`` of the expected speed. A single speed
-that differs by more comes from a delayed tick, or from the tick after it."""
+"""Largest plausible difference from the expected speed, for a wheel with a constant set-point and
+gains that the user set: ``STRAY_RPM``, plus the fraction ``STRAY_PART`` of the expected speed. A
+single speed that differs by more comes from a delayed tick, or from the tick after it."""
 COASTED_TICKS: Final = 1.0
 """Number of ticks by which a wheel that comes to rest rolls less far than its last reported speed
 suggests."""
@@ -43,8 +43,8 @@ SWINGS_PART: Final = 0.4
 """Fraction of the time between two reports for which an unexpected change of speed may have
 lasted."""
 UNSEEN_PART: Final = 0.6
-"""Largest fraction of ``WINDUP_M`` that the controller's integral can have reached while the wheel
-shows no tick."""
+"""Largest assumed fraction of ``WINDUP_M`` that the controller's integral can have reached while
+the wheel shows no tick."""
 
 
 class ReportedSpeed:

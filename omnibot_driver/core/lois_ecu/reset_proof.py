@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.messages import Ticks
 
 FEW_TICKS: Final = 20
-"""Largest number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
+"""Largest assumed number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
 """A number of ticks that no wheel can roll between a reset and the next counts."""
 STEADY_TICKS: Final = 3
@@ -25,8 +25,8 @@ repeated."""
 class ResetProof:
     """Search for a proof that the board has obeyed a reset.
 
-    ``before``: counts when the reset was sent, or None if unknown. ``steady``: the counts had not
-    changed for some time. ``remark``: what was not proved, as a sentence.
+    ``before``: counts when the reset was sent, or None if unknown. ``steady``: whether the counts
+    had not changed for some time. ``remark``: what was not proved, as a sentence.
     """
 
     def __init__(self, before: Ticks | None, *, steady: bool) -> None:

@@ -25,9 +25,9 @@ class SetPoints:
     """Encoder of set-points, with a memory of the set-points that were sent.
 
     ``saturated``: number of commands that were slowed because they were too fast. ``stopped_at_s``:
-    time since which only zeros were sent, infinite while the robot is driven. ``stood``: the robot
-    was seen at rest since ``stopped_at_s``. ``moved_at_s``: time at which a motion command was last
-    sent.
+    time since which only zeros were sent, infinite while the robot is driven. ``stood``: whether
+    the robot was seen at rest since ``stopped_at_s``. ``moved_at_s``: time at which a motion
+    command was last sent.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

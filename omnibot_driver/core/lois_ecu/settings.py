@@ -22,15 +22,16 @@ part of the time, and it cannot receive while it sends."""
 class LoisEcuSettings:
     """Settings of a LOIS ECU and its robot.
 
-    ``inverted``: the board's left wheel is the robot's right wheel, and vice versa. ``drive_mode``:
-    whether ``cmd_vel`` is sent as RPM or as duty. ``duty_scale``: percent of duty for each m/s of a
-    rim; ``max_duty``: largest percentage for a motor. ``low_pass``: 0..1, the fraction of a change
-    of the set-point that each step of the speed controller applies; until ``low_pass`` is written
-    to the board, the wheels never turn in RPM mode. ``written``: further settings that the user
-    wants on the board. ``periods_ms``: periods of the messages that the board sends periodically;
-    the periods of other messages are not changed. ``with_sum``: lines to the board have a checksum.
-    ``declination_rad``: declination of magnetic north, east positive. ``odom_rate_hz``: rate at
-    which the odometry is published; between two groups it is predicted.
+    ``inverted``: whether the board's left wheel is the robot's right wheel, and vice versa.
+    ``drive_mode``: whether ``cmd_vel`` is sent as RPM or as duty. ``duty_scale``: percent of duty
+    for each m/s of a rim; ``max_duty``: largest percentage for a motor. ``low_pass``: 0..1, the
+    fraction of a change of the set-point that each step of the speed controller applies; until
+    ``low_pass`` is written to the board, the wheels never turn in RPM mode. ``written``: further
+    settings that the user wants on the board. ``periods_ms``: periods of the messages that the
+    board sends periodically; the periods of other messages are not changed. ``with_sum``: whether
+    lines to the board have a checksum. ``declination_rad``: declination of magnetic north, east
+    positive. ``odom_rate_hz``: rate at which the odometry is published; between two groups it is
+    predicted.
     """
 
     wheel_radius_m: float = 0.13

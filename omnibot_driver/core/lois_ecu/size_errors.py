@@ -15,7 +15,8 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
 
 KINDS: Final = 3
-"""Number of kinds of errors: size of the left wheel, size of the right wheel, slip of both."""
+"""Number of kinds of errors: size of the left wheel, size of the right wheel, slip of both
+wheels."""
 WHEEL_SCALE: Final = 0.01
 WHEEL_SLIP: Final = 0.005
 """``WHEEL_SCALE``, ``WHEEL_SLIP``: standard deviations of a wheel's relative size, and of the

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 Terms = Sequence[tuple[int, float]]
-"""Pairs of the index of a state and the factor of that state."""
+"""Pairs, each of the index of a state and the factor of that state."""
 
 LEAST_VARIANCE: Final = 1e-12
 

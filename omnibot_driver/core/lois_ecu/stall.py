@@ -24,8 +24,8 @@ from omnibot_driver.core.lois_ecu.resting import FASTEST_RPM
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 STALLED_S: Final = 2.0
-"""Time in s without a sign of motion after which a wheel is stalled; with the firmware's own gains
-a wheel starts in half of this time."""
+"""Time in s without a sign of motion after which a wheel is regarded as stalled; with the
+firmware's own gains a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
@@ -34,7 +34,7 @@ TOO_FAST_RPM: Final = 3
 speed beyond both limits is the last speed of a wheel at rest, because a wheel that rolls backward
 exceeds its set-point by at most 10 % and one RPM."""
 UNLIKE: Final = 1.15
-"""Largest ratio of the relative speeds (speed divided by set-point) of two wheels that roll
+"""Largest assumed ratio of the relative speeds (speed divided by set-point) of two wheels that roll
 backward."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4

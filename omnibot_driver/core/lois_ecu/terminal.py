@@ -100,7 +100,7 @@ class ModeChange:
         return True
 
     def due(self, now: float, *, settled: bool) -> TerminalMode | None:
-        """Return the mode to write now, or None. ``settled``: all settings have been sent."""
+        """Return the mode to write now, or None. ``settled``: whether all settings were sent."""
         if self._stopping or now < self._again_at_s:
             return None
         if self.sensor_wanted:

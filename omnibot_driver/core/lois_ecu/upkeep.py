@@ -53,7 +53,7 @@ class Upkeep:
     def due(self, now: float, *, stands: bool) -> bytes:
         """Return the bytes to write now; called at ``wake_at``.
 
-        ``stands``: the robot is seen at rest.
+        ``stands``: whether the robot is seen at rest.
         """
         if not self.opened:
             self.opened = True

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 HEARD_S: Final = 0.008
-"""Time in s from the writing of a line until the board has read it."""
+"""Assumed time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
 """Period of the speed controller in s: ``STEP_S`` in the manual, ``FIRMWARE_STEP_S`` in the public
@@ -25,8 +25,8 @@ CommandKind = Literal["rpm", "duty"]
 class _Effect:
     """What happens to a wheel's command at ``at_s``.
 
-    ``halts``: the firmware sets its RPM target to zero; otherwise it carries out the command with
-    ``kind`` and ``speed_mps``.
+    ``halts``: whether the firmware sets its RPM target to zero; if not, it carries out the command
+    with ``kind`` and ``speed_mps``.
     """
 
     at_s: float

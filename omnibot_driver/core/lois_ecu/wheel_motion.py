@@ -43,8 +43,8 @@ power."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
-"""Longest time in s for which a wheel rolls on in the old direction after its set-point has changed
-sign."""
+"""Longest assumed time in s for which a wheel rolls on in the old direction after its set-point has
+changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
 """Time in s for which the speed of a halted wheel has differed from the model: with the board's own
 gains, and with gains that the user set. With the public firmware's own gains the speed
@@ -134,8 +134,8 @@ class Wheel:
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
         """Add the motion of the wheel in one step to ``step``.
 
-        ``holds``: the board keeps the last measured speed of a wheel at rest. ``signed``: ticks
-        count in both directions.
+        ``holds``: whether the board keeps the last measured speed of a wheel at rest. ``signed``:
+        whether ticks count in both directions.
         """
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]

@@ -39,9 +39,11 @@ Stamped = tuple[Reading, float]
 OUT_OF_PROPORTION: Final = 3.0
 """Least ratio of a spike to the largest recent step."""
 CALMING: Final = 0.95
-"""Factor by which each reading reduces the largest recent step; 20 readings leave a third of it."""
+"""Each reading multiplies the largest recent step by this factor; 20 readings leave a third of
+it."""
 STILL: Final = 0.08
-"""Largest change of the sensor's other values in a spike, as a fraction of the spike's leap.
+"""Largest allowed change of the sensor's other values in a spike, as a fraction of the spike's
+leap.
 
 After the spike, each value may still differ from its value before the spike by this fraction.
 """
@@ -205,7 +207,7 @@ class OutlierFilter:
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """Add the rejected displacements to the losses before this one; return the result."""
+        """Add the rejected displacements to ``reading.lost``; return the new reading."""
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,

@@ -45,7 +45,8 @@ class StreamStatistics:
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0
-    """Number of times in a row that each sensor has repeated exactly the same values."""
+    """``same_force``, ``same_rate``: how many times in a row the accelerometer and the gyro have
+    repeated exactly the same values."""
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
@@ -80,7 +81,7 @@ class StreamStatistics:
                 self._sent_imu = None
 
     def _miss_imus(self, reading: DisplacementReading) -> None:
-        """Count the IMU readings that displacements show to be lost, unless already counted."""
+        """Count the IMU readings that displacements show to be lost; count each only once."""
         if self.imu_period_s is None:
             return
         if reading.duration_s is None or reading.restarted:

@@ -19,7 +19,7 @@ STRETCH: Final = 1.2
 """Allowed ratio of speed to set-point: scales are set by hand, and controllers overshoot."""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""Noise in m/s and rad/s that is always allowed.
+"""``NOISE_MPS``, ``NOISE_RADPS``: noise in m/s and rad/s that is always allowed.
 
 The causes are encoder counts, rounding, and a slope on which a slow controller lets the robot roll.
 """
@@ -36,7 +36,8 @@ Overshoot is allowed only if the robot leaves a set-point other than rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""Allowed yaw rate per speed, and speed per yaw rate, for wheels that differ by some per cent."""
+"""``SKEW_RADPS_PER_MPS``, ``SKEW_MPS_PER_RADPS``: allowed yaw rate per speed, and allowed speed per
+yaw rate, for wheels that differ by some per cent."""
 CHANGING_RADPS_PER_MPS: Final = 0.4
 """Allowed yaw rate per change of speed, for wheels that accelerate differently."""
 

@@ -19,10 +19,9 @@ RISING_S: Final = 0.16
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of ``UNEXPLAINED_M`` or ``UNEXPLAINED_RAD`` that one displacement can add.
-
-The second value is for a long displacement. So a limit is exceeded after three displacements in a
-row, or after two long ones, at the earliest.
+"""``LARGEST_PART``, ``LARGEST_PART_OF_A_LONG_ONE``: largest fraction of ``UNEXPLAINED_M`` or
+``UNEXPLAINED_RAD`` that one displacement can add: a short one, and a long one. So a limit is
+exceeded after three displacements in a row, or after two long ones, at the earliest.
 """
 
 

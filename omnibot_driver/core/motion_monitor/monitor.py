@@ -26,7 +26,8 @@ LAG_S: Final = 0.4
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-"""Commanded speeds in m/s and rad/s above which a robot must be seen to move."""
+"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speeds in m/s and rad/s above which a robot must be
+seen to move."""
 MOVING_MPS: Final = 0.02
 MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0

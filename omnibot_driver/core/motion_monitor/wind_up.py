@@ -17,7 +17,8 @@ from omnibot_driver.core.motion_monitor.envelope import STRETCH, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 
 MOST_M: Final = 0.6
-"""Largest distance in m that is made up for: what the integrators hold at full effort."""
+"""Largest distance in m that a robot is assumed to make up for: what the integrators hold at full
+effort."""
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
 
@@ -25,7 +26,8 @@ A single long displacement does not prove that the robot is held: the robot may 
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
-"""Time constants in s with which the wind-up is forgotten, in motion and at rest.
+"""``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants in s with which the wind-up is
+forgotten, in motion and at rest.
 
 It is forgotten more slowly at rest, because a robot that is still held keeps its wind-up.
 """
@@ -33,7 +35,8 @@ HELD_PART: Final = 0.7
 """A robot whose speed is below this fraction of its set-points is regarded as held."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""Speeds against the set-point, in m/s and rad/s, above which a robot is not regarded as held.
+"""``BACK_MPS``, ``BACK_RADPS``: speeds against the set-point, in m/s and rad/s, above which a robot
+is not regarded as held.
 
 Faster motion against the set-point does not add to the wind-up.
 """

@@ -121,7 +121,8 @@ class Uncertainty:
         self.gap = NOTHING
         self._walk = Covariance()
         self._levers: list[tuple[float, float, float]] = []
-        """Error of the pose in m, m and rad, per relative size error of each wheel."""
+        """For each wheel: error of the pose (m, m, rad), divided by the wheel's relative size
+        error."""
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.

@@ -31,10 +31,10 @@ motion."""
 POSE_DUE_S: Final = 0.24
 """Board time, in s, within which the next pose arrives unless that pose is lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Largest standard deviation in rad, from open gaps, of a heading that counts as known."""
+"""A heading counts as known if open gaps add at most this standard deviation to it, in rad."""
 UNKNOWN_S: Final = 0.5
-"""Time in which a robot rolls to a halt, in s. In a gap of unknown length, motion of this duration
-may be unreported."""
+"""Time, in s, in which a robot is assumed to roll to a halt. In a gap of unknown length, motion of
+this duration may be unreported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

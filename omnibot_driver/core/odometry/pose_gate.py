@@ -16,14 +16,16 @@ from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
-"""Deviations in m and rad above which a pose must be confirmed by the next one.
+"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations in m and rad above which a pose must be
+confirmed by the next one.
 
 The deviation that open gaps explain is allowed in addition.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5
-"""Limits of a plausible pose: a pose beyond 100 km or 16,000 turns comes from misread bytes."""
+"""``FARTHEST_M``, ``FARTHEST_RAD``: limits of a plausible pose, in m and rad: a pose beyond 100 km
+or 16,000 turns comes from misread bytes."""
 
 
 class PoseGate:

@@ -27,7 +27,7 @@ class PoseTracker:
 
     def __init__(self, axis_signs: Signs) -> None:
         self.rolled = Pose()
-        """All motion since the driver began, as one tangent in the board's axes, of true size."""
+        """All motion since the driver began, in true size, as one tangent in the board's axes."""
         self._axis_signs = axis_signs
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(OdometryNoise())
 
@@ -92,7 +92,7 @@ class PoseTracker:
         self.uncertainty.settle()
 
     def _part(self, tangent: Pose) -> Pose:
-        """Add a tangent to ``rolled`` and the uncertainty; return it in REP-103's axes."""
+        """Add a tangent to ``rolled`` and the uncertainty; return the tangent in REP-103's axes."""
         self.rolled += _times(tangent, self._size)
         signed = _times(tangent, self._signed_size)
         self.uncertainty.move(self.follower.target.yaw_rad, signed)

@@ -96,7 +96,8 @@ IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""Largest rounding error of a sum of deltas, in 0.1 mrad: a constant part, and a part per delta.
+"""``ROUNDING``, ``ROUNDING_PER_DELTA``: largest rounding error of a sum of deltas, in 0.1 mrad: a
+constant part, and a part per delta.
 
 The error of five deltas is at most 4.
 """

@@ -27,7 +27,7 @@ from omnibot_driver.core.omnibot.late_reads import (
 )
 
 LATE_S: Final = 0.011
-"""Longest idle time in s of a line, while the board runs and no bytes are lost.
+"""Longest assumed idle time in s of a line, while the board runs and no bytes are lost.
 
 An adapter that collects bytes for a longer time causes pauses of its own.
 """
@@ -45,13 +45,13 @@ class InterFrameGaps:
     """The pauses within the bytes held, and where the pauses of this line normally are.
 
     * ``gaps``: the pauses within the bytes held.
-    * ``sharp``: normally, the first byte after a pause begins a frame.
-    * ``between``: normally, a frame begins somewhere in the read after a pause.
-    * ``certain``: ``sharp`` and ``between`` were confirmed so often that one more confirmation
-      changes nothing.
-    * ``at_pace``: the bytes of the last read came without a pause before them.
-    * ``collected``: the last read brought the bytes of more than a tick. So the read may have ended
-      anywhere in a tick; an end right after the first byte of a frame is unlikely.
+    * ``sharp``: whether the first byte after a pause normally begins a frame.
+    * ``between``: whether a frame normally begins somewhere in the read after a pause.
+    * ``certain``: whether ``sharp`` and ``between`` were confirmed so often that one more
+      confirmation changes nothing.
+    * ``at_pace``: whether the bytes of the last read came without a pause before them.
+    * ``collected``: whether the last read brought the bytes of more than a tick. If so, the read
+      may have ended anywhere in a tick; an end right after the first byte of a frame is unlikely.
 
     ``byte_s``: time in s that the line takes for a byte.
     """

@@ -25,12 +25,14 @@ The board sends this number of poses in 2 s.
 """
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""Limits of the absolute value of a coordinate in mm or mrad, unless the coordinate is 0.
+"""``SMALLEST``, ``LARGEST``: limits of the absolute value of a coordinate in mm or mrad, unless the
+coordinate is 0.
 
 A value outside the limits was misread from bytes in another order.
 """
 POSE_PERIODS: Final = 2
-"""Longest time between two compared poses, in pose periods; one pose in between may be lost."""
+"""Longest allowed time between two compared poses, in pose periods; one pose in between may be
+lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """Limits above which a pose contradicts the configured frame of the deltas.
@@ -42,7 +44,8 @@ frame. ``TIMES`` limits the ratio of this distance to the distance in the other 
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Least number and duration in s of consecutive deltas that prove the configured rate wrong."""
+"""``FEWEST_DELTAS``, ``FOR_S``: least number, and least duration in s, of consecutive deltas that
+prove the configured rate wrong."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}

@@ -52,7 +52,8 @@ class ModeTracker:
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self.mode = Mode.UNKNOWN
         self._imus_alone = self.imus_to_come = schedule.imus_alone
-        """Number of further IMU frames, without a delta between them, that show IMU-only mode."""
+        """``_imus_alone``: number of IMU frames, without a delta between them, that show IMU-only
+        mode. ``imus_to_come``: how many of these frames have not come yet."""
 
     def apply(self, happening: Happening) -> None:
         """Apply one event of the table. Raises RequestRefused if the mode does not allow it."""

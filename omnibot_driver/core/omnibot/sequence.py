@@ -41,8 +41,8 @@ class Step:
     """What the counter of a new delta or pose shows, compared with its previous value.
 
     ``lost``: number of missing deltas that were not reported before; ``duration_s``: time in s that
-    the delta covers, None if unknown; ``restarted``: the counter seems to have restarted from zero,
-    which only the board's pose can prove.
+    the delta covers, None if unknown; ``restarted``: whether the counter seems to have restarted
+    from zero, which only the board's pose can prove.
     """
 
     lost: int

@@ -62,7 +62,8 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """Number of IMU frames that ``single_imu`` may still take, and its initial value."""
+        """``singles_to_come``: number of IMU frames that ``single_imu`` may still take.
+        ``_most_singles``: the initial value of ``singles_to_come``."""
         self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:

@@ -79,7 +79,7 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 class Segment:
     """A complete frame of the best interpretation, with the contexts before and after it.
 
-    ``sure``: every other interpretation of the frame's first byte costs clearly more.
+    ``sure``: whether every other interpretation of the frame's first byte costs clearly more.
     """
 
     start: int
@@ -106,7 +106,8 @@ def read(
 ) -> list[Segment]:
     """Return the complete frames of the best interpretation of ``data``.
 
-    ``in_step``: a frame ended right before ``data``; ``closed``: more bytes will never follow.
+    ``in_step``: whether a frame ended right before ``data``; ``closed``: whether the line was
+    closed, so that more bytes will never follow.
     """
     search = _Search(data, context, expectation, pauses, pose_byte_order)
     search.run(in_step, closed)

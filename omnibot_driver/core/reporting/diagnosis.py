@@ -21,7 +21,7 @@ STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
 """Mean delay in s above which reads are reported as late: half the period of a 10 ms timer."""
 LARGEST_SKEW_PPM: Final = 115.0
-"""Largest difference in ppm between the rates of two crystal clocks."""
+"""Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0
 """Time in s for which the arrival time of a reading affects the estimated clock skew.
 

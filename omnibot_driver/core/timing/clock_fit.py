@@ -40,7 +40,8 @@ If an adapter's timer and the board's tick differ by 100 ppm, their phases repea
 blocks cover several repetitions.
 """
 LARGEST_SKEW: Final = 1.2e-4
-"""Largest relative deviation of the board's crystal from the host's: 100 ppm, with a margin."""
+"""Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
+margin."""
 SUPPORT: Final = 0.75
 """Place at which the line touches the hull of the points, as a fraction of their time span.
 
@@ -50,10 +51,10 @@ last second.
 FEWEST_READS: Final = 12
 """Least number of reads in a block that is enough to find out which of them were late."""
 LATE_PART: Final = 0.1
-"""Fraction of the reads that may be late by more than ``LATE_S``, which is in s."""
+"""Fraction of the reads that may be late by more than ``LATE_S`` s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest distance of an earliest point below a latest one, as a fraction of a period.
+"""Largest allowed distance of an earliest point below a latest one, as a fraction of a period.
 
 An earliest point that is farther below is not kept. With a 16 ms timer in the adapter, reads occur
 at phases of the 10 ms tick that are 2 ms apart, a fifth of the period.
@@ -66,7 +67,7 @@ Point = tuple[int, float]
 class ClockFit:
     """The line that gives the time of each tick, from the first tick seen on.
 
-    ``period_s``: the nominal period in s; ``slope_s``: the fitted one.
+    ``period_s``: the nominal period in s; ``slope_s``: the fitted period.
     """
 
     def __init__(self, period_s: float, first: Point) -> None:

@@ -47,7 +47,8 @@ CALM: Final = 0.45
 Two reads in a row must be this near to the line. The limit must be less than half a period.
 """
 LARGEST_RISE: Final = 0.02
-"""Largest extra step of the stamps per tick, as a fraction of a period, if the line is raised."""
+"""Largest allowed extra step of the stamps per tick, as a fraction of a period, if the line is
+raised."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 

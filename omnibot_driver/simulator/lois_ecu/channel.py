@@ -27,10 +27,10 @@ class WheelChannel:
     ``corrections``: factors for the durations of the short and the long level of the encoder.
     ``steps``: encoder edges per turn.
 
-    ticks: encoder ticks, as 0x12 reports them. rpm: measured speed in RPM, an integer. exact_rpm:
-    measured speed in RPM, with fraction. duty_percent: duty of the motor, -100..100. open_loop:
-    whether a duty is commanded, not a speed. record, record_left: the samples taken, and the number
-    of samples still to take.
+    ``ticks``: encoder ticks, as 0x12 reports them. ``rpm``: measured speed in RPM, an integer.
+    ``exact_rpm``: measured speed in RPM, with fraction. ``duty_percent``: duty of the motor,
+    -100..100. ``open_loop``: whether a duty is commanded, not a speed. ``record``: the samples
+    taken. ``record_left``: number of samples still to take.
     """
 
     def __init__(

@@ -51,9 +51,10 @@ class DocumentedOdometry:
 class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each tick of either wheel, from the latest RPMs.
 
-    The RPMs are integers. ``stands``: the position does not change while both RPMs are equal.
-    ``divides``: the velocity is the displacement divided by the time since the last tick, so a time
-    of zero gives NaN or infinity. ``slow``: each count of the timer takes 0.7 % too long.
+    The RPMs are integers. ``stands``: whether the position does not change while both RPMs are
+    equal. ``divides``: whether the velocity is the displacement divided by the time since the last
+    tick; a time of zero then gives NaN or infinity. ``slow``: whether each count of the timer takes
+    0.7 % too long.
     """
 
     def __init__(

@@ -48,7 +48,8 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: average the readings as plain numbers, which gives a wrong mean near north.
+    ``over_north``: whether the readings are averaged as plain numbers; their mean is then wrong
+    near north.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:

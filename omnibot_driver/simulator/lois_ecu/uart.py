@@ -50,7 +50,7 @@ class Uart:
         self._inbound.extend(data)
 
     def say(self, data: bytes, *, deaf: bool) -> None:
-        """Queue data to be sent; ``deaf``: with interrupts off."""
+        """Queue data to be sent; ``deaf``: whether interrupts are off during the sending."""
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:

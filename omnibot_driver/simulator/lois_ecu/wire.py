@@ -57,9 +57,9 @@ def sequence(command: int, payloads: list[int]) -> bytes:
 class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
-    ``checks``: whether lines have a checksum. ``lenient``: fields are read like C's strtol, which
-    accepts space, sign and prefix and stops at the first character that is not a digit. Without
-    ``lenient``, a field with such characters invalidates the line.
+    ``checks``: whether lines have a checksum. ``lenient``: whether fields are read like C's strtol,
+    which accepts space, sign and prefix and stops at the first character that is not a digit.
+    Without ``lenient``, a field with such characters invalidates the line.
     """
 
     def __init__(self, *, lenient: bool) -> None:

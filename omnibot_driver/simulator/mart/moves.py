@@ -23,7 +23,8 @@ PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
 WRITES_S = 0.005
 LINEAR_S = REFERENCE_S = 0.015
-"""Duration of the set-up of the motor board, in s."""
+"""``LINEAR_S``, ``REFERENCE_S``: duration in s of the motor board's set-up before a linear move and
+before a reference move."""
 
 
 def start_linear(server: "MartServer", word: str, *, backward: bool) -> None:
@@ -49,7 +50,7 @@ def start_controlled(
 ) -> None:
     """Start a move over a distance (TF, TB, PTF, MCF, MCB).
 
-    A distance of 0 or less is unlimited. ``plain``: the reply has no distance.
+    A distance of 0 or less is unlimited. ``plain``: whether the reply has no distance.
     """
     motion = server.motions[kind]
     motion.word, motion.backward = word, backward

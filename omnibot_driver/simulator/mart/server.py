@@ -20,7 +20,8 @@ from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then
 QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
 QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
-"""Times in s from a restart to the opening of the ports, and from then to the complete start-up."""
+"""``BOOT_S``: time in s from a restart to the opening of the ports. ``START_UP_S``: time in s from
+then to the complete start-up."""
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
 Sender = object

@@ -17,7 +17,7 @@ from omnibot_driver.simulator.mart.motion import INCHES_PER_M, Kind, Motion
 from omnibot_driver.simulator.mart.settings import MartSettings
 
 COMMAND, STOP = 0, 1
-"""Indices of the command port and the stop port."""
+"""``COMMAND``, ``STOP``: indices of the command port and of the stop port."""
 NEAR_READINGS_S = 0.15
 """Duration of the three readings that confirm a near obstacle, in s."""
 FARTHEST_IN = 254

@@ -44,7 +44,7 @@ from omnibot_driver.simulator.omnibot.wire import (
 from omnibot_driver.simulator.omnibot.world import Force, Held, TruePose, Twist, World
 
 CHANNELS = (Channel(),)
-"""One serial line."""
+"""The board's channels: one serial line."""
 
 COMMAND_LOG = 100_000
 SENT_LOG = 10_000
