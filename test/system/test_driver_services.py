@@ -180,7 +180,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
     twist = Twist()
     twist.linear.x = 0.3
     timer = probe.node.create_timer(0.05, lambda: commands.publish(twist))
-    driver.wait_for_line("does not move.*~/reset")
+    driver.wait_for_line("stands still.*~/reset")
     assert still(board.board)
     probe.remove(timer)
     assert probe.call(Trigger, "reset").success
