@@ -14,7 +14,7 @@ TIOCGICOUNT: Final = 0x545D
 """Request of asm-generic/ioctls.h; Python's ``termios`` does not have it on every platform."""
 _COUNTS: Final = struct.Struct("20i")
 _OVERRUN, _BUFFER_OVERRUN = 7, 10
-"""Indices in ``serial_icounter_struct``: overruns of the receiver, and of the tty's buffer."""
+"""Indices in ``serial_icounter_struct`` of the overruns of the receiver and of the tty's buffer."""
 
 
 def overruns(descriptor: int) -> int | None:

@@ -95,9 +95,9 @@ class SharedSession:
         """Pass ``wish``, the motion that a sender wants, to the session by ``action``.
 
         ``sent_ns``: the possible times of day, in ns, at which the command was sent.
-        ``moves_base``: the motion is that of the base, so a refusal concerns the motion interlock.
-        Raises CommandRefused for a wish that waited while this process was stalled. Each refusal is
-        also delivered, in its place among the events, unless the outbox is full.
+        ``moves_base``: whether ``wish`` is a motion of the base; then a refusal concerns the motion
+        interlock. Raises CommandRefused for a wish that waited while this process was stalled. Each
+        refusal is also delivered, in its place among the events, unless the outbox is full.
         """
         try:
             with self.lock:

@@ -21,8 +21,8 @@ SETTLE_S: Final = 0.25
 stall, whatever its send time. A command that was sent within this time is regarded as sent during
 the stall too, because a sender's clock is known only roughly."""
 LATEST_S: Final = 10.0
-"""Longest time in transit, in s, retransmissions included. A command that seems to be older comes
-from a sender whose clock is wrong."""
+"""Longest assumed time in transit, in s, retransmissions included. A command that seems to be older
+comes from a sender whose clock is wrong."""
 
 
 def boot_time_s() -> float:

@@ -29,10 +29,10 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, between messages that are regarded as late without interruption."""
+"""Longest pause, in s, between two late messages that belong to one series of late messages."""
 LARGEST_DRIFT: Final = 5e-4
-"""Largest drift between two clocks, in s/s. A crystal is off by a tenth of this value, and NTP
-corrects a clock at most at this rate."""
+"""Largest assumed drift between two clocks, in s/s. A crystal is off by a tenth of this value, and
+NTP corrects a clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
 """A sender is this many times less likely to have sent a message that seems early than one that
 seems late by the same time."""

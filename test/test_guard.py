@@ -31,7 +31,7 @@ from omnibot_driver.keeper import Keeper
 
 @pytest.fixture(autouse=True)
 def _no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the driver wait longer, as a busy computer may delay a guard's start and stops."""
+    """Let the driver wait longer, because a busy computer may delay a guard's start and stops."""
     monkeypatch.setattr("omnibot_driver.keeper.SPEAKS_WITHIN_S", PATIENCE_S)
 
 

@@ -24,7 +24,10 @@ SIMULATOR: Final = "omnibot_driver.simulator.fejemis"
 USB_BAUDRATE: Final = 115200
 """Baud rate that is set for the USB ports, whose real speed does not depend on this setting."""
 WHEEL_RADIUS_M, TRACK_M, WHEELBASE_M = 0.0775, 0.4, 0.42
-"""Default sizes for values that the user does not set; only the track is in the manual."""
+"""Wheel radius, track and wheelbase, in m, that are used if the user does not set them.
+
+Only the track is in the manual.
+"""
 PARAMETERS: Final = table(
     "fejemis",
     TRAITS,

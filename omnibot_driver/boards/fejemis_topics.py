@@ -241,7 +241,7 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
-        ``off``: the action switches something off, which is always possible.
+        ``off``: whether the action switches something off, which is always possible.
         """
 
         def say(session: Session, now: float) -> str:

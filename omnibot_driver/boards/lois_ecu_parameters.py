@@ -17,8 +17,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest rate of commands in a terminal mode, in Hz. A command has 14 characters, and the board
-can forward 34 such commands per second to the compass."""
+"""Largest allowed rate of commands in a terminal mode, in Hz. A command has 14 characters, and the
+board can forward 34 such commands per second to the compass."""
 
 WHEELS: Final = (
     Parameter(
@@ -209,7 +209,7 @@ PERIODS: Final[Mapping[str, Stream]] = {
     "time_period": Stream.GPS_TIME,
     "date_period": Stream.GPS_DATE,
 }
-"""Messages that the board sends periodically, by the name of the parameter."""
+"""Messages that the board sends periodically, by the name of the parameter for the period."""
 
 
 def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:

@@ -10,14 +10,15 @@ import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds of a minute in which TIME is sent, with the next minute, so that it arrives in time."""
+"""In these seconds of a minute, TIME is sent with the next minute, which begins within 4 s."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second for TIME (UTC), or None if TIME must wait.
 
-    ``now_s``: this computer's time in s since 1970. Without ``may_set_back``, the next minute is
-    sent shortly before it begins, so the clock is then as much as 4 s fast.
+    ``now_s``: this computer's time in s since 1970; ``may_set_back``: whether the clock may be set
+    back. If not, the next minute is sent shortly before it begins, so the clock is then up to 4 s
+    fast.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -22,10 +22,10 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 class Parameter:
     """One row of the table. The default's type is the parameter's type.
 
-    ``unset``: the value is None unless one is given, because the board keeps its own value; the
-    default then only defines the type. ``low`` and ``high`` are inclusive. ``fixed``: the value is
-    given at start, and is read-only afterwards. ``calibrated``: a calibration file may hold the
-    value.
+    ``unset``: whether the value is None unless one is given, because the board keeps its own value;
+    the default then only defines the type. ``low`` and ``high`` are inclusive. ``fixed``: whether
+    the value is given at start, and is read-only afterwards. ``calibrated``: whether a calibration
+    file may hold the value.
 
     The default of a list has at least one item. Range and choices apply to each item. ``length`` is
     the least and the largest number of items; without ``length``, a list has as many items as the

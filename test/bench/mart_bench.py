@@ -24,7 +24,7 @@ WINDOW_S: Final = 20.0
 SETTLING_S: Final = 8.0
 """How long the programs run before the measurement, in s; no event reports that they are ready."""
 LATEST_S: Final = 0.9
-"""Longest latency in s; a later datagram belongs to the next command."""
+"""Longest assumed latency in s; a later datagram belongs to the next command."""
 LARGE: Final = 3
 """Smallest change of a speed that shows a new command, in register units.
 
@@ -100,7 +100,7 @@ def _latencies(
 ) -> list[float]:
     """Return the time from each command to its datagram, in µs, for commands to a moving robot.
 
-    ``stops``: measure stops; otherwise measure changes of speed.
+    ``stops``: whether to measure stops; otherwise changes of speed are measured.
     """
     found = []
     for (_, before), (at, speed) in pairwise(sent):

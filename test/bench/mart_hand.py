@@ -20,7 +20,7 @@ AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Command each speed to both robots in quick succession; record when it was first published."""
+    """Command each speed to both robots in turn; record when each speed was first published."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

@@ -120,7 +120,7 @@ class Campaign(Outcome):
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
         """Run a case once and collect its complaints.
 
-        ``again``: check afterwards that the robot obeys a fresh command.
+        ``again``: whether to check afterwards that the robot obeys a fresh command.
         """
         try:
             case(rig)

@@ -30,11 +30,14 @@ LATE_S: Final = 0.3
 LOST_STOP_S: Final = 1.2
 """Delay of a stop in s if two datagrams in a row are lost and the third is as late as possible."""
 BLIND_S: Final = 2.0
-"""Time in s until a robot is stopped whose driver gets no replies, even with slow exchanges."""
+"""Longest allowed time, in s, until a robot stops if its driver gets no replies.
+
+The time also suffices if exchanges are slow.
+"""
 NETWORK_S: Final = 90.0
 """Longest wait for a start on a bad network, in s; the driver must first see that the IMU works."""
 STRAY_S: Final = 2.5
-"""Time until a robot that another program drives is stopped, in s."""
+"""Longest allowed time, in s, until the driver stops a robot that another program drives."""
 
 
 class Board(SimulatedMart):

@@ -34,7 +34,7 @@ DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
 class Terminal(PtyBoard):
     """A pseudo-terminal.
 
-    ``deaf``: the adapter does not read the kernel's buffer, but still sends.
+    ``deaf``: whether the adapter, which still sends, does not read the kernel's buffer.
     """
 
     deaf = False
@@ -90,8 +90,8 @@ class Terminal(PtyBoard):
 class Server(RunningBoard):
     """A board behind a serial-port server on the network.
 
-    ``deaf``, ``mute``: the server holds back data to the board, or from it. ``accepted_at``: the
-    board's tick at each connection.
+    ``deaf``: whether the server holds back data to the board; ``mute``: whether it holds back data
+    from the board. ``accepted_at``: the board's tick at each connection.
     """
 
     deaf = mute = False

@@ -37,7 +37,8 @@ REST_TICKS: Final = round(1.0 / TICK_S)
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
-"""Variance of x just after an odometry reset, in m²; acceleration in a gap of data, in m/s²."""
+"""NEW_VARIANCE: variance of x just after an odometry reset, in m². GAP_MPS2: assumed acceleration
+in a gap of data, in m/s²."""
 WRONG_ONE_IN: Final = 500
 """At most one message in this number may be wrong while one byte in 100 is lost."""
 ENDS_WITHIN_S: Final = 2.0
@@ -249,7 +250,7 @@ class Rig:
     def judge_stream(self, damaged_bytes: bool = False) -> None:
         """Expect every published message to have been sent, and odometry to be free of jumps.
 
-        ``damaged_bytes``: bytes were lost or added, so that a few wrong frames are allowed.
+        ``damaged_bytes``: whether bytes were lost or added; then a few wrong frames are allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf

@@ -24,11 +24,11 @@ class RigBoard:
     ``services``: the common services that the board's driver has. ``tuning``: parameters that
     refuse invalid values.
 
-    ``off_within_s``: time from a stop until the motors are off. ``old_bytes_s``: time in which the
-    board receives what a full port has kept. ``ends_later_s``: additional time for the driver to
-    end. ``deaf_s``: longest time in which the board may lose the commands on a line, so that the
-    driver must repeat them. ``silent_s``: longest usual pause between two transmissions of the
-    board.
+    ``off_within_s``: longest allowed time from a stop until the motors are off. ``old_bytes_s``:
+    time in which the board receives what a full port has kept. ``ends_later_s``: additional time
+    that the driver may take to end. ``deaf_s``: longest time in which the board may lose the
+    commands on a line, so that the driver must repeat them. ``silent_s``: longest usual pause
+    between two transmissions of the board.
 
     ``imu``: whether the board has an IMU. ``jump_stddevs``: largest correction of predicted
     odometry, in standard deviations of the prediction.

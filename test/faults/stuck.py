@@ -18,7 +18,7 @@ LOST: Final = "lost .*retrying"
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
     """Drive while the adapter is stuck for ``seconds``; then it delivers everything it has held.
 
-    ``mute``: data from the board are held too.
+    ``mute``: whether data from the board are held too.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -98,7 +98,7 @@ TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
 def server_holds(rig: NetworkRig, *, mute: bool) -> None:
     """Let the server hold data back, and later deliver everything at once.
 
-    ``mute``: data from the board are held too.
+    ``mute``: whether data from the board are held too.
     """
     rig.drive()
     rig.server.deaf, rig.server.mute = True, mute

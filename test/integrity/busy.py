@@ -14,7 +14,7 @@ from carriage import CHUNKERS, Chunker, Chunks, Received
 from truth import BYTE_S
 
 LATE_SHARE, LATE_S = 0.02, (0.002, 0.030)
-"""Share of late reads, and the range of their delay in s, as beside a navigation stack."""
+"""Share of late reads, and range of their delay in s, while a navigation stack runs as well."""
 STALL_SHARE, STALL_S = 0.002, (0.001, 0.300)
 JITTER_S = 60e-6
 """Mean delay of any wake-up in s, exponentially distributed."""
@@ -23,9 +23,9 @@ READ_S = 20e-6
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
 """Share of wake-ups that wait for their turn beside busy loops, and the range of the delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Share of wake-ups after which busy loops slow the process, and for how long, as a range in s."""
+"""Share of wake-ups after which busy loops slow the process; range of the slow time, in s."""
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
-"""Ranges of the delay of a wake-up of a slowed process, in s: of a reader, and of an adapter."""
+"""Ranges of the delay of a slowed wake-up, in s: SHARE_S of a reader, SLOW_S of an adapter."""
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
 """Range of the number of bytes after which another kind of pieces is drawn."""

@@ -55,7 +55,7 @@ Of honest poses, 1 in 270,000 is above it by chance.
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
 STAY_M: Final = 1.5
-"""Distance from the start up to which motions are commanded, so that the wall is not hit, in m."""
+"""Distance from the start, in m, beyond which only turns are commanded, to avoid the wall."""
 
 
 @dataclass(slots=True)
@@ -75,7 +75,7 @@ class Score:
         return self
 
     def count(self, kind: str, wrong: bool) -> None:
-        """Count one message of this kind as published, and if ``wrong`` also as wrong."""
+        """Count one message of this kind as published and, if ``wrong`` is true, also as wrong."""
         self.published[kind] += 1
         self.wrong[kind] += wrong
 

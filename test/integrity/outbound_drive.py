@@ -39,7 +39,7 @@ History = tuple[tuple[int, Shown], ...]
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Bytes that the driver or its guard writes; ``flush``: discard waiting bytes first."""
+    """Bytes that the driver or guard writes; ``flush``: whether to discard waiting bytes first."""
 
     at_s: float
     data: bytes

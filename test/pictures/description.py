@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 DESCRIPTION = Path(__file__).parents[2] / "urdf" / "omnibot.urdf.xacro"
 WIDTH, HEIGHT, BAND, FINER = 800, 560, 20, 2
-"""Size in pixels, number of rows computed at once, and rays along each side of a pixel."""
+"""WIDTH, HEIGHT: size in pixels; BAND: rows computed at once; FINER: rays along a pixel's side."""
 EYE_M, LOOK_M, HALF_VIEW_RAD = np.array([0.62, 0.30, 0.42]), np.array([0.0, 0.0, 0.088]), 0.2138
 FLOOR_M, FADE_M = 0.2, 0.35
 LAMPS, LAMP_SIZE = 6, 0.06

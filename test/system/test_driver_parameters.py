@@ -110,7 +110,7 @@ def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
 
 
 OPENS_NOTHING = "import serial; serial.serial_for_url = None"
-"""Code that prevents the driver from opening a port, as the default port may lead to a robot."""
+"""Code that prevents the driver from opening a port, because a robot may be on the default port."""
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ class Stamped:
         return [at - self.sampled_s[tick] for tick, at, _ in self._settled(since_s)]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Return the standard deviation, from 10 ms, of steps between successive stamps, in s."""
+        """Return the RMS deviation from 10 ms of the steps between successive stamps, in s."""
         return math.sqrt(
             fmean(
                 (b[1] - a[1] - TICK_S) ** 2

@@ -35,7 +35,7 @@ QUICKEST_S: Final = 0.1
 """Shortest time in s to wait for a query's reply, in addition to the time the server needs."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
-"""Factor and addend in s by which an unanswered query raises ``trip_s``.
+"""An unanswered query multiplies ``trip_s`` by LOSS, and then adds LOSS_S (s) to it.
 
 The driver may have stopped waiting too soon, so it waits longer for the reply to the next query.
 """

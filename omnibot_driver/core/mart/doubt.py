@@ -24,11 +24,11 @@ The motion shakes the gyro. The deviation grows with the square root of the time
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
 END_M, END_RAD = 0.004, math.radians(0.4)
-"""Standard deviations that the start and roll-out of each motion add, in m and rad."""
+"""Standard deviations that start and roll-out of each motion add to position (m), heading (rad)."""
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviations of a turn on the spot that the server reports in whole degrees.
 
-The first is a constant in rad, the second is a part of the turn.
+TOLD_TURN_RAD is a constant in rad, TOLD_TURN is a part of the turn.
 """
 PIVOT: Final = 0.01
 """Offset of the centre of a turn on the spot, as a part of the track."""

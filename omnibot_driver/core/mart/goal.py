@@ -27,22 +27,29 @@ ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 To come nearer, the robot would have to turn towards the goal first.
 """
 STRETCH: Final = 1.3
-"""Initial ratio of driven to requested length of straight moves: 12 inches become 15.8 inches."""
+"""Ratio of driven to requested length of straight moves that is assumed before it is measured.
+
+A request for 12 inches becomes a move of 15.8 inches.
+"""
 DOCK_STRETCH: Final = 1.6
-"""Largest ratio of the driven to the requested length of docking moves: 19 inches become 0.73 m."""
+"""Largest assumed ratio of driven to requested length of docking moves.
+
+A request for 19 inches (0.48 m) becomes a move of 0.73 m.
+"""
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Least improvement of the heading in degrees for which a turn is made."""
 WIDER: Final = 0.5
-"""Part of NEAR_RAD that each turn in a row adds to the heading's tolerance: turns overshoot."""
+"""Each successive turn adds this part of NEAR_RAD to the heading's tolerance: turns overshoot."""
 MOST_MOVES: Final = 9
-"""Largest number of moves to one goal; after them the goal is given up."""
+"""Largest allowed number of moves to one goal; after them the goal is given up."""
 
 
 LEAST_LIKE: Final = 0.35
-"""Largest relative difference of a move from its request, if the move ran only once."""
+"""A move whose relative difference from its request exceeds this value may have run twice."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
-"""Usual duration of a move: a constant in s, plus s per degree or inch (doubled if SLOW)."""
+"""Usual duration of a move, in s: SETTLES_S, plus S_PER_DEG for each degree or S_PER_IN for each
+inch. SLOW doubles S_PER_DEG and S_PER_IN."""
 LONGER: Final = 1.4
 
 

@@ -43,9 +43,9 @@ The server opens its ports before it has started up completely. VOLTS and most m
 server that has just started; a crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""Longest silence of a server that was not absent: seconds, plus a number of exchange durations."""
+"""A server was absent if its silence exceeds ABSENT_S (s) plus ABSENT_TRIPS exchange durations."""
 ABSENT_BUSY_S: Final = 2.5
-"""Longest silence, in s, of a server that may be busy but was not absent.
+"""A server that may be busy was absent if its silence exceeds this time, in s.
 
 A stop, for example, keeps the server busy.
 """
@@ -171,7 +171,7 @@ class Ground:
         self.heard_s = now
 
     def _appears(self, now: float) -> None:
-        """Record that the server may have been restarted: it may be starting up, without a log."""
+        """Record that the server may have been restarted, so that its log may be lost."""
         self.appeared_s = now
         self.jobs.log_may_be_lost = self.jobs.logging
         self.jobs.ended = False

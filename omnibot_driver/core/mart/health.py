@@ -34,18 +34,18 @@ BITS: Final = {
 NO_READ: Final = 255
 HALTING: Final = 4 | 8 | 16 | 32
 FRONT_IN, REAR_IN = 19, 15
-"""Distances in inches in front and behind; the controller stops for nearer obstacles."""
+"""The controller stops for obstacles nearer than FRONT_IN in front or REAR_IN behind (inches)."""
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
-"""Largest difference of two readings that confirm each other, in V and inches."""
+"""Two readings confirm each other if they differ by no more than this, in V or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
 """Number of similar readings in a row that are accepted, even if a late reply may be among them."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Longest time in s from a failed RM to an uncommanded motion that this RM has caused."""
+"""An uncommanded motion within this time in s after a failed RM is attributed to that RM."""
 
 
 class Health:

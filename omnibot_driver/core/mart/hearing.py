@@ -19,7 +19,7 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest unanswered change of motor units while the heading is unknown, as a part of the units.
+"""While the heading is unknown, the unanswered change of units may be at most this part of them.
 
 A larger unanswered change stops the robot.
 """

@@ -23,7 +23,7 @@ from omnibot_driver.core.mart.words import (
 )
 
 PROVED_S: Final = 0.2
-"""Largest age in s of a successful check of the IMU with which a motion may start."""
+"""A motion may start only if the last successful check of the IMU is at most this old, in s."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of a check in s; half of any additional time is regarded as the reply's delay."""
 FAILS: Final = {RESET: 3, CHECK: 1}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""Smallest time uncertainty in s with which a reply is regarded as uncertain."""
+"""A reply is regarded as uncertain if its time uncertainty is at least this, in s."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,15 +13,16 @@ from typing import Final
 
 LOWEST_SLOPE, HIGHEST_SLOPE = 0.4, 2.5
 MOST_DEAD: Final = 20.0
-"""Largest number of units that a motor needs before it turns."""
+"""Largest number of units that a motor is assumed to need before it turns."""
 SLOPE_SD, OFFSET_SD = 0.3, 4.0
 """Initial standard deviations of the slope (around 1) and of the offset (around 0 units)."""
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 """Standard deviations of the change of slope and offset (units) between two measurements."""
 SURE: Final = 3.0
-"""Number of standard deviations by which a speed must exceed zero to be certain."""
+"""A motor certainly turns if its expected speed exceeds this number of standard deviations."""
 NOISE, NOISE_PART = 0.3, 0.02
-"""Standard deviation of a measured speed: nominal units, plus a part of the commanded units."""
+"""Standard deviation of a measured speed: NOISE nominal units, plus NOISE_PART of the commanded
+units."""
 
 
 class MotorLine:

@@ -42,9 +42,9 @@ This time is shorter than STARTS_UP_S, so that the first motion uses the measure
 VOLTS_S: Final = 10.0
 """Longest time in s for which unanswered requests delay the query VOLTS."""
 SILENT_S, GREET_AGAIN_S = 0.15, 0.1
-"""Times in s: from the last reply to the first HELLO, and from each HELLO to the next.
+"""Times in s: SILENT_S from the last reply to the first HELLO, GREET_AGAIN_S between HELLOs.
 
-Two exchange durations are added to the first time.
+Two exchange durations are added to SILENT_S.
 """
 COPY_S: Final = 0.25
 """If ENC is unanswered for this time in s after a move, a duplicate of the move may be running."""

@@ -22,7 +22,8 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest difference of a reported turn from the wheel's turn: in rad, plus a part of that turn.
+"""Largest accepted difference of a reported turn from the wheel's turn: TOLD_RAD (rad), plus
+TOLD_PART of the wheel's turn.
 
 A number that differs by more is regarded as the answer to another query.
 """
@@ -201,7 +202,7 @@ class Reckoning:
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Return the turn on the spot, in rad, that moves the wheel by ``wheel_m``; else zero."""
+        """Return the turn by ``wheel_m``, in rad; zero unless the motion is on the spot."""
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property

@@ -15,7 +15,7 @@ from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
-"""Largest turn acceleration (rad/s²) and rate (rad/s) with which a heading is plausible."""
+"""Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
 """A heading may be from before RM if it is this near, in rad, to the last heading before RM."""
 MOST_RAD: Final = 1e7
@@ -25,7 +25,7 @@ The server integrates the turn rate over unsigned milliseconds of its wall clock
 set back, the heading is about 1e15 degrees.
 """
 AHEAD_S: Final = 0.3
-"""Longest prediction of the heading to the time of a count, in s."""
+"""The heading is predicted to the time of a count, but at most for this time in s."""
 ODD_TIMES: Final = 3
 """Number of implausible headings in a row after which the last of them is accepted."""
 SPREADS: Final = 4

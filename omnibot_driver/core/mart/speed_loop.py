@@ -17,20 +17,24 @@ from omnibot_driver.core.mart.motors import MOST_UNITS, UNEQUAL, Motors
 from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_CHANGE: Final = 15
-"""Largest change in units by one command; it is small, because a duplicated command acts twice."""
+"""Largest allowed change in units by one command.
+
+It is small, because a duplicated command acts twice.
+"""
 MOST_BACKWARD: Final = 5
-"""Largest change in units while reversing on a slow network, which hides duplicates."""
+"""Value of MOST_CHANGE while reversing on a slow network, which hides duplicates."""
 SETTLE_S, LEARN_S = 0.45, 0.35
-"""Times in s: pause in learning after a large change, and shortest window of learning."""
+"""Times in s: SETTLE_S is the pause in learning after a large change; LEARN_S is the shortest
+window of learning."""
 LARGE_UNITS: Final = 3
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""Effect of the exchange duration, which lengthens the window, and makes it less certain.
+"""Effects of a longer exchange duration: a longer window of learning, and less certain speeds.
 
-The window grows by LEARN_TRIPS durations. The standard deviation of its speeds is multiplied by
+The window grows by LEARN_TRIPS durations. The standard deviation of the speeds is multiplied by
 1 + LESS_PER_S * duration in s.
 """
 SLOWEST_MPS: Final = 0.015
-"""Slowest speed of a wheel that certainly turns, in m/s."""
+"""A wheel whose measured speed is above this, in m/s, is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
 """Slowest wheel speed in m/s with which a motion starts, so that the server sees the wheel turn."""
 LEAST_UNITS: Final = 4
@@ -41,9 +45,10 @@ HOLD_AFTER_S: Final = 1.0
 """For this time in s after a change of the turn rate, the heading error is not integrated."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Variances per squared change of units: if the change may arrive twice; if it is unanswered.
+"""Variances per squared change of units: COPIED for a change that may arrive twice, MISSED for an
+unanswered change.
 
-A change may come twice where an exchange takes longer than SLOW_TRIP_S (s). The variances are
+A change may arrive twice if exchanges take longer than SLOW_TRIP_S (s). The variances are
 deliberately large, because a wrong ratio of speeds lasts for the whole motion.
 """
 
@@ -173,8 +178,8 @@ class SpeedLoop(Motors):
     ) -> None:
         """Learn from a displacement measured over ``seconds``, and hold the heading.
 
-        ``right_only``: only the right wheel was measured, so the left motor's line is changed by as
-        much as the right motor's line.
+        ``right_only``: whether only the right wheel was measured; then the left motor's line is
+        changed by as much as the right motor's line.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

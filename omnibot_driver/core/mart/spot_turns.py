@@ -37,17 +37,20 @@ HINDERED, TOO_FAST = 0.8, 1.12
 """Parts of the commanded rate. If a turn slower than HINDERED is followed by one faster than
 TOO_FAST, something held the robot in the slow turn, and what was learned from it is false."""
 SAME, CORRECTIONS = 0.2, 2
-"""Largest relative difference of rates that count as equal; largest number of corrections."""
+"""Rates that differ relatively by no more than SAME count as equal. For one commanded rate, a turn
+is begun anew at most CORRECTIONS times because its measured rate is wrong."""
 STEADY: Final = 0.03
 """Relative change of the commanded rate at which the rate is regarded as a new one."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
-"""Shortest turn that shows how fast the motors turn: a time in s, and angles in rad.
+"""A turn shows how fast the motors turn if it takes SPINS_UP_S (s) plus the averaging time of
+speeds, and exceeds SEEN_RAD (rad).
 
-The time is added to the averaging time of speeds. From TOLD_RAD on, the angle that the server
-reports in whole degrees is more precise than the wheel.
+From TOLD_RAD (rad) on, the angle that the server reports in whole degrees is more precise than the
+wheel.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Largest difference of a turn reported by a stop from the expected one: in rad, plus a part of it.
+"""Largest accepted difference between the turn that a stop reports and the expected turn:
+UNSURE_RAD (rad), plus UNSURE_PART of the expected turn.
 
 The expected turn comes from the encoder count and the commanded rate.
 """
@@ -64,8 +67,8 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns by R and L.
 
-    ``settings`` may be replaced. ``units``: motor units of the last turn; ``seen_radps``: its
-    measured rate.
+    ``settings`` may be replaced. ``units``: motor units of the last turn; ``seen_radps``: measured
+    rate of the last turn.
     """
 
     def __init__(self, settings: MartSettings, odometry: MartOdometry, loop: SpeedLoop) -> None:

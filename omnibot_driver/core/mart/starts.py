@@ -38,7 +38,7 @@ TIMED_OUT_S: Final = 0.5
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Longest duration of controlled moves: s per inch (straight), s per degree (turn)."""
+"""Time allowed for a controlled move beyond 3 s: s per inch (straight), s per degree (turn)."""
 REFERENCE_FAILS: Final = 2
 """Number of bare ``fail`` replies to RM in a row after which RM is not tried again.
 

@@ -30,7 +30,7 @@ ANSWERS: Final = {
 }
 """The forms of the reply ``ok`` with which the server reports that it has stopped each motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s within which a controlled move should end after it was first told to stop."""
+"""Time in s, from the first stop command, within which a controlled move is expected to end."""
 
 
 class Stopping:

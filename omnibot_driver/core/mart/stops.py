@@ -27,7 +27,7 @@ from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 BLIND_S, TRIPS = 0.8, 3
-"""Longest drive without measurements: a time in s, plus a number of exchange durations."""
+"""Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
 FROZEN_S: Final = 0.5
 """Time in s, plus two exchange durations, after which a constant heading shows a dead IMU."""
 NO_START_S: Final = 1.5

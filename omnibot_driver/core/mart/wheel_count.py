@@ -21,12 +21,12 @@ The error is DOUBT_M (m), plus DOUBT_MPS (m/s) times the sum of two times: the d
 the last count, and the time uncertainty of the reply.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
-"""Largest distance of a wheel between two counts: MOST_M, plus MOST_MPS times the time.
+"""Largest plausible distance between two counts: MOST_M (m), plus MOST_MPS (m/s) times the time.
 
 A larger distance shows that one of the two counts is false.
 """
 STRAY_COUNTS: Final = 3
-"""Largest change of the count of a robot at rest."""
+"""Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
 """Number of counts that show a lost start, if they equal the last count before the start."""

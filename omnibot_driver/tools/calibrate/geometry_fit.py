@@ -25,7 +25,10 @@ from omnibot_driver.tools.needs import ToolError
 WHEELS_ALIKE: Final = 0.01
 """Relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
 UNKNOWN: Final = 0.2
-"""Largest relative error of an assumed radius; beyond it the readings are regarded as wrong."""
+"""Largest accepted relative error of an assumed radius.
+
+If the error is larger, the readings are regarded as wrong.
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,12 +23,13 @@ STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
 """The robot is regarded as stopping below this fraction of its earlier speed."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Range of the speed ratio that means a doubled speed, and largest ratio that means an equal speed.
+"""DOUBLED: range of speed ratios that mean a doubled speed. UNCHANGED: largest ratio that means an
+equal speed.
 
 Both allow for friction and rounding.
 """
 PURE_TURN: Final = 0.5
-"""Largest ratio of sideways motion to rim speed in a turn on the spot.
+"""Largest accepted ratio of sideways motion to rim speed in a turn on the spot.
 
 The ratio is 0 if the odometry deltas are interpreted correctly, else 2 or more.
 """

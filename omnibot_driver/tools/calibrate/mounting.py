@@ -24,17 +24,18 @@ from omnibot_driver.tools.calibrate.seen import Contradiction
 Array = NDArray[np.float64]
 
 STILL_RADPS: Final = 0.1
-"""Largest standard deviation of the rotation rate, in rad/s, while a hand holds the robot still."""
+"""Largest accepted standard deviation of the rotation rate, in rad/s, while a hand holds the robot
+still."""
 GRAVITY_PART: Final = 0.15
 LEAST_TILT_RAD: Final = math.radians(10)
 MOST_TILT_RAD: Final = math.radians(75)
 SQUARE_RAD: Final = math.radians(35)
-"""Largest deviation, in rad, of the angle between the two tilts from a right angle."""
+"""Largest accepted deviation, in rad, of the angle between the two tilts from a right angle."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
 """A mounting within this angle, in rad, of a right-angled mounting is taken as right-angled."""
 HAND_RAD: Final = math.radians(2)
-"""Least standard deviation, in rad, of the direction of a tilt made by hand."""
+"""Least assumed standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
 """Weight of the level posture relative to a tilted one; a floor is more exact than a hand."""
 

@@ -32,14 +32,15 @@ UNLIKE: Final = 4.0
 """Two ratios disagree if they differ by more than this number of standard deviations."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""Names of the parameters for the distance per encoder count, and for the motors' units per m/s.
+"""Names of parameters: COUNT, distance per encoder count; UNITS, the motors' units per m/s.
 
 If the distance per count is found to be longer, the units per m/s become fewer in proportion.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
-"""A parameter that the driver measures during the drives: the balance of the two motors.
+"""The balance of the two motors, which the driver measures during the drives.
 
-The constants are its name, its name in /diagnostics, and the standard deviation of its value.
+BALANCE: name of the parameter. BALANCE_SHOWN: its name in /diagnostics. BALANCE_SIGMA: standard
+deviation of its value.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where"

@@ -26,7 +26,7 @@ The board's integrator leaves an error of 0.1 % after a second.
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
-"""Least standard deviation of a pose, in m and rad, and of a speed over 1 s, in m/s and rad/s."""
+"""Least assumed standard deviation of a pose (m, rad), and of a speed over 1 s (m/s, rad/s)."""
 CORRECTED_WITH: Final = 5
 """Number of odometry steps over which a correction of the pose is spread.
 

@@ -26,7 +26,7 @@ SHARPEST: Final = 0.002
 """Least relative noise of one time between ticks; the board reports times in steps of 0.1 ms."""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
-"""Longest sum of both time constants, in s."""
+"""Longest allowed sum of both time constants, in s."""
 GRID: Final = 1500
 STARTS_S: Final = (0.1, 0.5)
 """Starting values for the sum of both time constants, in s."""
@@ -36,9 +36,9 @@ RATIOS: Final = (0.15, 0.4, 0.8)
 A search that starts at 1 would stop there.
 """
 LATEST_S: Final = 2.0
-"""Largest time from the start to the first mark, in s."""
+"""Longest allowed time from the start to the first mark, in s."""
 MOST_OFF: Final = 0.4
-"""Largest error of a mark's position, in ticks."""
+"""Largest allowed error of a mark's position, in ticks."""
 LAGS: Final = 60
 """Number of ticks over which the residuals are correlated because the load changes."""
 MISSED: Final = 0.42

@@ -33,7 +33,7 @@ LARGEST_MS: Final = 1.6
 LARGEST_OVERSHOOT: Final = 0.05
 HORIZON_TICKS: Final = 400
 SETTLED: Final = 1e-3
-"""Largest relative error of a stable loop after ``HORIZON_TICKS``."""
+"""A loop is regarded as stable if its relative error after ``HORIZON_TICKS`` is below this."""
 CANDIDATES: Final = 24
 """Number of values of each gain in one round of the search."""
 ROUNDS: Final = 3

@@ -38,7 +38,7 @@ MOTIONS: Final = {
     "j": (0, 0, 1),
     "l": (0, 0, -1),
 }
-"""Direction of each key: forward, to the left, turning to the left."""
+"""For each key, the signs of its motion: forward, to the left, and turning to the left."""
 
 
 class DeadMan:

@@ -82,8 +82,8 @@ class FrameSchedule:
     """The timing of a stream.
 
     ``steps_s``: steps between successive timestamps, from ``at_s`` on; ``period_s``: their median.
-    ``gap_at_s``, ``gap_s``, ``missing``: beginning and length of each gap, and number of missing
-    messages, without the gaps that the driver's state explains. ``leap_at_s``, ``leap_s``:
+    ``gap_at_s``, ``gap_s``, ``missing``: beginning and length of each gap, and number of messages
+    missing in it, without the gaps that the driver's state explains. ``leap_at_s``, ``leap_s``:
     beginning and length of each wide step that later short steps compensate, so that no message is
     missing. ``late_s``: arrival after the timestamp, at ``arrived_s``.
     """

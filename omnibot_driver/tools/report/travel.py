@@ -36,7 +36,8 @@ class Steps:
     """The steps from each message of odom to the next.
 
     ``way_m`` and ``turned_rad`` are 0 for leaps. In a leap the pose differs from the
-    pose that the twist leads to, by ``off_m`` and ``off_rad``. ``reset``: leaps to zero.
+    pose that the twist leads to, by ``off_m`` and ``off_rad``. ``reset``: whether the
+    step is a leap to zero.
     """
 
     way_m: Array

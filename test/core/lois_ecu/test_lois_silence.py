@@ -13,7 +13,7 @@ FIRMWARES = ("lois_ecu", "lois_ecu as documented")
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
     """Return a bench whose connection was lost for ``seconds``, in both directions, during a drive.
 
-    ``reopened``: the port was closed and opened again. The robot is at rest at the end.
+    ``reopened``: whether the port was closed and opened again. The robot is at rest at the end.
     """
     bench = nominal(firmware)
     bench.drive_on(vx, 4.0)

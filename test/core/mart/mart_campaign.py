@@ -34,8 +34,8 @@ FIRMWARES: tuple[Firmware, ...] = ("documented", "firmware", "source")
 class Outcome(NamedTuple):
     """The result of one drive.
 
-    ``ended``: the robot stands still, and the server still answers; ``stop_s``: longest time from a
-    stop to standstill, in s; ``way_m``: driven distance in m.
+    ``ended``: whether the robot stands still and the server still answers; ``stop_s``: longest time
+    from a stop to standstill, in s; ``way_m``: driven distance in m.
     """
 
     ended: bool

@@ -28,7 +28,7 @@ from omnibot_driver.core.mart.words import WORDS, Kind
 
 BY_TEXT: Final = {("CHECK" if word.kind is Kind.CHECK else word.text): word for word in WORDS}
 COPIED: Final = frozenset(SAID)
-"""Commands of which a late copy is modelled; copies of the others do not change the server."""
+"""Commands whose late copies are modelled; copies of other commands do not change the server."""
 MOVES: Final = ("TF", "MCR")
 MOST_COPIES: Final = 2
 UNANSWERED: Final = 3
@@ -38,10 +38,10 @@ UNANSWERED: Final = 3
 class Driver(NamedTuple):
     """The modelled driver.
 
-    ``proved``: the IMU was just proved alive. ``pending``: the command that awaits a reply.
-    ``unanswered``: number of stops without an answer. ``moved``: the last motion was a controlled
-    move. ``counted``: the encoder was read after the robot stopped, and after the last harmful copy
-    could arrive. ``greeted``: the server has been stopped once.
+    ``proved``: whether the IMU was just proved alive. ``pending``: the command that awaits a reply.
+    ``unanswered``: number of stops without an answer. ``moved``: whether the last motion was a
+    controlled move. ``counted``: whether the encoder was read after the robot stopped, and after
+    the last harmful copy could arrive. ``greeted``: whether the server has been stopped once.
     """
 
     state: State = State.UNKNOWN

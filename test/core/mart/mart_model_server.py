@@ -26,8 +26,8 @@ class Server(NamedTuple):
     """The state of the server.
 
     ``port``: the command port is free, busy (with a controlled move), waiting (for a dead IMU) or
-    hung. ``released``: the stop port has stopped an uncontrolled motion, but the server still
-    regards this motion as in progress.
+    hung. ``released``: whether the stop port has stopped an uncontrolled motion that the server
+    still regards as in progress.
     """
 
     motion: Motion = Motion.NONE

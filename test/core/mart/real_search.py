@@ -4,10 +4,10 @@
 
 ``mart_model`` searches without a bound, but its driver is a model. There are three sets of trials.
 ``pairs``: every pair of wishes (what a user may want, such as "forward"). ``eights``: sequences of
-eight wishes, in which each wish follows each wish. In both sets, one datagram of either direction
-is lost, late or duplicated, or the IMU is dead from that datagram on; there is a trial for each
-datagram. ``beginnings``: a driver starts while the robot may already be in a motion, and the
-network is away for various times.
+eight wishes, in which each wish follows every other wish. In both sets, one datagram of either
+direction is lost, late or duplicated, or the IMU is dead from that datagram on; there is a trial
+for each datagram. ``beginnings``: a driver starts while the robot may already be in a motion, and
+the network is away for various times.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all of them.
 """
@@ -154,7 +154,7 @@ def pairs() -> Iterator[Trial]:
 
 
 def eights() -> Iterator[Trial]:
-    """Yield trials of eight wishes; each wish follows each other one in some of the trials."""
+    """Yield trials of eight wishes; over all trials, each wish follows every other wish."""
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
