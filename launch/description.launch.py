@@ -9,7 +9,13 @@ the prefix before the names of frames only.
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
-from launch.substitutions import Command, FindExecutable, LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import (
+    Command,
+    FindExecutable,
+    LaunchConfiguration,
+    PathJoinSubstitution,
+    PythonExpression,
+)
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
@@ -17,13 +23,12 @@ from launch_ros.substitutions import FindPackageShare
 
 def generate_launch_description() -> LaunchDescription:
     """Return robot_state_publisher, RViz and their arguments."""
+    board = PythonExpression(["'", LaunchConfiguration("board"), "' or 'omnibot'"])
     description = Command(
         [
             FindExecutable(name="xacro"),
             " ",
-            PathJoinSubstitution(
-                [FindPackageShare("omnibot_driver"), "urdf", LaunchConfiguration("board")]
-            ),
+            PathJoinSubstitution([FindPackageShare("omnibot_driver"), "urdf", board]),
             ".urdf.xacro ",
             LaunchConfiguration("xacro_args"),
         ]
@@ -32,8 +37,8 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument(
                 "board",
-                default_value="omnibot",
-                description="Motor board of the robot, whose description is shown.",
+                default_value="",
+                description="Motor board of the robot, whose description is shown; empty: omnibot.",
             ),
             DeclareLaunchArgument(
                 "namespace",
@@ -80,7 +85,7 @@ def generate_launch_description() -> LaunchDescription:
                             [
                                 FindPackageShare("omnibot_driver"),
                                 "rviz",
-                                LaunchConfiguration("board"),
+                                board,
                             ]
                         ),
                         ".rviz",

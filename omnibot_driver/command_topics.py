@@ -26,13 +26,14 @@ def obeying(
     expires_s: Callable[[], float],
     *,
     may_be_old: Callable[[Any], bool] = lambda _message: False,
+    is_stop: Callable[[Any], bool] = lambda _message: False,
     moves_base: bool = True,
 ) -> Callable[[Any, MessageInfo], None]:
     """Return a callback that passes each message to ``action``; the link reports a refusal.
 
     ``expires_s`` returns the age in s at which a command expires. ``may_be_old`` returns True for a
-    message whose transit time does not matter. ``moves_base``: whether the commands move the base,
-    and not another part of the robot.
+    message whose transit time does not matter, and ``is_stop`` for one that is always obeyed.
+    ``moves_base``: whether the commands move the base, and not another part of the robot.
     """
     transit = Transit()
 
@@ -48,11 +49,12 @@ def obeying(
         delay = transit.delay(arrival, longest_s)
 
         def obey(session: Session, message: Any, now: float) -> None:
-            if not may_be_old(message):
+            if not (may_be_old(message) or is_stop(message)):
                 delay.require(topic, longest_s)
             action(session, message, now)
 
         with contextlib.suppress(CommandRefused):
-            link.command(obey, message, delay.sent_ns, moves_base=moves_base)
+            sent_ns = () if is_stop(message) else delay.sent_ns
+            link.command(obey, message, sent_ns, moves_base=moves_base)
 
     return callback

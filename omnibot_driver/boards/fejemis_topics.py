@@ -223,7 +223,7 @@ class FejemisTopics:
             "lift_cmd",
             lift,
             lambda: float(self._values["cmd_vel_timeout"]),
-            may_be_old=lambda message: message.data == 0.0,
+            is_stop=lambda message: message.data == 0.0,
             moves_base=False,
         )
 

@@ -264,6 +264,13 @@ def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]
 
 
 @needs_launch
+def test_an_empty_board_is_described_as_the_default_one(launch: Callable[..., Started]) -> None:
+    """A launch file that includes the driver's file leaves its empty argument behind."""
+    path, *_ = launch("description.launch.py", "board:=")["xacro"]["arguments"]
+    assert Path(path).resolve() == ROOT / "urdf/omnibot.urdf.xacro"
+
+
+@needs_launch
 def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
     """RViz uses this package's display, in the robot's own odometry frame."""
     started = launch("description.launch.py", "rviz:=true", "frame_prefix:=robot1/")

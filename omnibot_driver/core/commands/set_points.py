@@ -51,6 +51,10 @@ class Setpoint(Protocol):
     def settled(self) -> bool:
         """Whether all later orders are the same as the present one."""
 
+    @property
+    def final(self) -> Order:
+        """The order of this command once it is settled."""
+
     def order(self, now: float) -> Order:
         """Return the order for the time ``now``."""
 
@@ -78,7 +82,7 @@ class BaseSetpoint:
         since: float,
     ) -> None:
         self._wanted, self._limits, self._is_zero = wanted, limits, is_zero
-        self._order = Drive(wanted)
+        self._order = self.final = Drive(wanted)
         self.is_zero = is_zero(self._order)
         self._setpoint, self._reached_at = wanted, since
         self.settled = self.is_zero or not (limits.linear_mps2 or limits.angular_radps2)
@@ -121,6 +125,7 @@ class SteadySetpoint:
     ) -> None:
         self.authority = authority
         self._order, self._is_zero = order, is_zero
+        self.final = order
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
@@ -158,7 +163,8 @@ class GoalSetpoint:
     ) -> None:
         self.alignment = alignment
         self._direct = direct
-        self._goal, self._order, self._check = goal, GoTo(place), check
+        self._goal, self._check = goal, check
+        self._order = self.final = GoTo(place)
         self._nearest_m = self._nearest_rad = math.inf
         self.check_anew()
 

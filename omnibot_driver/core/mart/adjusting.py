@@ -65,6 +65,7 @@ class Adjusting(Moves):
         self.loop.trip_s = self.conversation.trip_s
         if moved.duration_s is not None:
             blind = self.odometry.left_over_right is not None
+            self._turns.keep_lessons()
             self.loop.measured(moved.dx_m, moved.dyaw_rad, moved.duration_s, now, right_only=blind)
         self._predict_turn()
 

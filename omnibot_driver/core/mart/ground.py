@@ -94,6 +94,7 @@ class Ground:
     def settings(self, settings: MartSettings) -> None:
         self._settings = self.odometry.settings = self.loop.settings = settings
         self._turns.settings = settings
+        self._turns.keep_lessons()
         self.conversation.delay_s = settings.network_delay_s
 
     def connect(self) -> None:

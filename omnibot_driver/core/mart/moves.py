@@ -48,7 +48,8 @@ class Moves(Asking):
         ``sure``: whether the reply certainly belongs to this move.
         """
         motion = self.motion
-        if sure and isinstance(reply, Ok):
+        copies_s = self._started_s + 2 * self._delay_s  # of earlier requests, and their replies
+        if sure and isinstance(reply, Ok) and now >= copies_s:
             self.odometry.wheel.started()
         if motion is Motion.STRAIGHT:
             self.odometry.doubt.end_straight()

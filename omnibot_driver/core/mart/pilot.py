@@ -55,6 +55,7 @@ class Pilot(Hearing):
 
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``; a new command cancels the present job."""
+        docks = self.jobs.moving
         if wanted is not None:
             self.jobs.cancel(
                 "a motion command or a stop arrived; end the commands, then call again"
@@ -62,7 +63,7 @@ class Pilot(Hearing):
         if wanted is not self._wanted:
             order = moving_order(wanted, now)
             same = self._move and isinstance(order, GoTo) and order.place == self._move.place
-            self._move = self._move.repeated() if self._move and same else None
+            self._move = self._move.repeated() if self._move and same and not docks else None
             if is_standstill(self._wanted) or is_standstill(wanted):
                 self._blocked = Motion.NONE
         self._wanted = wanted

@@ -16,6 +16,9 @@ from omnibot_driver.core.mart.states import Motion
 STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Commands below both limits, in m/s and rad/s, are regarded as a standstill."""
+RAMP_LEFT: Final = 0.2
+"""Largest difference of a ramped yaw rate from its final value, as a part of that value, with which
+a turn on the spot begins."""
 
 
 def is_standstill(wanted: Wanted) -> bool:
@@ -23,9 +26,15 @@ def is_standstill(wanted: Wanted) -> bool:
     return wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero
 
 
-def is_ramped(wanted: Wanted) -> bool:
-    """Return whether an acceleration limit still changes the speeds of the command."""
-    return not (wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.settled)
+def is_turn_ramped(wanted: Wanted, now: float) -> bool:
+    """Return whether an acceleration limit will still change the yaw rate much."""
+    if wanted is None or isinstance(wanted, Stop | EmergencyStop):
+        return False
+    present, final = wanted.order(now), wanted.final
+    if not (isinstance(present, Drive) and isinstance(final, Drive)):
+        return False
+    final_radps = final.twist.yaw_rate_radps
+    return abs(present.twist.yaw_rate_radps - final_radps) > RAMP_LEFT * abs(final_radps)
 
 
 def moving_order(wanted: Wanted, now: float) -> Drive | GoTo | None:

@@ -227,6 +227,10 @@ class SpotTurns:
         self._loop.spun(self.units, self._lesson(rate_radps))
         self._has_learned = True
 
+    def keep_lessons(self) -> None:
+        """Record that other lessons followed the last turn, so that a turn cannot undo them."""
+        self._before_slow = None
+
     def _undo_false_lesson(self, part: float) -> None:
         """Forget the lesson of the slow turn if the present turn shows that the slow one was held.
 
@@ -236,5 +240,5 @@ class SpotTurns:
         if self._before_slow is not None and part > TOO_FAST:
             self._loop.restore(self._before_slow)
             self._before_slow = None
-        elif part < HINDERED:
-            self._before_slow = self._loop.lines()
+        else:
+            self._before_slow = self._loop.lines() if part < HINDERED else None

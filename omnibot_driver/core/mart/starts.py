@@ -19,7 +19,7 @@ from omnibot_driver.core.mart.ground import (
     STARTS_UP_S,
 )
 from omnibot_driver.core.mart.replies import Fail
-from omnibot_driver.core.mart.required_motion import is_ramped
+from omnibot_driver.core.mart.required_motion import is_turn_ramped
 from omnibot_driver.core.mart.spot_turns import SLOW_UNITS
 from omnibot_driver.core.mart.states import (
     HALTS,
@@ -88,7 +88,7 @@ class Starts(Adjusting):
     def _spin_setting(self, now: float) -> Request | None:
         """Return the setting of the speed for the next turn on the spot, if it must be sent."""
         motion, twist = self._wish(now)
-        if motion is not Motion.SPIN or is_ramped(self._wanted):
+        if motion is not Motion.SPIN or is_turn_ramped(self._wanted, now):
             return None
         if self.refusal or now < self.appeared_s + STARTS_UP_S:
             return None
@@ -113,7 +113,7 @@ class Starts(Adjusting):
         if motion is Motion.NONE or motion is self._blocked:
             return None
         if motion is Motion.SPIN:
-            if is_ramped(self._wanted):
+            if is_turn_ramped(self._wanted, now):
                 return None  # the server cannot change the rate of a turn, so the ramp ends first
             return self._turns.request(twist.yaw_rate_radps)
         if self.health.obstacle(motion, now):

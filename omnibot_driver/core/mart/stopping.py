@@ -154,6 +154,8 @@ class Stopping:
             return False
         if not isinstance(reply, Ok | Fail):
             return False
+        if isinstance(reply, Ok) and now < self._own_from_s:
+            return False  # it may answer a copy of an earlier request; the server's name decides
         self.result = reply
         self.began = isinstance(reply, Ok) or None
         return True

@@ -41,6 +41,7 @@ HALF_STUCK: Final = (
     "one wheel does not turn: check its motor, wiring and power; forward motion is refused until"
     " the command ends"
 )
+UNCONTROLLED: Final = (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
 """Measured speeds in m/s and rad/s; a robot that exceeds either of them certainly moves."""
 BLOCKED_S: Final = 0.6
@@ -292,7 +293,7 @@ class Stops(Ground, ABC):
             self._notice(f"an obstacle has ended the move ({reply.reason})", halt=False)
         elif reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
-        elif reply.reason == words.NO_START and motion not in (Motion.STRAIGHT, Motion.TURN):
+        elif reply.reason == words.NO_START and motion in UNCONTROLLED:
             self._learn_standing()
         elif reply.reason == words.IMU_LOST:
             self.imu.lost()

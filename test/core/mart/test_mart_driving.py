@@ -136,6 +136,28 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
     assert abs(bench.server.chassis.yaw_rad - from_rad) < 3.0 * 0.03
 
 
+def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
+    """Whole units make slow turns up to 17 % faster; the first turn was slow by a dead zone."""
+    bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
+    for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):
+        bench.command(vx, yaw_rate, 6.0)
+        bench.command(0.0, 0.0, 1.5)
+    assert float(bench.board.figures.own["Motor balance"]) == pytest.approx(1.05, abs=0.02)
+
+
+@pytest.mark.parametrize("noise_mps", [0.0, 0.02])
+def test_an_acceleration_limit_of_the_speed_delays_no_turn_on_the_spot(noise_mps: float) -> None:
+    """A joystick sends some linear speed beside the turn."""
+    bench = MartBench().ready()
+    ramp = SessionSettings(
+        limits=SpeedLimits(linear_mps2=0.1), commands=CommandSettings(), odometry=OdometrySettings()
+    )
+    bench.session.configure(ramp, bench.now, board=MartSettings())
+    for step in range(30):
+        bench.command(noise_mps * (-1) ** step, 0.5, 0.1)
+    assert bench.server.chassis.yaw_rad > 0.6
+
+
 @pytest.mark.parametrize("dead_units", [0.0, 3.0])
 def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units: float) -> None:
     """The server cannot change the rate of a turn, so the turn begins only at its final rate."""

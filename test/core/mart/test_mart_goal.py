@@ -12,7 +12,9 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import MartSettings
 from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, STRETCH, Move, Surplus, next_move
 from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.words import MCR, TB, TF
+from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
 
 
@@ -118,6 +120,69 @@ def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
     assert not bench.board._pilot.jobs.log_may_be_lost
     end(bench)
     assert bench.error.way_m < 0.1
+
+
+@pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
+def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
+    """The command cancels the docking, so the driver stops the move to the dock at once."""
+    bench = MartBench(firmware).ready()
+    bench.go_to(0.0, 0.0, 0.0)
+    bench.run(2.0)
+    bench.board.ask(Job.DOCK, "token", bench.now, "DOCK", 12)
+    bench.run_until(lambda: bench.truth.x_m > 0.05, 5.0)
+    bench.go_to(0.0, 0.0, 0.0)
+    bench.run(3.0)
+    assert bench.truth.x_m < 0.12
+
+
+def lose_moves_and_copy_a_check(bench: MartBench) -> None:
+    """Lose all turns of goals; deliver a copy of the next RST IMU, and its reply, 0.29 s late."""
+    receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
+    copies: list[float] = []
+    replies: list[float] = []
+
+    def lossy(data: bytes, now: float, channel: int) -> None:
+        if data.startswith(b"RST IMU") and not copies:
+            copies.append(board.now_s + 0.29)
+        if not data.startswith(b"MC"):
+            receive(data, now, channel)
+
+    def late() -> list[Packet]:
+        if copies and copies[0] <= board.now_s:
+            receive(b"RST IMU", board.now_s, 0)
+            copies[0] = math.inf
+        out: list[Packet] = []
+        for packet in advance():
+            if packet[1] == b"ok" and copies == [math.inf]:
+                replies.append(board.now_s + 0.29)
+            else:
+                out.append(packet)
+        due = [at for at in replies if at <= board.now_s]
+        replies[:] = [at for at in replies if at > board.now_s]
+        return out + [(0, b"ok")] * len(due)
+
+    bench.robot.receive = lossy  # type: ignore[method-assign]
+    bench.robot.advance = late  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+@pytest.mark.parametrize("before", [(0.0, 0.5), (0.25, 0.0)], ids=["turn", "drive"])
+@pytest.mark.parametrize("stops_s", [0.1, 0.3, None])
+def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
+    firmware: Firmware, before: tuple[float, float], stops_s: float | None
+) -> None:
+    """The encoder still has the count of the motion before, which must not be counted again."""
+    bench = MartBench(firmware).ready()
+    bench.command(*before, 3.0)
+    bench.command(0.0, 0.0, 1.5)
+    lose_moves_and_copy_a_check(bench)
+    here = bench.odometry[-1].pose
+    bench.go_to(here.x_m, here.y_m, here.yaw_rad - 2.0)
+    bench.run_until(lambda: bench.board._pilot.motion is Motion.TURN, 5.0)
+    bench.run(stops_s or 3.0)
+    bench.command(0.0, 0.0, 3.0)
+    assert bench.error.way_m < 0.05
+    assert abs(bench.error.yaw_rad) < 0.05
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
