@@ -170,10 +170,10 @@ def test_odom_and_base_must_be_different_frames() -> None:
 
 
 @pytest.mark.parametrize("signs", [[1, 1, -1], [1, -1, 1], [-1, -1, -1]])
-def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
+def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_control(
     signs: list[int],
 ) -> None:
-    """Axis signs that no mirror makes are valid for velocities, but not for goal positions."""
+    """If x · y is not the sign of yaw, axis_signs is valid for velocities, but not for goals."""
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
         check_all({"axis_signs": signs, "control_method": "position"})

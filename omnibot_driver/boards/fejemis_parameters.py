@@ -131,9 +131,9 @@ DRIVING: Final = (
         10.0,
         "s",
         "Time from ~/power_off until the board cuts the power. This computer loses power too if"
-        " the board supplies it. The driver sends whole seconds, and increases a value in which the"
-        " loss of two digits could go undetected: for example, 120 s becomes 131 s. The answer of"
-        " ~/power_off states the time in use.",
+        " the board supplies it. The driver sends whole seconds. It replaces a number that could"
+        " lose two digits on the line without a wrong checksum by a larger one: for example, 120"
+        " by 131. The answer of ~/power_off states the time in use.",
         low=1.0,
         high=3600.0,
     ),

@@ -251,7 +251,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return what the guard sends if this process fails: Stop, and emergency stop with Stop.
+        """Return the two alternatives that the guard sends: Stop, or emergency stop and then Stop.
 
         The guard sends the second item if the e-stop is latched. This method is called after each
         input and before each output, because the right packets may depend on the board's state.

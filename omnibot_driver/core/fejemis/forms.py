@@ -13,10 +13,11 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Count of deviating lines, among ``OF`` lines of a kind, after which the kind is no longer
+"""Number of lines with another form, in ``OF`` lines of a kind, after which the form is no longer
 checked.
 
-Lines with a correct sum are rarely damaged, so for them the smaller ``VARIES`` is enough."""
+For lines with a correct sum, ``VARIES`` applies: they are rarely damaged, so fewer such lines show
+that the board itself varies the form."""
 OF: Final = 24
 
 Form = tuple[int, ...]

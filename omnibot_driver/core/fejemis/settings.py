@@ -17,7 +17,10 @@ class Written(Enum):
     WHEELS = "confw", 5
     """Radii of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
     STEERING = "confs", 2
-    """Track and distance of the steered wheel from the axle, in m; written to both boards."""
+    """Track in m, then the distance in m from the axle to the steered wheel.
+
+    The driver writes both numbers to both boards.
+    """
     FRONT_WHEEL = "fwoffset", 2
     """Offset of the front angle in degrees, and 1 if the angle is inverted, else 0."""
     INFRARED = "irc", 4

@@ -197,9 +197,9 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; if it is a pose, add earlier rejected displacements to ``lost``.
+        """Return the reading; for a pose, ``reading.lost`` includes the rejected displacements.
 
-        The pose includes the motion of the rejected displacements.
+        Only their number is added, because the pose already includes their motion.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Draw the path of each drive with the old and the new geometry, and its end by the tape.
+    """Draw each drive's path with the old and the new geometry, and its end as measured by tape.
 
     Beside the paths, draw the errors of the odometry with both geometries, in standard deviations
     of the tape reading.

@@ -53,7 +53,7 @@ def _states(log: Log) -> Iterator[Finding]:
             Level.WARN,
             "State",
             f"The board ran in IMU-only mode. Time in each state: {told}.",
-            "For odometry set the board's own mode to nominal and reboot it.",
+            "For odometry, set the board's own mode to nominal and reboot it.",
         )
     else:
         yield Finding(Level.GOOD, "State", f"{told[:1].upper()}{told[1:]}.")

@@ -149,7 +149,7 @@ def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() ->
 
 
 def test_a_small_difference_is_written_after_a_start() -> None:
-    """A board whose values differ only slightly from the user's settings is sent the settings."""
+    """The driver writes the user's settings even if the board's values differ only slightly."""
     configuration = Configuration("front", {Written.STEERING: (0.4, 0.4205)})
     for _ in range(2):
         configuration.hear(parse("confs 0.4200 0.4000"))
