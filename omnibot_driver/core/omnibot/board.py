@@ -266,5 +266,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the two alternatives that the guard sends: Stop, or emergency stop and then Stop."""
+        """Return the two alternatives for the guard: Stop, or emergency stop and then Stop."""
         return LAST_WORDS

@@ -33,7 +33,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """A Stop follows each ES, for firmware without mode 10; the first ES and Stop are sent twice."""
+    """A Stop follows each ES, for firmware without mode 10; the first ES and Stop go out twice."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
