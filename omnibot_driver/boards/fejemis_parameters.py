@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of a Fejemis, except those that all boards have. Must not know ROS.
+"""The parameters of a Fejemis, except those that all boards have. This module must not use ROS.
 
 Values that the two Teensys store are unset by default: the driver writes such a value only if the
 user sets it (`fejemis_values.py`).

@@ -2,7 +2,7 @@
 
 """Values of a Fejemis' parameters: what is written to the boards, and which values fit together.
 
-Must not know ROS, nor what a parameter means to the boards.
+This module must not use ROS. It does not know what a parameter means to the boards.
 """
 
 import math

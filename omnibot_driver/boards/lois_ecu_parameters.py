@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU's own parameters, in addition to those of every board. Does not know ROS.
+"""The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
 
 Settings that the board stores are unset by default: the driver writes such a setting only if the
 user gives a value.

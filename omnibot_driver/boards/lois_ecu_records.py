@@ -2,7 +2,7 @@
 
 """Saving of a LOIS ECU's record as a CSV file, which is complete or does not exist.
 
-Knows records and files. Does not know ROS, nor the lines of the board.
+This module works on records and files, without ROS and without the board's lines.
 """
 
 import contextlib

@@ -38,7 +38,7 @@ class PairStream(SetpointStream):
         super().connect()
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the set-point; tell the listener whether the new order is an emergency stop."""
+        """Replace the set-point; notify the listener whether the order is an emergency stop."""
         is_stop = wanted is None or isinstance(wanted, Stop | EmergencyStop)
         self.driving = not is_stop and not wanted.is_zero  # type: ignore[union-attr]
         self._listener.wanted(estop=isinstance(wanted, EmergencyStop))

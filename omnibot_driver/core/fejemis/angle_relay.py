@@ -29,8 +29,8 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""A text of an angle to the right that damage can turn into angles to the left is accepted only if
-these angles are less than ``ACROSS`` degrees."""
+"""If damage can change the text of an angle to the right into that of an angle to the left, the
+text is used only if the angle to the left is less than ``ACROSS`` degrees."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

@@ -143,7 +143,7 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines, because the ports are closed; return a failed job's result."""
+        """Discard incomplete lines, and fail a running job, because the ports are closed."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -233,7 +233,7 @@ class FejemisBoard(Board):
         return self._ports.both(STOP)
 
     def emergency_stop(self) -> Packets:
-        """Return ``stop`` for the drive board; for the front board, lines that end brush and lift.
+        """Return ``stop`` for the drive board; for the front board, lines that stop brush and lift.
 
         The front board does not have a ``stop`` command.
         """
@@ -244,7 +244,7 @@ class FejemisBoard(Board):
         return self._ports.ending("front", *OFF)
 
     def switch_off(self) -> Packets:
-        """Return the lines that switch lift and brush off and restore the lights."""
+        """Return lines that switch lift and brush off, and let the board show its own lights."""
         return self._ports.ending("front", *self._upkeep.machine.switch_off())
 
     def wake(self) -> Packets:
@@ -281,9 +281,9 @@ class FejemisBoard(Board):
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the packets of a Stop, and those of an emergency stop, for the guard process.
+        """Return two alternatives for the guard process: Stop, or emergency stop and then Stop.
 
-        Both groups of packets also switch brush and lift off.
+        The packets of each alternative also switch brush and lift off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

@@ -17,7 +17,8 @@ HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all but the frame counter."""
 SICK_LINES: Final = 3
-"""Number of lines in a row that must report a fault of the sensor: a few lines may be damaged."""
+"""The sensor is regarded as faulty when this number of lines in a row report a fault: a single line
+may be damaged."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Accepted jump of the angle in degrees, in addition to the motion of the fastest servo."""

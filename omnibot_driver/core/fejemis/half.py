@@ -246,7 +246,7 @@ class Half:
 
 
 def keyword_of(message: Message) -> str:
-    """Return the keyword of the stream to which a message belongs; empty without such a stream."""
+    """Return the keyword of a message's stream; empty if the message belongs to no stream."""
     if isinstance(message, Distance):
         return message.keyword
     return _KEYWORDS.get(type(message).__name__, "")

@@ -87,7 +87,10 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Set the phase to the latest that the last ``PHASE_BLOCKS`` blocks of arrivals allow."""
+        """Set the phase to the latest value for which no sample arrives before its own time.
+
+        The samples are those of the last ``PHASE_BLOCKS`` blocks of arrivals.
+        """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)
         if self._block_s < self._phase_s:

@@ -11,8 +11,8 @@ false pair:
 - between its two lines comes a line of a kind that never comes within a pair;
 - its second line comes ``PAIR_WITHIN_S`` or more after the first. Such a pair waits for the next
   pose: the times of two poses tell how many samples lie between them;
-- a pose comes later in the same read. So a pair is returned only at this pose, or at the end of its
-  read.
+- a pose follows in the same read, and its time shows that fewer lines came since the previous pose
+  than the board has sent. So a pair is returned only at this pose, or at the end of its read.
 
 One case remains undetected: the lines come late, but less than ``PAIR_WITHIN_S`` apart, and no pose
 follows in the read that completes the pair. Until the order of the two lines is known, some samples
@@ -35,8 +35,8 @@ PAIR_WITHIN_S: Final = 0.005
 evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""The evidence for which line comes first is a sum of pauses in s. From the sum ``KNOWN_S`` on, the
-order is known; ``SUREST_S`` is the largest sum."""
+"""The pauses before the lines show which line of a sample comes first. The sum of the pauses, in s,
+is the evidence: from ``KNOWN_S`` on, the order is known; ``SUREST_S`` is the largest sum."""
 MARKED_S: Final = PERIOD_S
 """Evidence in s that is added if another periodic line comes between a gyro and an acceleration
 line, because a control cycle has then ended between them."""
@@ -45,8 +45,8 @@ PATIENCE: Final = 60
 
 Neither order gains evidence if the board sends both lines half a period apart."""
 MOST: Final = 10
-"""The difference of two counts is kept between ``-MOST`` and ``MOST``: the lines of a kind that
-came outside of pairs, minus the lines of that kind that came within pairs."""
+"""For each kind of line, the driver counts the lines that came outside of pairs, minus the lines
+that came within pairs. This difference is kept between ``-MOST`` and ``MOST``."""
 UNPOSED: Final = 20
 """Largest count of gyro or acceleration lines for which a pair waits for the next pose; after more
 lines, the pair is rejected."""
@@ -88,7 +88,7 @@ class ImuPairs:
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
         self._between: set[str] = set()
-        """Kinds of other lines since the last gyro or acceleration line."""
+        """The kinds of lines that have come since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
         """For each other kind of line: count of lines outside of pairs, minus count within
         pairs."""

@@ -27,8 +27,8 @@ LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the speed that a line gives."""
 ANGLE_COST: Final = 1e4
-"""Cost of an angle error of 1 rad; numbers that are e (2.718) times too large have a cost of 1.
-"""
+"""Cost of an angle error of 1 rad, for the choice among several lines. For comparison, a number
+that is e (2.718) times too large has a cost of 1."""
 SLOWEST: Final = 30.0
 """Largest allowed ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
 SCALES: Final = 4.0

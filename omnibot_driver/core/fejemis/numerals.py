@@ -6,7 +6,7 @@ A sum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` a
 and ``6``. Each line contains the number ``2`` (the source of the command), so the numbers of this
 module do not contain ``1``. They also do not contain ``3`` or ``5``. In a line with a minus sign,
 the numbers do not contain ``6`` either. So there are gaps between the numbers; the largest gap,
-relative to the number, is from 1 to 2.
+relative to the number, is between 1 and 2 times a power of ten.
 """
 
 from bisect import bisect_left, bisect_right

@@ -9,9 +9,10 @@ difference of the two poses differ by more than rounding explains, lines were lo
 turned quickly; then the displacement is the difference of the poses. The displacements add up to
 the pose.
 
-A pose that the robot cannot have reached is held back until the next pose comes. If the next pose
-agrees with the held pose, either the last accepted pose was wrong, or the board has begun a new
-frame (command ``enc0``).
+A pose is rejected if the last pose and the wheel speeds do not explain it. If the next pose agrees
+with the rejected pose, and the robot can have reached it, the next pose is accepted. If the robot
+cannot have reached it, but ``NEW_FRAME`` poses in a row agree with the pose before, the board has
+begun a new frame (command ``enc0``).
 """
 
 import math
@@ -47,7 +48,8 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""If this many rejected poses in a row agree, the board has begun a new frame."""
+"""If this number of rejected poses in a row each agree with the rejected pose before, the board has
+begun a new frame."""
 
 
 class PoseOdometry:

@@ -42,7 +42,7 @@ def line(text: bytes, *, sums: bool) -> bytes:
 
 
 def lines(*texts: bytes, sums: bool) -> bytes:
-    """Return the bytes of several lines in order, each as ``line`` makes them."""
+    """Return the bytes of several lines in order, each as ``line`` makes it."""
     return b"".join([line(text, sums=sums) for text in texts])
 
 

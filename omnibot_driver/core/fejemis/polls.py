@@ -47,7 +47,7 @@ class Polls:
         return min(self._next_at, self._sonar_at) if self._role == "drive" else self._next_at
 
     def unknown(self, words: Mapping[str, None]) -> None:
-        """Stop sending the requests among ``words``, the lines that the firmware does not know."""
+        """Stop sending requests that are in ``words``: the firmware does not know them."""
         self._unknown = {text for text in ASKED[self._role] if text.decode("ascii") in words}
 
     def due(self, now: float, *, sums: bool) -> list[bytes]:

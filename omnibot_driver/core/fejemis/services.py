@@ -18,7 +18,7 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""Time in s between a Stop and the loading of a configuration, for a robot that moves."""
+"""If the robot moves, the driver sends a Stop, and loads a configuration this time in s later."""
 NO_DATA: Final = "no data from the boards; check their power and cables"
 
 

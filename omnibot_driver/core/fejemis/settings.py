@@ -45,11 +45,11 @@ class FejemisSettings:
 
     ``track_m``, ``wheelbase_m``: the geometry that is used until the boards report their own.
     ``written``: values to write to the boards; all others are only read. ``line_sums``: whether
-    lines carry a sum (checksum); ``auto``: if the heartbeats carry one. ``allow_reverse``: whether
-    a negative speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the longest
-    time that the lift runs after one command. ``power_off_delay_s``: time from a request to switch
-    off until the power is cut. ``low_cell_v``: voltage per cell below which a battery is reported
-    as low.
+    lines carry a sum (checksum); with ``auto``, they do if the heartbeats do. ``allow_reverse``:
+    whether a negative speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the
+    longest time that the lift runs after one command. ``power_off_delay_s``: time from a request to
+    switch off until the power is cut. ``low_cell_v``: voltage per cell below which a battery is
+    reported as low.
     """
 
     track_m: float = 0.4

@@ -12,7 +12,8 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Of the lines that a firmware does not know, at most this number is shown: the latest lines."""
+"""The diagnostics show at most this number of lines that the firmware does not know: the latest
+ones."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

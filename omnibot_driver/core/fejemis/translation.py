@@ -40,7 +40,8 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time between two notices of a low battery, in s."""
 PERIOD_S: Final = 0.03
-"""Time in s after an IMU sample within which an orientation gets the timestamp of that sample."""
+"""An orientation that comes within this time in s after an IMU sample gets that sample's
+timestamp."""
 
 
 class Translation:

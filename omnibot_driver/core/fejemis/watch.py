@@ -48,7 +48,7 @@ class Watch:
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:
-        """Add notices of timeouts that stop the robot; return whether a board was lost."""
+        """Check all timeouts, and add their notices; return whether a board became silent."""
         if self._stalled:
             self._stalled, self._patient_until = False, now + SILENT_S
         lost = [self._look_at(channel, now) for channel in (0, 1)]
@@ -68,7 +68,7 @@ class Watch:
 
     @property
     def front_unheard_at(self) -> float:
-        """Time in s at which the front board has been silent too long for brush and lift to run."""
+        """Time in s from which brush and lift must be off if the front board remains silent."""
         front = self._ports.half("front")
         return -math.inf if front is None else front.came_at("fwl") + NO_ANGLE_S + SLACK_S
 

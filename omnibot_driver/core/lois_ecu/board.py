@@ -99,7 +99,7 @@ class LoisEcuBoard(Board):
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether both wheels' ticks are counted now, so that unchanged ticks prove a standstill.
+        """Whether the board now counts both wheels' ticks, so unchanged ticks prove a standstill.
 
         The public firmware counts a wheel's ticks only while its RPM target is positive.
         """
@@ -125,7 +125,7 @@ class LoisEcuBoard(Board):
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings of held bytes and groups; called when the port closes."""
+        """Return the readings that were held back until now; called when the port closes."""
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
@@ -133,7 +133,7 @@ class LoisEcuBoard(Board):
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return readings of groups whose waiting time is over, and the odometry that is due."""
+        """Return the readings of held groups that waited long enough, and odometry if it is due."""
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)
@@ -147,7 +147,7 @@ class LoisEcuBoard(Board):
 
     @property
     def _odometry_due_at(self) -> float:
-        """Time of the next odometry; infinity while nothing shows the motion of the wheels."""
+        """Time of the next odometry; infinity while the board does not report motion."""
         silent = self._sensor_speaks or self.mode is not Mode.NOMINAL
         return math.inf if silent else self._odometry_at
 
@@ -264,11 +264,11 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """Return RPM 0/0, because the board has no e-stop command; nothing in a terminal mode."""
+        """Return RPM 0/0, because the board has no e-stop command. Empty in a terminal mode."""
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and a reset of the counters; ``due`` repeats the reset until confirmed."""
+        """Return Stop and the reset command; ``due`` repeats both until ticks confirm the reset."""
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own
         self._resets_left, self._reset_shown = RESETS, False

@@ -14,10 +14,10 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of groups of ticks that must have come before odometry with its own command byte (0x20)
-proves that the board behaves as the manual says."""
+"""If this many groups of ticks came without appended odometry, a group of odometry with its own
+command byte (0x20) proves that the board behaves as the manual says."""
 UNCOUNTED_M: Final = 0.06
-"""Distance in m that wheels roll backward without a negative count before the driver concludes that
+"""If wheels roll backward by this distance in m and no count is negative, the driver concludes that
 ticks do not count backward."""
 
 

@@ -20,8 +20,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored groups: the groups of five seconds. In this time, a clock with an error of 100
-ppm drifts by 0.5 ms."""
+"""Number of stored groups; the board sends them in five seconds. In this time, a clock with an
+error of 100 ppm drifts by 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s; a longer delay means that the board has restarted, or that its
@@ -31,8 +31,8 @@ UNKNOWN_S: Final = 0.012
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Longest assumed time in s between groups that were read together after a pause of the reader.
-Only the last of these groups is stored, because its delay is the smallest."""
+"""Groups that arrive within this time in s are assumed to be read together, after a pause of the
+reader. Only the last of these groups is stored, because its delay is the smallest."""
 Point = tuple[float, float]
 """Arrival time in s, and how far the board's clock is behind the arrival time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}

@@ -33,8 +33,8 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Assumed age in s of ticks when their last line arrives; ``ODOMETRY_AGE_S`` is that of
-odometry."""
+"""Assumed time in s from the board's reading of its counters until the last line of the ticks
+arrives. ``ODOMETRY_AGE_S`` is the corresponding time for odometry."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
@@ -42,10 +42,11 @@ ALONG_VARIANCE: Final = 0.15
 in 0x20 (odometry), and ``ALONG_VARIANCE`` of the distance in 0x20."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Residual in ticks above which the wheel's speed is assumed to have changed without a change of
-its set-point."""
+"""If a residual exceeds this number of ticks, the filter assumes that the wheel's speed has
+changed, although its set-point has not."""
 SAME_TICKS: Final = 0.6
-"""Residual in ticks below which an unchanged count is not used as a measurement."""
+"""If a count is unchanged, and its residual is below this number of ticks, the filter does not use
+the count as a measurement."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP``, ``LEAP_M``: limits of the residual of a heading, in standard deviations and in m. A
@@ -62,7 +63,8 @@ SWERVED_M: Final = 0.05
 """Additional standard deviation in m of the position after 1 m at an oscillating speed, even if the
 distances of the wheels are known."""
 EQUAL_RPM: Final = 3.0
-"""Standard deviation in RPM of the true difference of two speeds that are reported as equal."""
+"""Assumed standard deviation, in RPM, of the difference between the true speeds of both wheels
+while the board reports equal speeds."""
 
 
 class Comparison:
@@ -72,14 +74,14 @@ class Comparison:
         self._motion = motion
         self._counted_m = [0.0, 0.0]
         self._counted = [False, False]
-        """Whether the board counted the ticks of each wheel at the last group."""
+        """For each wheel: whether the board counted its ticks when the last group came."""
         self._turned_m = 0.0
         self._speeds = ReportedSpeed(motion, 0), ReportedSpeed(motion, 1)
 
     # Ticks
 
     def begin_counts(self) -> None:
-        """Make the present counts the reference for later counts."""
+        """Add up ticks from zero again: later counts are relative to the present ones."""
         self._counted_m = [0.0, 0.0]
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
@@ -116,7 +118,7 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Make the present heading and distance in 0x20 the reference for later values."""
+        """Use the present heading and distance in 0x20 as zero for the later values of 0x20."""
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
         self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)

@@ -246,7 +246,7 @@ class LoisConversation:
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """Return RPM 0/0, which is sent in turn with Stop.
+        """Return RPM 0/0; during an e-stop, the driver sends RPM 0/0 and Stop alternately.
 
         The board does not latch an e-stop, so both commands are repeated.
 
@@ -285,7 +285,7 @@ class LoisConversation:
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Send ``command``, whose repetition must be harmless, several times: lines may be lost."""
+        """Send ``command`` several times: lines may be lost. A repetition must be harmless."""
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""History of a filter's states, which restores a past state if a restart is noticed late.
+"""History of a filter's states, to restore a past one if the board's restart is noticed late.
 
 This module works on states and times. It does not know what a state means.
 """

@@ -48,12 +48,12 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group of a valid length is complete: the board sends the lines of a
-group 1.2 ms apart, and a reader usually delivers them within ``QUIET_S``."""
+"""Silence in s after which a group of a valid length is regarded as complete: the board sends the
+lines of a group 1.2 ms apart, and a reader usually delivers them within ``QUIET_S``."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest allowed pause within a group: ``LATE_S`` in s, or if that is shorter, ``LATE_PART`` times
-the time between the markers of the previous group and of this group; at least ``QUIET_S``."""
+"""Longest allowed pause within a group: the smaller of ``LATE_S`` in s and ``LATE_PART`` times the
+time from the marker of the previous group to the marker of this group, but at least ``QUIET_S``."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),

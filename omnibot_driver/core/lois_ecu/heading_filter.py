@@ -15,8 +15,8 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""A heading may be wrong by ``NEAR_DEG``, plus this fraction of the angle that the odometry has
-turned."""
+"""Allowed error of a heading: ``NEAR_DEG`` degrees, plus this fraction of the angle by which the
+odometry has turned."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)

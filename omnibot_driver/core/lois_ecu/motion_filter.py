@@ -75,8 +75,8 @@ class MotionFilter:
 
     ``tuned``: whether the controllers have gains that the user set. If a wheel is halted soon after
     a change of its set-point, it did not roll at the speed of the model, and perhaps rolled in the
-    other direction. The error of its distance is then the change of speed times
-    ``UNSETTLED_S[tuned]``.
+    other direction. The filter then assumes that the error of the wheel's distance is the change of
+    speed times ``UNSETTLED_S[tuned]``.
     """
 
     def __init__(self) -> None:
@@ -146,11 +146,12 @@ class MotionFilter:
             at_s = end_s
 
     def restart(self, then_s: float) -> None:
-        """Restore the state at ``then_s``, when the board restarted, and add the later coasting.
+        """Restore the state at ``then_s``, the time of the board's restart, and add the coasting.
 
-        Later estimates are discarded. If ticks count in both directions, they have restarted at
-        zero and report how far the wheels coasted. Otherwise the distance of the coasting is
-        estimated, and the set-points are forgotten.
+        Estimates after ``then_s`` are discarded. The restarted board does not drive its wheels, so
+        they coast. If ticks count in both directions, they have restarted at zero and report how
+        far the wheels coasted. Otherwise the distance of the coasting is estimated, and the
+        set-points are forgotten.
         """
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
@@ -186,7 +187,7 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return the states, with factors, that change with an unmeasured distance of a wheel."""
+        """Return the states that an unmeasured distance of a wheel changes, with their factors."""
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = [*self._way_terms(index), (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
@@ -195,7 +196,7 @@ class MotionFilter:
         return terms
 
     def _way_terms(self, index: int) -> Terms:
-        """Return the states, with factors, that change with a distance of a wheel."""
+        """Return the states that a distance of a wheel changes, each with its factor."""
         base, yaw = PER_WHEEL * index, self.yaw_rad
         terms = [(base + WAY, 1.0), (X, math.cos(yaw) / 2), (Y, math.sin(yaw) / 2)]
         counts = self.wheels[index].counts(self.speed_mps(index), signed=self.signed)
@@ -250,7 +251,7 @@ class MotionFilter:
             self.begin_excess()
 
     def begin_excess(self) -> None:
-        """Reset the fraction by which each wheel rolls backward faster than its set-point."""
+        """Reset the estimate of how much faster than its set-point each wheel rolls backward."""
         for index in (0, 1):
             mean = EXCESS_MEAN[self.tuned] if self.holds else 0.0
             stddev = EXCESS_STDDEV[self.tuned] if self.holds else 0.0

@@ -32,13 +32,13 @@ from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, U
 __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 WHEEL_DRIFT: Final = 0.0035
-"""Random walk of a wheel on the ground: standard deviation in m after 1 m."""
+"""Assumed standard deviation, in m, of the random error of a wheel's distance after 1 m."""
 LATE_S: Final = 0.012
 """Assumed standard deviation of an arrival time in s, while no better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
 """The pose is predicted for at most ``UNHEARD_S`` s after the last report, or ``UNHEARD_GROUPS``
-tick periods if that is longer; after that, the board may be switched off."""
+tick periods if that is longer. A longer silence can mean that the board is off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
@@ -103,7 +103,7 @@ class LoisOdometry:
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """Whether each wheel is taken to be at rest although it is commanded to turn backward."""
+        """For each wheel: whether it is assumed to be at rest, although it must turn backward."""
         left, right = self._motion.wheels
         return left.rests, right.rests
 
@@ -155,7 +155,7 @@ class LoisOdometry:
         self.wrote(SetRpm(0, 0), now)
 
     def stalled(self, wheels: tuple[bool, bool]) -> None:
-        """Treat the given ``wheels`` as at rest since their reported speeds last changed."""
+        """Assume that stalled ``wheels`` have rested since their reported speeds last changed."""
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:
                 self._comparison.came_to_rest(index)

@@ -52,7 +52,7 @@ def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], 
 
 
 def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
-    """Return the set-points in ``data``, which are lines for the board, in order."""
+    """Return the set-points among the lines in ``data``, in order."""
     length = LENGTH if with_sum else LENGTH_WITHOUT_SUM
     found: list[SetRpm | SetDuty] = []
     for line in data.splitlines(keepends=True):

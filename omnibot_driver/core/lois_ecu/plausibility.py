@@ -22,17 +22,18 @@ FASTEST_RADPS: Final = 20.0
 POSE_MARGIN_M: Final = 0.5
 POSE_MARGIN_RAD: Final = 1.0
 FARTHEST: Final = 1e5
-"""Largest plausible position in m, and yaw in rad, of a robot on one charge."""
+"""Largest position in m, and largest yaw in rad, that a robot can reach on one battery charge."""
 LATEST_S: Final = 0.3
 """Longest plausible time in s from the sending of a group to its arrival."""
 SLOWEST_CLOCK: Final = 0.5
 """Lowest plausible rate of the board's clock, as a fraction of real time; the clock stops while the
 board sends."""
 SURE_AFTER: Final = 2
-"""Number of further clock steps in the same unit after which the unit is accepted."""
+"""The clock's unit is accepted when, after the first pair of ticks that shows the unit, this many
+more pairs in a row show the same unit."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest clock step in s from which the unit is learnt; arrival times are too inexact for shorter
-steps."""
+"""The clock's unit is learnt from two groups of ticks only if the second one arrives more than this
+time in s after the first one. Arrival times are too inexact for shorter times."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -50,7 +51,8 @@ def wrapped(difference: int) -> int:
 class Gate(Generic[Group]):
     """Check of each group against the last accepted group.
 
-    ``reachable(before, after, duration_s)`` returns whether ``after`` can follow ``before``.
+    ``reachable(before, after, duration_s)`` returns whether the values of ``before`` can have
+    changed to those of ``after`` in this time.
     """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:
@@ -153,7 +155,10 @@ def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: f
 
 
 def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
-    """Return whether a group's position is finite and in range. Velocities are not checked."""
+    """Return whether a group's position is finite and in range. Ticks are always in range.
+
+    Velocities are not checked.
+    """
     match group:
         case GpsPosition(latitude, longitude):
             return abs(latitude) <= 90.0 and abs(longitude) <= 180.0

@@ -61,7 +61,10 @@ class RecordFailed:
 
 @dataclass(frozen=True, slots=True)
 class TerminalLeft:
-    """Notice that a terminal mode has ended, in which presses of the e-stop button are not seen."""
+    """Notice that a terminal mode has ended.
+
+    During a terminal mode, the driver does not receive presses of the e-stop button.
+    """
 
 
 LoisReading = (

@@ -63,7 +63,7 @@ class RecordAssembler:
         self._begin(None)
 
     def damage(self) -> None:
-        """Record that a line of the record may have been lost."""
+        """Take note that a line of the requested record may have been lost."""
         self._damaged = self.begun
 
     def cut_off(self) -> None:

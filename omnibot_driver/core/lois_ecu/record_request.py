@@ -31,11 +31,12 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s, from the first time on, at which the request is sent. The intervals are longer than
-the board can be deaf, and are not multiples of its usual periods."""
+"""Times in s at which the driver sends the request, counted from the first request. The intervals
+are longer than the longest time in which the board receives nothing, and are not multiples of its
+usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
-"""Time unit in s of an RPM record, by the unit of the time in 0x12. The public firmware uses other
-units than the manual, for the time and for the record."""
+"""Time unit, in s, of the samples of an RPM record, by the unit of the board's time in 0x12
+(ticks). In the public firmware, both units differ from those in the manual."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
@@ -63,7 +64,7 @@ class RecordRequest:
         self._said = self._damaged = 0
 
     def begin(self, kind: RecordKind, samples: int, decoder: LoisDecoder) -> None:
-        """Request a record with the next ``due``; an earlier request is abandoned."""
+        """Make the next ``due`` return the request for a record; abandon an earlier request."""
         self._command, self.kind = command_of(kind, samples), kind
         self._begun_s, self._said = math.inf, 0
         decoder.expect_record(kind, samples, 0 if kind is RecordKind.HEADING else samples)
@@ -76,7 +77,7 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the readings, with the awaited record or the reason why the record will not come.
+        """Return the readings and, if known, the record or the reason why the record will not come.
 
         ``prevented``: why the board will not send the record, as a sentence; empty if the record
         may still come.

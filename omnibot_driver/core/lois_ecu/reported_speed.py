@@ -19,7 +19,8 @@ ODOMETRY_AGE_S: Final = 0.0135
 """Assumed age in s of odometry when its last line arrives: a line of 14 characters takes 1.2 ms,
 and the values are from the time at which the first line began."""
 DOUBT: Final = 3.0
-"""Residual, in standard deviations, above which an error of the estimate is assumed, not noise."""
+"""If a residual exceeds this number of standard deviations, the filter assumes that its estimate is
+wrong, because noise is rarely that large."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used: at a lower speed the wheel may have been at rest
 between the last two ticks."""
@@ -28,23 +29,24 @@ LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""Largest plausible change of a wheel's speed: ``JUMP_RPM``, plus ``JUMP_RPM_PER_S`` for each s. A
-larger change shows a tick that was delayed while the board sent something else."""
+"""Largest plausible change of a wheel's speed: ``JUMP_RPM``, plus ``JUMP_RPM_PER_S`` for each s
+between two reports. A larger change shows a tick that was delayed while the board sent something
+else."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """Largest plausible difference from the expected speed, for a wheel with a constant set-point and
 gains that the user set: ``STRAY_RPM``, plus the fraction ``STRAY_PART`` of the expected speed. A
 single speed that differs by more comes from a delayed tick, or from the tick after it."""
 COASTED_TICKS: Final = 1.0
-"""Number of ticks by which a wheel that comes to rest rolls less far than its last reported speed
+"""A wheel that comes to rest rolls this number of ticks less far than its last reported speed
 suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
-"""Fraction of the time between two reports for which an unexpected change of speed may have
-lasted."""
+"""The filter assumes that an unexpected change of speed has lasted for this fraction of the time
+between two reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed fraction of ``WINDUP_M`` that the controller's integral can have reached while
-the wheel shows no tick."""
+"""While the reports show no tick of a wheel, the filter assumes that the integral of the wheel's
+controller is at most this fraction of ``WINDUP_M``."""
 
 
 class ReportedSpeed:
@@ -121,7 +123,7 @@ class ReportedSpeed:
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
     def _jumps(self, told_rpm: float, duration_s: float) -> bool:
-        """Return whether a reported speed is implausible after the last, or for a steady wheel."""
+        """Return whether a speed is implausible after the last one, or at a constant set-point."""
         motion, wheel = self._motion, self._wheel
         change_rpm = abs(told_rpm - abs(self._told) / motion.rpm_mps)
         if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:
@@ -152,7 +154,7 @@ class ReportedSpeed:
             motion.doubt(self._index, resting.chance * abs(speed) * duration_s)
 
     def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
-        """Correct a wheel by its mean speed over the last tick."""
+        """Correct the wheel's estimate by ``speed_mps``, its mean speed over the last tick."""
         motion, estimate, base = self._motion, self._motion.filter, self._wheel.base
         push = estimate.mean[base + PUSH]
         lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)

@@ -45,7 +45,7 @@ class ResetProof:
             self._waits_since_s, self._seen = math.inf, None
 
     def look(self, ticks: Ticks, now: float) -> bool:
-        """Return whether the reset can be reported.
+        """Return whether the driver can report the reset now.
 
         The reset can be reported if the counts are near zero and prove the reset, or if they are
         near zero and ``UNPROVED_S`` has passed.

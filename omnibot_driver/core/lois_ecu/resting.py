@@ -60,12 +60,12 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Record an estimated speed in RPM for the last ``since_s``, without a reported speed."""
+        """Record an estimated speed for the last ``since_s``, in which no speed was reported."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
     def tell(self, rpm: float, since_s: float, *, tuned: bool = False) -> None:
-        """Process a reported speed without its sign, ``since_s`` after the speed before.
+        """Process a reported speed, without its sign, that came ``since_s`` after the one before.
 
         ``tuned``: whether the controller has gains that the user set.
         """

@@ -70,7 +70,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Send RPM 0/0 again before the next set-points."""
+        """Make ``wheels`` return RPM 0/0 before each of the next set-points again."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 Terms = Sequence[tuple[int, float]]
-"""Pairs, each of the index of a state and the factor of that state."""
+"""Pairs of numbers: the index of a state, and the factor by which this state is multiplied."""
 
 LEAST_VARIANCE: Final = 1e-12
 

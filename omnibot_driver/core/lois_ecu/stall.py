@@ -34,18 +34,19 @@ TOO_FAST_RPM: Final = 3
 speed beyond both limits is the last speed of a wheel at rest, because a wheel that rolls backward
 exceeds its set-point by at most 10 % and one RPM."""
 UNLIKE: Final = 1.15
-"""Largest assumed ratio of the relative speeds (speed divided by set-point) of two wheels that roll
-backward."""
+"""While both wheels roll backward, the ratio of speed to set-point of one wheel is assumed to be at
+most this factor times the ratio of the other wheel."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
-"""Smallest number of groups that must show no motion, because on a bad line few groups arrive."""
+"""A wheel is regarded as stalled only if at least this number of groups show that it does not move.
+On a bad line few groups arrive, so the time ``STALLED_S`` alone is not enough."""
 
 
 class StallWatch:
-    """Watch of both wheels; ``stalled`` reports a wheel at rest once in each ``STALLED_S``.
+    """Detector of stalled wheels; ``stalled`` reports such a wheel once in each ``STALLED_S``.
 
-    ``settings`` may be replaced at any time. ``saturated``: whether each wheel's controller may be
-    saturated, which means that the wheel rolls.
+    ``settings`` may be replaced at any time. ``saturated``: for each wheel, whether its controller
+    may give full power; the wheel then rolls, although its reported speed does not change.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -54,8 +55,8 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.saturated = [False, False]
         self._quiet = [0, 0]
-        """Number of groups since ``_seen_at`` that could have shown each wheel's motion, but did
-        not."""
+        """For each wheel: number of groups since ``_seen_at`` that could have shown its motion, but
+        did not."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None

@@ -16,7 +16,7 @@ from omnibot_driver.core.lois_ecu.messages import TerminalMode
 
 SENSORS: Final = (TerminalMode.GPS, TerminalMode.COMPASS)
 UNPROVED_S: Final = 2.0
-"""Time in s for which Stop is sent to a robot whose standstill cannot be seen."""
+"""Time in s for which the driver sends Stop if it cannot see whether the robot is at rest."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
 """Time in s after a mode is written, during which reports that the board sent earlier may still

@@ -41,16 +41,16 @@ TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """If the counts fall towards zero by more than ``RESTARTED_TICKS``, plus ``RESTARTED_TICKS_PER_S``
-for each s, the board has restarted: wheels do not roll back that fast."""
+for each s between two groups, the board has restarted: wheels do not roll back that fast."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which wheels are assumed to have rolled back, if the board's clock does not
-confirm the time since the last ticks. (The decoder has then forgotten the clock's unit.)"""
+"""If the board's clock does not confirm the time since the last ticks, the wheels are assumed to
+have rolled back for at most this time in s. (The decoder has then forgotten the clock's unit.)"""
 
 
 class Translation:
     """Translation of reports; ``settings`` may be replaced at any time.
 
-    ``restarts``: number of restarts of the board, as far as is known.
+    ``restarts``: number of restarts of the board that the driver has noticed.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

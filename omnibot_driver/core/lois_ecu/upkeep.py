@@ -86,7 +86,7 @@ class Upkeep:
         )
 
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
-        """Return Stop or the terminal mode if either is due."""
+        """Return Stop, or the line that sets the terminal mode, if one of them is due."""
         change, with_sum = self.change, self.writer.settings.with_sum
         if change.stops(now, stands=stands):
             return outbound.lines(outbound.STOP, with_sum=with_sum)

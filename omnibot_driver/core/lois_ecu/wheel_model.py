@@ -23,7 +23,7 @@ CommandKind = Literal["rpm", "duty"]
 
 @dataclass(frozen=True, slots=True)
 class _Effect:
-    """What happens to a wheel's command at ``at_s``.
+    """Effect that a command has on a wheel at the time ``at_s``.
 
     ``halts``: whether the firmware sets its RPM target to zero; if not, it carries out the command
     with ``kind`` and ``speed_mps``.
@@ -36,7 +36,7 @@ class _Effect:
 
 
 class WheelModel:
-    """The command of one wheel; ``carry_out`` advances it. Speeds are commanded rim speeds.
+    """The commands of one wheel; ``carry_out`` makes them take effect. Speeds are rim speeds.
 
     ``kind``, ``target_mps``: the motor's command. ``hidden_mps``: the firmware's RPM target; a duty
     command does not change this target, but each tick at a negative duty lowers it.
@@ -87,7 +87,7 @@ class WheelModel:
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:
-        """Carry out all effects until ``now``.
+        """Make the commands take effect whose time has come at ``now``.
 
         Return whether the measured speed was cleared, and whether the motor's command changed.
         """

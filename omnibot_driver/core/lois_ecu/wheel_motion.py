@@ -25,10 +25,11 @@ fraction by which the wheel rolls backward faster than its set-point."""
 STATES: Final = 18
 
 CONTROL_RATE: Final = 2.0
-"""Rate in 1/s at which the controller reaches its target, as a critically damped system."""
+"""Assumed rate in 1/s at which the controller brings a wheel to its target speed, without overshoot
+(critically damped)."""
 PUSH_PER_SPEED: Final = 2.2
-"""Standard deviation of the acceleration after a change of speed, for each m/s of the change, in
-1/s."""
+"""Assumed standard deviation of a wheel's acceleration, in m/s² for each m/s by which target and
+speed have recently differed."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that the ground adds to a speed, in (m/s)² per s."""
@@ -46,9 +47,9 @@ ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on in the old direction after its set-point has
 changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Time in s for which the speed of a halted wheel has differed from the model: with the board's own
-gains, and with gains that the user set. With the public firmware's own gains the speed
-oscillates."""
+"""Assumed time in s for which a wheel's speed differed from the model before the wheel was halted.
+The first value is for the board's own gains, the second for gains that the user set. With the
+public firmware's own gains the speed oscillates."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -60,7 +61,8 @@ Terms = list[tuple[int, float]]
 class Step:
     """One step of the filter over ``dt`` s: the ``new`` means, rows of the transition, and noises.
 
-    ``unsure_mps``: standard deviation of the measured speed that each wheel's controller uses.
+    ``unsure_mps``: for each wheel, the standard deviation of the measured speed that its controller
+    uses.
     """
 
     dt: float
@@ -94,9 +96,9 @@ class Wheel:
         self.wound_m = 0.0
         """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
-        """Whether the wheel is without power until the controller has wound up."""
+        """Whether the wheel has no power, because the integral ``wound_m`` is still too small."""
         self.rolls_on = False
-        """Whether the reported speed may be from before the target changed sign."""
+        """Whether the reported speed may be from before the last reset of the controller."""
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf

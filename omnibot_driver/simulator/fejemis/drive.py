@@ -2,8 +2,8 @@
 
 """The drive Teensy: turning control of two wheels, odometry, IMU, battery, distance sensors.
 
-This module knows the drive half of the manual and the robot. It must not know the front Teensy:
-only a command can tell the angle of the front wheel.
+This module knows the drive half of the manual and the robot. It must not know the front Teensy: the
+angle of the front wheel comes only with a command.
 """
 
 from collections.abc import Callable
@@ -125,7 +125,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write the lines of the items in the help text, by key."""
+        """Return, by key, a function for each item in the help text; it returns the item's line."""
         return super().items() | {
             "hbt": self._heartbeat,
             "adc": lambda: f"adc {self.settings.volts * 100:.0f} 2050 812 790 0",

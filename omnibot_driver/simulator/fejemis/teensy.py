@@ -82,7 +82,7 @@ class Teensy(Generic[C]):
     # What each kind of Teensy extends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write the items' lines, by the item's subscription key."""
+        """Return, by subscription key, a function for each item; it returns the item's line."""
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
             "id": lambda: f"id {self.config.name} {self.config.number}",
