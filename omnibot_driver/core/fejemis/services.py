@@ -18,7 +18,8 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""If the robot moves, the driver sends a Stop, and loads a configuration this time in s later."""
+"""If the user requests to load a configuration while the robot moves, the driver sends a Stop, and
+loads the configuration this time in s later."""
 NO_DATA: Final = "no data from the boards; check their power and cables"
 
 

@@ -48,7 +48,10 @@ class Watch:
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:
-        """Check all timeouts, and add their notices; return whether a board became silent."""
+        """Check all timeouts, and add notices of new ones.
+
+        Return whether a board has ceased to send the stream that driving requires (``NEEDED``).
+        """
         if self._stalled:
             self._stalled, self._patient_until = False, now + SILENT_S
         lost = [self._look_at(channel, now) for channel in (0, 1)]

@@ -81,7 +81,7 @@ class Comparison:
     # Ticks
 
     def begin_counts(self) -> None:
-        """Add up ticks from zero again: later counts are relative to the present ones."""
+        """Set two counts to zero: the added ticks, and the ticks that the filter expects."""
         self._counted_m = [0.0, 0.0]
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
@@ -118,7 +118,7 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Use the present heading and distance in 0x20 as zero for the later values of 0x20."""
+        """Set the added changes of 0x20 (odometry), and those that the filter expects, to zero."""
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
         self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)

@@ -92,7 +92,7 @@ class LoisDecoder:
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
-        """Accept any counts next, because the board was commanded to set its counters to zero."""
+        """Accept any counts in the next group: a reset may set the board's counters to zero."""
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:

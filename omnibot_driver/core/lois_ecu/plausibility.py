@@ -77,7 +77,7 @@ class Gate(Generic[Group]):
         return last is not None and self._reachable(last[0], group, now - last[1])
 
     def forget(self) -> None:
-        """Treat the next group as the first."""
+        """Accept the next group without a check, as the first one."""
         self._last = self._aside = None
         self._begins_anew()
 

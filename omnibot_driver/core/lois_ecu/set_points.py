@@ -70,7 +70,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` return RPM 0/0 before each of the next set-points again."""
+        """Make ``wheels`` put RPM 0/0 before the next set-points once more."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

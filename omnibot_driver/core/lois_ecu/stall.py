@@ -80,7 +80,7 @@ class StallWatch:
         now: float,
         resting: tuple[bool, bool] = (False, False),
     ) -> None:
-        """Process a report: ticks show motion forward, and odometry shows motion backward."""
+        """Process a report: ticks show a wheel's forward motion, odometry its backward motion."""
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
             told = rim_speeds(report, self.settings.track_m)

@@ -115,7 +115,7 @@ class ModeChange:
         return TerminalMode.HOST
 
     def protocol_heard(self, now: float) -> None:
-        """Record a report of the protocol: the terminal mode has ended, or has not begun yet."""
+        """Note that the board sent its own message: its terminal mode has ended or not begun."""
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return
         if not self.sensor_wanted:

@@ -92,7 +92,8 @@ class Wheel:
         self.restless_mps = 0.0
         """Largest recent difference of target and speed, in m/s; decays with time."""
         self.unsettled_mps = 0.0
-        """Difference of target and speed at the last set-point, in m/s; decays with time."""
+        """Difference of target and speed when the set-point last changed, in m/s; decays with
+        time."""
         self.wound_m = 0.0
         """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
