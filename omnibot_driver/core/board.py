@@ -51,7 +51,8 @@ class BoardFigures:
     * ``saturated``: commands that exceeded the range of the board's encoding.
     * ``odom_hz``: rate at which ``odom`` is published, or None if it is published once per
       odometry reading.
-    * ``own``: figures that only this board has (version, voltage, progress), by readable names.
+    * ``own``: figures that only this kind of board has, such as its version; the keys are their
+      labels.
     """
 
     rates_hz: Mapping[RateName, float] = field(default_factory=dict)
@@ -83,7 +84,7 @@ class ReadingClock(Protocol):
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of a reading that arrived alone, in less time than ``stamps`` takes.
+        """Return the stamp of a reading that arrived alone; faster than a call of ``stamps``.
 
         Return None, and change nothing, if the stamp is uncertain; the caller then calls ``stamps``
         instead.
@@ -138,7 +139,7 @@ class Board(Protocol):
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Return advice on the settings if ``gravity_mps2`` differs from gravity; empty if not.
+        """Return advice on the settings; empty if ``gravity_mps2`` is near the true gravity.
 
         ``gravity_mps2``: specific force measured at rest, in m/s².
         """
@@ -177,20 +178,21 @@ class Board(Protocol):
     def due(self, now: float) -> Packets:
         """Return the subscriptions, polls and relayed values that are due; commands are excluded.
 
-        The caller writes these packets, so regard them as written. Called at ``wake_at``.
+        The driver calls this method at ``wake_at`` and writes the packets, so the board may regard
+        them as written.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time; called at ``wake_at``.
 
-        If all returned readings are OdometryReadings or NoticeReadings, the board may still be
-        silent. Any other reading shows that the board is alive.
+        OdometryReadings and NoticeReadings do not show that the board is alive. Any other returned
+        reading does.
         """
         return []
 
     def leave(self) -> None:
-        """Prepare for the end of the driver: from now on ``due`` returns only what a stop needs."""
+        """Prepare for the driver's exit: ``due`` then returns only packets that a stop needs."""
         return
 
     def reset_odometry(self) -> None:
@@ -232,7 +234,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def force_pause(self) -> Packets:
-        """Return the packets that pause the board, whatever its mode and the commands in flight."""
+        """Return packets that pause the board in any mode, even if earlier commands arrive late."""
         return NO_PACKETS
 
     def reset(self) -> Packets:

@@ -22,8 +22,8 @@ class Liveness:
         self.unheard_s, self.silence_s = traits.unheard_s, traits.silence_s
         self.heard_at = self.came_at = -math.inf
         self._silent_since: float | None = None
-        """Value of ``heard_at`` at which a silence was last reported, so that it is reported
-        once."""
+        """Value of ``heard_at`` when a silence was last reported. As long as ``heard_at`` has this
+        value, no silence is reported again."""
 
     def begin(self, now: float) -> None:
         """Begin a new connection."""
@@ -37,7 +37,7 @@ class Liveness:
         self.heard_at = now
 
     def unheard(self, now: float) -> bool:
-        """Return whether the board has been silent for too long to drive the robot."""
+        """Return whether the board has been silent so long that the robot must be stopped."""
         return now - self.heard_at >= self.unheard_s
 
     def fell_silent(self, now: float) -> bool:

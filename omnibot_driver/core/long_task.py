@@ -61,7 +61,7 @@ class LongTask:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 
     def watch(self, *, driven: bool) -> None:
-        """Record whether the robot is commanded to move; the task fails when a motion ends."""
+        """Record whether a command drives the robot. If such a drive ends, the task fails."""
         if self._driven and not driven:
             self.give_up("the robot was stopped meanwhile; call again")
         self._driven = driven

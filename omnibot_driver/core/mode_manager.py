@@ -24,8 +24,8 @@ PAUSE_RETRY_S: Final = 1.5
 sends a notice every second, so data without a notice for this time shows that the command was
 lost."""
 FLOWING_S: Final = 0.1
-"""Largest contribution, in s, of one gap between two receptions to the time for which data has
-flowed; a longer gap adds only this much. A running board sends every 10 ms."""
+"""To measure how long data has flowed, the driver adds up the gaps between receptions. One gap adds
+at most this time, in s. A running board sends every 10 ms."""
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command, or the notice of a paused board, takes to arrive. A notice
 that arrives sooner than this after a command may have been sent before the board obeyed. If data
@@ -64,7 +64,7 @@ a slow function call."""
 class ModeManager:
     """The requested and the confirmed mode of a board.
 
-    ``run``: whether to start the board whenever it is connected; if not, the mode stays.
+    ``run``: whether to start the board whenever it is connected. If not, the board keeps its mode.
     ``answers``: answers to requests that the session has not taken yet.
     """
 
@@ -101,7 +101,7 @@ class ModeManager:
         return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
-        """Begin with an open port; the board may be in any state, even inside a command."""
+        """Begin with an open port. The board may even be waiting for the rest of a command."""
         self.output = NO_PACKETS
         self._begin(now)
 
@@ -174,7 +174,7 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether further data from a running board needs no reaction."""
+        """Whether this class can ignore further data from a running board."""
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:

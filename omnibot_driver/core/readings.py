@@ -156,7 +156,8 @@ class SampleBoundary:
 
     * ``ahead``: number of samples (0 or 1) received, at least in part, after the last ImuReading.
     * ``cut``: whether the sample counted in ``ahead`` is incomplete.
-    * ``latest_s``: the last sample was due to be complete within this time after the read.
+    * ``latest_s``: longest time in s, after the read, until the line completes the last sample; 0
+      if it is complete.
     * ``earliest_s``: the next sample, or the incomplete one, cannot be complete sooner than this
       time after the read.
     """

@@ -3,8 +3,8 @@
 """Safety stops: what stops the robot at once, whatever the source of its commands.
 
 A stop follows from the e-stop, from a board that restarts, is paused or falls silent, and from a
-stall of this process. In this module, measurements act on commands and requests. The module
-must not know bytes, or who commands. Two other stops are elsewhere: the command
+stall of this process. This module passes what the board reports to the parts that handle commands
+and requests. It must not know bytes, or who commands. Two other stops are elsewhere: the command
 policy stops the robot when a command expires, and the motion monitor stops a robot that does not
 move as commanded.
 """

@@ -31,7 +31,7 @@ class Actuator(Protocol):
     def commanded(self) -> BodyTwist | None:
         """Body velocity of the last command sent, as rounded by the encoding, in the board's axes.
 
-        None if that command allows any motion.
+        None if that command does not determine the velocity.
         """
 
     @property
@@ -39,7 +39,7 @@ class Actuator(Protocol):
         """Time at which ``due`` must be called again, in s; infinity if nothing is due."""
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the robot stands still under this order.
+        """Return whether this order makes the robot stand still.
 
         Raises CommandRefused if the order cannot be encoded.
         """

@@ -47,7 +47,7 @@ class Interlocks:
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Return the reason why this motion is refused; empty if the motion is allowed.
 
-        Call it once per command, because the motion interlock records each arrival.
+        Call it once per command, because the motion interlock records each call as a command.
         """
         if self.leaving or self.missing:
             return self.why_not_request()

@@ -85,7 +85,10 @@ def require_finite(what: str, values: Sequence[float]) -> None:
 
 
 def require_timely(what: str, age_s: float, longest_s: float) -> None:
-    """Raise CommandRefused if ``age_s`` is more than ``longest_s`` in the past or the future."""
+    """Raise CommandRefused if ``age_s``, the age of the sender's stamp, exceeds ``longest_s``.
+
+    For a stamp in the future ``age_s`` is negative; its absolute value has the same limit.
+    """
     if abs(age_s) <= longest_s:
         return
     if age_s > 0.0:

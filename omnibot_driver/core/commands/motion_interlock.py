@@ -56,7 +56,7 @@ class MotionInterlock:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Restart the measurement of the pause that ends a refusal: a sender may be active.
+        """Begin anew to measure the pause that ends a refusal: a sender may be active now.
 
         A refused command shows that its sender is active, whatever the reason for the refusal.
         While this process stalls, the driver cannot see whether a sender pauses.

@@ -163,7 +163,7 @@ class CommandPipeline:
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Record that the current set-point was sent, so the robot is expected to follow it."""
+        """Record that the actuator sent the current set-point, so the robot should follow it."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -185,7 +185,7 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Return the fault seen in the newest estimate or, without estimates, in ``reading``."""
+        """Return the fault that the newest estimate shows. Without estimates, use ``reading``."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()
@@ -232,10 +232,10 @@ class CommandPipeline:
         return f" (commanded {commanded}; measured {measured})"
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
-        """Drop a goal that is no longer valid or is being left; return notices for the user.
+        """Drop an invalid goal, or a goal that the robot drives away from; return notices.
 
-        A goal is valid until the odometry frame moves within the board's frame. It is being left
-        if the robot drives away from it.
+        A goal becomes invalid when the odometry frame moves within the board's frame. The notices
+        are for the user.
         """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):

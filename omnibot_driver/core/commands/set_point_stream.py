@@ -45,8 +45,9 @@ class Encoder(Protocol):
 class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
-    ``proof`` is notified of each stop and motion that is sent. ``heard``, if given, is called with
-    the time and all packets that are written, including the packets of requests.
+    ``proof`` receives a report of each stop and motion that the stream sends. If ``heard`` is
+    given, the stream calls it with all packets that are written, including those of requests, and
+    the time.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class SetpointStream:
         self.connect()
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the order is encoded as Stop, possibly because it rounds to zero."""
+        """Return whether the encoding of this order is Stop; a very slow motion rounds to Stop."""
         return self._encoder.encode(order) == self._encoder.stop()
 
     def connect(self) -> None:
@@ -94,8 +95,9 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that a request was written, and adapt what to send next.
 
-        Packets that begin with Stop on every channel count as a Stop. Any other packets may have
-        completed a damaged motion frame on the line, so the set-point is repeated at once.
+        Packets that begin with Stop on every channel count as a Stop. If a motion frame lost bytes,
+        the board may take the bytes of other packets for its end. So after other packets the stream
+        repeats the set-point at once.
         """
         if self._heard is not None:
             self._heard(packets, now)

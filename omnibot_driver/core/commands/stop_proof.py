@@ -72,7 +72,7 @@ class StopProof:
 
     @property
     def takes_s(self) -> float:
-        """Time in s to wait for a proof, given the period of the displacements."""
+        """Time in s to wait for a proof; it depends on the period of the displacements."""
         return max(PROOFS * self._needed_s, UNDER_WAY_S + (AT_LEAST + 1) * self._period_s)
 
     def look(self, reading: DisplacementReading, now: float) -> None:

@@ -18,7 +18,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 @dataclass(frozen=True, slots=True)
 class SteeredKinematics:
-    """Driven wheels as in ``DifferentialKinematics``; a steered wheel is ``wheelbase_m`` ahead."""
+    """Two wheels as in ``DifferentialKinematics``, and a steered wheel ``wheelbase_m`` ahead."""
 
     wheel_radius_m: float
     track_m: float

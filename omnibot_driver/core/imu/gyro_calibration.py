@@ -20,7 +20,7 @@ from omnibot_driver.core.requests import RequestDone
 
 MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0
-"""Length in s of an observation that was not requested."""
+"""Length in s of each observation while no measurement is requested."""
 GAP_S: Final = 0.2
 """Longest allowed pause between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
@@ -46,7 +46,7 @@ REFINEMENT: Final = 0.05
 
 
 class Look:
-    """One observation of the robot, which began at ``began_s``."""
+    """One observation of the robot; ``began_s``: time at which the observation began."""
 
     def __init__(self) -> None:
         self.rates: list[Vector3] = []
@@ -140,7 +140,7 @@ class GyroCalibration:
             )
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """Add an IMU reading in SI units: ``rate`` includes the bias, ``force`` is corrected."""
+        """Add an IMU reading in SI units: ``rate`` includes the gyro's bias, ``force`` no bias."""
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()

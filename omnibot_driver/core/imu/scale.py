@@ -23,13 +23,14 @@ _RADPS_PER_COUNT: Final = {
 }
 
 ACCEL_TOLERANCE: Final = 0.1
-"""Largest accepted relative error of the measured gravity; tolerance and bias can explain it."""
+"""Largest accepted relative error of the measured gravity. The sensor's tolerance and bias can
+cause such an error."""
 
 Counts = tuple[int, int, int]
 
 
 def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
-    """Return advice on settings if ``gravity_mps2`` differs from gravity; empty if it does not."""
+    """Return advice on the settings; empty if ``gravity_mps2`` is near the true gravity."""
     if abs(gravity_mps2 / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
         return ""
     wrong = f"at rest the accelerometer measures {gravity_mps2:.2f} m/s² instead of gravity: "
@@ -42,7 +43,7 @@ def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuScale:
-    """The full scales that are set: keys of ACCEL_COUNTS_PER_G and of GYRO_COUNTS_PER_DPS."""
+    """The sensor's two ranges: keys of ACCEL_COUNTS_PER_G and of GYRO_COUNTS_PER_DPS."""
 
     accel_range_g: int = 2
     gyro_range_dps: int = 250

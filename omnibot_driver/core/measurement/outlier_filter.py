@@ -59,9 +59,8 @@ BACK: Final = 0.25
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    ``force_step_mps2``: always allowed change of specific force between two readings;
-    ``full_scale_mps2``: full scale of the accelerometer, infinite where its readings are not
-    integers.
+    ``force_step_mps2``: change of specific force between two readings that is never a spike.
+    ``full_scale_mps2``: full scale of the accelerometer; infinite if its readings are not integers.
     """
 
     fastest_mps: float = 2.0
@@ -104,7 +103,7 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Return the readings that are certain now; those of one kind are in order of arrival."""
+        """Return the readings that need not wait any more; each kind is in order of arrival."""
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):
@@ -134,7 +133,7 @@ class OutlierFilter:
         return released
 
     def admit_imu(self, reading: ImuReading, stamp_s: float) -> list[tuple[ImuReading, float]]:
-        """Return the IMU readings that are certain now, as ``admit`` does for all kinds."""
+        """Return the IMU readings that need not wait any more, as ``admit`` does for all kinds."""
         force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
@@ -222,9 +221,9 @@ class OutlierFilter:
 class _Spikes:
     """Finds spikes in a series of readings, each of which is a list of values.
 
-    The unit of a value is a change that is always allowed. ``left``: fraction of a leap that may
-    remain after a spike; ``knocked``: number of values, from the first on, that a knock may change
-    for a single reading.
+    Each value is divided by the change that is always allowed. ``left``: fraction of a leap that
+    may remain after a spike. ``knocked``: number of values at the start of the list that a knock of
+    the robot may change for a single reading.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -274,7 +273,7 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether a step has the size of a bit, within the recent variation of the values.
+        """Return whether a step is as large as a bit. Recent variation gives the tolerance.
 
         A value at the end of the scale was moved by a knock, not by the topmost bit.
         """

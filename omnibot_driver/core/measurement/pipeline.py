@@ -4,7 +4,7 @@
 
 It combines the board's clock, the outlier filter, odometry and the IMU. It does not know commands
 or modes. IMU readings are processed at once by ``hear``; other readings wait for ``flush``. So IMU
-readings do not wait for the measurements from other readings.
+readings need not wait until the other readings are processed.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ from omnibot_driver.core.timing.device_clock import DeviceClock
 
 Estimate = ImuEstimate | OdometryEstimate | Extra
 Measured = tuple[Reading, Sequence[Estimate]]
-"""A reading that is certain, and the estimates that follow from it."""
+"""A reading that the outlier filter has passed on, and the estimates that follow from it."""
 
 
 class MeasurementPipeline:
@@ -87,7 +87,7 @@ class MeasurementPipeline:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """Return the IMU estimates that these readings make certain; ``now``: their arrival time.
+        """Return the IMU estimates that these readings complete; ``now``: their arrival time.
 
         Other readings wait for ``flush``, and IMU readings after them wait too, to keep the order.
         Most reads of a board with an IMU bring one IMU reading and nothing else. Such a reading is

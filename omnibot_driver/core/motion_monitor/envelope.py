@@ -46,7 +46,8 @@ YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Normals of 16 half-planes around a hull; the distance from them is at most 2 % too small."""
+"""Normals of 16 half-planes around a hull. They give a distance to the hull that is at most 2 % too
+small."""
 
 
 def outside(
@@ -54,8 +55,8 @@ def outside(
 ) -> tuple[float, float]:
     """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
 
-    ``explained``: velocities that the set-points explain; the current set-point's velocity is
-    first. If the heading is unknown, only the magnitude of the linear velocity is checked.
+    ``explained``: velocities that recent set-points can cause; that of the current one is first. If
+    the heading is unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0

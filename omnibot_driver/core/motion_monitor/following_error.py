@@ -15,18 +15,19 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s: a robot that is slower than all set-points of the last 0.16 s is regarded as held."""
+"""Time in s: if a robot is slower than all its set-points of the last 0.16 s, something is assumed
+to hold it."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""``LARGEST_PART``, ``LARGEST_PART_OF_A_LONG_ONE``: largest fraction of ``UNEXPLAINED_M`` or
-``UNEXPLAINED_RAD`` that one displacement can add: a short one, and a long one. So a limit is
-exceeded after three displacements in a row, or after two long ones, at the earliest.
+"""``LARGEST_PART``, ``LARGEST_PART_OF_A_LONG_ONE``: a short displacement, and a long one, adds at
+most this fraction of the limit (``UNEXPLAINED_M`` or ``UNEXPLAINED_RAD``) to the error. So at least
+three displacements in a row, or two long ones, are needed to exceed a limit.
 """
 
 
 class FollowingError:
-    """The sum of a robot's motion outside its envelope.
+    """The sum of a robot's motion outside its envelope: the velocities that set-points allow.
 
     ``slack_mps``, ``slack_radps``: speeds outside the envelope that are tolerated; ``outside``:
     whether the last displacement was outside the envelope by more than these speeds.

@@ -22,12 +22,12 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s without a set-point after which the robot is treated as not driven."""
+"""Time in s: once all set-points have been rest for this long, the robot counts as not driven."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speeds in m/s and rad/s above which a robot must be
-seen to move."""
+"""``PLAIN_MPS``, ``PLAIN_RADPS``: if the commanded speed in m/s or rad/s is higher, the
+displacements must show motion."""
 MOVING_MPS: Final = 0.02
 MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
@@ -35,7 +35,7 @@ BLOCKED_S: Final = 1.0
 STOOD_S: Final = 0.5
 """Time in s: a robot at rest for this long has obeyed a stop; later motion has another cause."""
 STOPS_S: Final = 5.0
-"""Time in s for which one Stop is repeated automatically while the robot moves."""
+"""Time in s for which the command policy repeats Stop if the robot keeps moving."""
 
 REFUSED_IN_A_ROW: Final = 4
 COSINE_60: Final = 0.5
@@ -119,7 +119,7 @@ class MotionMonitor:
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Return whether to report this fault: only once, until the robot obeys again."""
+        """Return whether this fault was not reported since the robot obeyed last."""
         told, self._told = self._told, self._told | {fault}
         return fault not in told
 
@@ -175,8 +175,8 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault: too fast if a set-point has the measured direction, else wrong way.
 
-        ``explained``: velocities that the set-points explain. Linear directions that differ by less
-        than 60° count as the same direction.
+        ``explained``: velocities that recent set-points can cause. Linear directions that differ by
+        less than 60° count as the same direction.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

@@ -21,19 +21,19 @@ Velocity = tuple[float, float, float]
 """The values of a BodyTwist; a plain tuple, because many are made and a tuple is made quickly."""
 
 HELD_S: Final = 0.3
-"""Time in s for which a replaced set-point explains its full velocity.
+"""Time in s for which a robot may keep the full velocity of a replaced set-point.
 
 This time covers the delay of the line, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant in s of the decay after ``HELD_S``.
+"""Time constant in s with which the velocity of a replaced set-point decays after ``HELD_S``.
 
 Robots with a time constant of up to 0.35 s stay within the envelope.
 """
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored: 2 % of its velocity are left."""
 UNKNOWN_S: Final = 0.8
-"""Time in s from the first known set-point until motion by earlier commands has ended."""
+"""Time in s that motion by earlier, unknown commands may last after the first known set-point."""
 HISTORY_S: Final = 3.0
 """Length of the history in s; displacements arrive later than this only if the computer stalls."""
 
@@ -83,7 +83,7 @@ class SetpointHistory:
         return any(each is not AT_REST for each in self.since(at_s))
 
     def explained(self, at_s: float) -> list[Velocity]:
-        """Return the velocities that the set-points explain at ``at_s``.
+        """Return the velocities that the robot may have at ``at_s`` because of its set-points.
 
         The velocity of the current set-point comes first.
         """

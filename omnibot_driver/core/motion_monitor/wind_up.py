@@ -17,8 +17,8 @@ from omnibot_driver.core.motion_monitor.envelope import STRETCH, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 
 MOST_M: Final = 0.6
-"""Largest distance in m that a robot is assumed to make up for: what the integrators hold at full
-effort."""
+"""Largest distance in m that a robot is assumed to make up for. The integrators of the wheel
+controllers are assumed to be at their limits then."""
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
 
@@ -45,8 +45,8 @@ LEVER_M: Final = 0.15
 
 
 class WindUp:
-    """The wind-up of a robot's wheels. ``way_m``: distance in m at a rim, still to be made up
-    for."""
+    """The wind-up of a robot's wheels. ``way_m``: distance in m at a rim that the robot may still
+    make up for."""
 
     def __init__(self) -> None:
         self.way_m = 0.0
@@ -81,7 +81,7 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add the distance that a held robot loses; if it is not held, slowly forget the wind-up.
+        """Add the distance by which a held robot falls behind; else slowly forget the wind-up.
 
         ``motion``: motion inside the envelope. ``newest``: the set-points that the robot may not
         have reached yet, the current one first.

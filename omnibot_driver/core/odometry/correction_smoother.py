@@ -31,7 +31,10 @@ class CorrectionSmoother:
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """Correct ``target`` by ``chord``, given in its axes; ``pose`` follows in ``spread_s``."""
+        """Move ``target`` by the correction ``chord``; ``pose`` follows within ``spread_s``.
+
+        ``chord`` is given in the axes of ``target``.
+        """
         self.target = self.target.moved(chord)
         self._settling_s = spread_s
 
@@ -68,5 +71,5 @@ class CorrectionSmoother:
 
 
 def _part(wanted: float, room: float) -> float:
-    """Return the part of the wanted correction that fits into the room, from 0 to 1."""
+    """Return which fraction of the wanted correction the room allows, from 0 to 1."""
     return min(1.0, max(0.0, room) / wanted) if wanted else 1.0

@@ -24,12 +24,12 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
-"""Board time, in s, without any pose, after which heading 0 is assumed."""
+"""If no pose arrives within this time, in s of the board's clock, heading 0 is assumed."""
 LONG_GAP_S: Final = 1.0
-"""Lost board time, in s, above which the next displacements wait for a pose that shows the lost
-motion."""
+"""If displacements of more than this duration, in s, were lost, the next displacements wait for a
+pose that shows the lost motion."""
 POSE_DUE_S: Final = 0.24
-"""Board time, in s, within which the next pose arrives unless that pose is lost."""
+"""The next pose arrives within this time, in s of the board's clock, unless it is lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """A heading counts as known if open gaps add at most this standard deviation to it, in rad."""
 UNKNOWN_S: Final = 0.5
@@ -312,7 +312,7 @@ class Odometry:
         self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
-        """Assume that the last motion continued over ``lost`` displacements before a pose."""
+        """Assume that the last motion went on during the ``lost`` displacements before a pose."""
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
             self._track.miss((lost + 1) * period_s)

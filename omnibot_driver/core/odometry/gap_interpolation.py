@@ -14,7 +14,8 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest board time that is interpolated, in s; a robot without data stops earlier."""
+"""Longest time, in s of the board's clock, over which motion is interpolated. Before this time has
+passed, the driver stops a robot that sends no data."""
 NO_WAY: Final = Pose()
 
 

@@ -44,12 +44,12 @@ class PendingDisplacements:
 
     @property
     def lost_s(self) -> float:
-        """Board time in s of the displacements that are missing before the first waiting one."""
+        """Duration in s of all displacements that are missing before the first waiting one."""
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
     @property
     def duration_s(self) -> float:
-        """Board time of the waiting displacements, as far as it is known, in s."""
+        """Sum of the waiting displacements' durations, in s; an unknown duration counts as 0."""
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:

@@ -95,7 +95,7 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """Return whether rounding and open gaps explain that a pose deviates by ``way``.
+    """Return whether rounding and motion in open gaps can make a pose deviate by ``way``.
 
     ``gap``: covariance of the motion in open gaps.
     """

@@ -210,7 +210,7 @@ class OmniBot:
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return no readings, because the board sends without polling."""
+        """Return no readings: this board's readings follow only from bytes, never from time."""
         return []
 
     def reset_odometry(self) -> None:
@@ -266,5 +266,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the two alternatives for the guard: Stop, or emergency stop and then Stop."""
+        """Return the guard's two alternatives: Stop, or emergency stop and then Stop."""
         return LAST_WORDS

@@ -2,11 +2,12 @@
 
 """The cost of an interpretation of the bytes: all evidence for and against it in one unit.
 
-A cost is about the negative logarithm of a probability: a cost of 1 is a factor of three. This
-module knows what a board is likely to send next, and how likely the line is to damage frames. It
-does not know how interpretations are searched (``trellis``) or when one is accepted (``decoder``).
+A cost is about the negative logarithm of a probability: each unit of cost makes an interpretation
+about three times less likely. This module knows what a board is likely to send next, and how likely
+the line is to damage frames. It does not know how interpretations are searched (``trellis``) or
+when one is accepted (``decoder``).
 
-Content is soft evidence: the cost of a frame's content stays below the cost of calling the frame
+Content is weak evidence: the cost of a frame's content stays below the cost of calling the frame
 damaged. So the frame of a true shock is delivered if it lies between two complete frames.
 """
 
@@ -35,7 +36,7 @@ It is below twice ``ONE_BYTE``, because losses cluster.
 BROKEN_OFF: Final = 9.0
 """Cost of a frame whose last three or more bytes were lost in a burst."""
 HEADER_BYTE: Final = 7.5
-"""Cost of a frame (of 9 to 15 bytes) that lost one of its two header bytes."""
+"""Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
 """Extra cost of a frame that gained bytes, if a header is where the frame should have ended."""
 BAD_RUN: Final = 6.0
@@ -45,7 +46,8 @@ BAD_TAIL: Final = 2.5
 UNKNOWN_START: Final = 1.0
 """Cost if the first bytes are the rest of a frame: after a silence, a whole frame is likelier."""
 BAD_BYTE: Final = 0.35
-"""Cost of each byte of a bad run; ``BAD_RUN`` plus 14 bytes costs more than any true IMU frame."""
+"""Cost of each byte of a bad run, in addition to ``BAD_RUN``. A bad run of 14 bytes therefore costs
+more than any true IMU frame."""
 BAD_HEADER: Final = 0.5
 """Cost of a header within a bad run; a header may arise by chance, or from a gyro at rest."""
 GAP: Final = 5.0
@@ -60,7 +62,7 @@ The cost is too high to accept the frame at once, but low enough to accept it on
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
 ENDS_IN_NOISE: Final = 2.0
-"""Cost of a line that falls silent within a bad run; a line normally falls silent after a frame."""
+"""Cost if the line falls silent within a bad run; normally it falls silent after a frame."""
 
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
@@ -140,7 +142,7 @@ NOTHING_KNOWN: Final = Context()
 class Expectation:
     """Judges the content of a frame by the frames before it.
 
-    Accepted frames teach this class how much the words of the IMU scatter.
+    This class learns from accepted frames how much the IMU's words scatter.
     """
 
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:

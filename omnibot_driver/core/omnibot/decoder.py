@@ -42,9 +42,10 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""Cost of a frame's content at which the frame waits until the bytes after it arrive."""
+"""A frame whose content costs at least this waits until the bytes after it arrive."""
 DOUBT_BYTES: Final = 170
-"""Number of uncertain bytes that force a decision: 100 ms of the nominal stream."""
+"""Number of uncertain bytes at which the decoder must decide. In nominal mode the board sends this
+number of bytes in 100 ms."""
 SHORTEST_RUN: Final = DELTA_LENGTH
 """Least number of bytes for which the fast path is tried: the length of the shortest frame."""
 CALM_S: Final = 10.0
@@ -218,7 +219,7 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether, by arrival times, the last byte held may be the first of another frame.
+        """Return whether, given the arrival times, the last byte held may begin another frame.
 
         ``start``, ``length``: position and length in bytes of the last frame held; ``due``: whether
         the board may send another frame right after it.
@@ -235,7 +236,7 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of ``walk`` except the last two, which are uncertain; return False."""
+        """Accept all frames of ``walk`` but the uncertain last two; return False for ``_walk``."""
         believed = len(walk.frames) - 2
         if believed > 0:
             self._take(walk, believed, walk.known_after(believed, self.expectation), found)

@@ -55,9 +55,10 @@ LEARN_EVERY: Final = 8
 class Walk:
     """Consecutive frames, from the first byte held on, that no evidence speaks against.
 
-    ``ends``: the end of each frame; ``lessons``: frames from which the expectation will learn, as
-    the frame's number, the frame and the IMU frame before it; ``known``: numbers of frames, each
-    with the context (as fields of a Context) after that number of frames.
+    ``ends``: position after each frame. ``lessons``: for each frame from which the expectation will
+    learn, the number of frames before it, the frame, and the last IMU frame before it. ``known``:
+    contexts that are already computed (as fields of a Context), each with the number of frames
+    after which it applies.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -94,8 +95,8 @@ def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a frame follows at position ``at``.
 
     If a frame follows, odd content before ``at`` is a shock, not damage. The frame must be
-    complete, and the bytes after it must be able to begin another frame. At the end of ``held``,
-    return ``closed``.
+    complete, and the bytes after it must be able to begin another frame. If ``at`` is the end of
+    ``held``, return ``closed``.
     """
     if at == len(held):
         return closed

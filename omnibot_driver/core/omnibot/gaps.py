@@ -36,7 +36,8 @@ BYTE_S: Final = 10 / 115200
 TICK_BYTES: Final = 14 + 9 + 15
 """Most bytes that the board sends in one tick; a read of more bytes after a pause was late."""
 PAUSES_TO_TRUST: Final = 16
-"""Number of pauses between frames after which a pause is attributed to the line."""
+"""After this many pauses between frames, the line is assumed to cause the pauses, not an
+adapter."""
 
 _FIRST: Final = attrgetter("first")
 

@@ -30,19 +30,22 @@ from omnibot_driver.core.omnibot.frames import (
 from omnibot_driver.core.omnibot.schedule import TICK_S
 
 IDLE_S: Final = 0.1
-"""Pause in s that is longer than any adapter causes (16 ms): ten of the board's ticks."""
+"""Pause in s that no adapter causes: ten of the board's ticks. An adapter causes pauses of at most
+16 ms."""
 HALF_TICK_S: Final = TICK_S / 2
 """Delay in s below which a frame still counts as sent in its own tick."""
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Tolerance in s: a delay this close to whole ticks may be due to lost bytes."""
+"""Tolerance in s: a delay that differs from whole ticks by at most this may be due to lost
+bytes."""
 INTO_TICK_S: Final = 1e-3
 """Approximate delay in s of a delta or pose within its tick: an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
 """Largest difference in s between the delays of two punctual reads, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Largest deviation in s from the pace of the line at which bytes still count as on pace."""
+"""Tolerance in s: bytes that arrive this much earlier or later are still at the pace of the
+line."""
 FEW_BYTES: Final = 2
 """Up to this number of bytes, the pace at which bytes arrive cannot be measured."""
 TICKS_TO_PROVE: Final = 2
@@ -76,7 +79,7 @@ _END: Final = attrgetter("end")
 
 
 class Gap(NamedTuple):
-    """A pause between two reads, before a byte at a position from ``first`` to ``before`` - 1.
+    """A pause between two reads, before one of the bytes from ``first`` to ``before`` - 1.
 
     During the pause the line was idle, or the reader was late. ``price``: cost of assuming a frame
     across the pause, if the line was idle; ``pause_s``: time in s between the two reads.

@@ -47,7 +47,8 @@ from omnibot_driver.core.omnibot.frames import (
 MAX_WORD: Final = 32767
 
 ZEROS: Final = bytes(8)
-"""Zeros before a frame or letter: seven end a begun frame, one may be lost; three wake a board."""
+"""Zeros before a frame or letter. Seven zeros end any frame that was begun, and an eighth may be
+lost. Three zeros are enough to wake a board."""
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """Zeros before a motion frame: few, so that the frame soon replaces a damaged one before it."""
 

@@ -36,9 +36,11 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""Least extra cost of any alternative to a sure frame: the alternative is 30 times less likely."""
+"""A frame is sure if every other interpretation of its first byte costs at least this much more.
+Each of them is then at least 30 times less likely."""
 STEP: Final = 5.5
-"""First margin of the cost limit above the lower bound; increased until a path is found."""
+"""The cost limit first exceeds the lower bound by this; the search raises it until it finds a
+path."""
 BEYOND: Final = 0.025
 """Half the step of the prices (0.05), added to the cost limit.
 

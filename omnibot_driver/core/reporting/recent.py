@@ -65,9 +65,9 @@ class RecentFigures:
         return {name: count / self.span_s for name, count in counts.items()}
 
     def delay_s(self) -> tuple[float, float] | None:
-        """Return mean and standard deviation, in s, of the reads' delay above the smallest delay.
+        """Return the mean and standard deviation, in s, of how late the recent reads came.
 
-        Returns None without recent reads.
+        The read with the smallest delay counts as on time. Returns None without recent reads.
         """
         old, new = self._window[0][1].tally, self._window[-1][1].tally
         reads = new.reads - old.reads

@@ -51,7 +51,7 @@ last second.
 FEWEST_READS: Final = 12
 """Least number of reads in a block that is enough to find out which of them were late."""
 LATE_PART: Final = 0.1
-"""Fraction of the reads that may be late by more than ``LATE_S`` s."""
+"""At most this fraction of the reads is assumed to be late by more than ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest allowed distance of an earliest point below a latest one, as a fraction of a period.

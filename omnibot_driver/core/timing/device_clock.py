@@ -5,10 +5,10 @@
 The board samples once a tick, by a crystal of its own. Its bytes arrive with a delay that is
 unknown and always changes, but never before they were sent. Two questions follow.
 
-*Which tick is it?* IMU readings are counted, together with those that are reported as lost. Losses
-without a trace are counted exactly by the displacements' counter. Until the next displacement
-arrives, or if none ever does, arrival times show such losses: a read takes all bytes that have
-arrived, so its newest tick is hardly older than one period, and never from the future.
+*Which tick is it?* IMU readings are counted, together with those that are reported as lost. The
+displacements' counter also shows the exact number of losses that nothing reports. Until the next
+displacement arrives, or if none ever does, arrival times show such losses: a read takes all bytes
+that have arrived, so its newest tick is hardly older than one period, and never from the future.
 
 *When was it?* ``ClockFit`` lays a line under the arrivals. The error that remains in the stamps is
 the least delay that ever occurs, which is a constant.
@@ -42,13 +42,11 @@ If an adapter delivers every 16 ms, the phase of the tick at which reads occur r
 reads, so 12 reads see each phase twice.
 """
 CALM: Final = 0.45
-"""Distance of a read from the line, as a fraction of a period, up to which its tick is sure.
-
-Two reads in a row must be this near to the line. The limit must be less than half a period.
+"""The tick of a read is sure if the read is at most this fraction of a period from the line. The
+read before it must be as near to the line. The limit must be less than half a period.
 """
 LARGEST_RISE: Final = 0.02
-"""Largest allowed extra step of the stamps per tick, as a fraction of a period, if the line is
-raised."""
+"""If the line is raised, each step of the stamps exceeds the period by at most this fraction."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
