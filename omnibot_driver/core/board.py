@@ -206,7 +206,7 @@ class Board(Protocol):
     def actuator(self, proof: StopProof) -> Actuator:
         """Return the part that encodes motion orders; called once.
 
-        The actuator reports each stop and each motion that it sends to ``proof``.
+        The actuator reports to ``proof`` each stop and each motion that it sends.
         """
 
     def wake(self) -> Packets:

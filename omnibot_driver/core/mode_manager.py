@@ -237,9 +237,9 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether a P may be in flight, or the received data may be wrong. If True, P is
-        sent only after data has flowed for ``PAUSE_RETRY_S``, because a second P would resume the
-        board.
+        ``with_p``: whether an earlier P may still be on its way, or the received data may be wrong.
+        If True, P is sent only after data has flowed for ``PAUSE_RETRY_S``, because a second P
+        would resume the board.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

@@ -4,7 +4,7 @@
 
 The policy decides what the robot should do and for how long. An actuator makes the packets that
 carry out the decision: set-points that are repeated (`set_point_stream.py`), or an exchange
-specific to the board. The actuator reports each stop and motion that it sends to the stop proof. An
+specific to the board. The actuator reports to the stop proof each stop and motion that it sends. An
 actuator reads no clock and never refuses an order of the policy.
 """
 

@@ -39,7 +39,7 @@ class SpeedLimits:
         )
 
     def allow(self, twist: BodyTwist) -> bool:
-        """Return whether the twist is below the speed limits; False with NaN or infinity."""
+        """Return whether the twist is below the speed limits; False if it has NaN or infinity."""
         return (
             twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
             < self.linear_mps * self.linear_mps

@@ -42,10 +42,9 @@ CALMING: Final = 0.95
 """Each reading multiplies the largest recent step by this factor; 20 readings leave a third of
 it."""
 STILL: Final = 0.08
-"""Largest allowed change of the sensor's other values in a spike, as a fraction of the spike's
-leap.
-
-After the spike, each value may still differ from its value before the spike by this fraction.
+"""A leap of an acceleration can be a spike only if every other value of the sensor changes by at
+most this fraction of the leap. After any spike, each value differs from its value before the spike
+by at most this fraction of the leap.
 """
 END_OF_SCALE: Final = 0.99996
 """Value just below the largest positive word, as a fraction of full scale."""

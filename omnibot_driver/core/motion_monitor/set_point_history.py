@@ -14,7 +14,7 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 CommandedTwist = BodyTwist | None
-"""A commanded body velocity; None: any motion is possible."""
+"""A commanded body velocity. None: the motion is not known in advance, as on the way to a goal."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]

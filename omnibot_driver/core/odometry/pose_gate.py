@@ -67,7 +67,7 @@ class PoseGate:
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
         """Return whether a pose confirms ``doubted``, the last unexpected pose.
 
-        If ``told`` does not confirm it, ``doubted`` is refused.
+        If ``told`` does not confirm ``doubted``, then ``doubted`` counts as refused.
         """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)

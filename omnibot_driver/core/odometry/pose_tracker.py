@@ -69,8 +69,8 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent that took ``seconds``.
 
-        ``stamped_s``: time in s that the stamps leave for this motion; it limits the motion of the
-        published pose.
+        ``stamped_s``: time in s that is left between the stamps for this motion. The published pose
+        moves no farther than the robot can move in this time.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail

@@ -238,7 +238,8 @@ class OmniBot:
     def pause(self) -> Packets:
         """Return Stop and the letter P.
 
-        P would start a paused board, so RequestRefused is raised unless the board is known to run.
+        P would start a paused board, so this method raises RequestRefused unless the board is known
+        to run.
         """
         self._translation.apply(Happening.SENT_PAUSE)
         return packed(transmission(frames.encode(frames.STOP), frames.TOGGLE_PAUSE))

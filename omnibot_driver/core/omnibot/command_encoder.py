@@ -112,7 +112,7 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Encode a goal for positional control; a goal at the origin is not sent as Stop.
+        """Encode a goal for positional control; unlike a velocity, a zero goal is not sent as Stop.
 
         Raises CommandRefused if a coordinate exceeds 16 bits, or if its high byte is S, P or R: if
         bytes are lost, the board could obey this byte as a letter.

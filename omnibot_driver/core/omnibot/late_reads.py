@@ -40,7 +40,7 @@ NEAR_S: Final = 2e-3
 """Tolerance in s: a delay that differs from whole ticks by at most this may be due to lost
 bytes."""
 INTO_TICK_S: Final = 1e-3
-"""Approximate delay in s of a delta or pose within its tick: an IMU frame precedes it."""
+"""A delta or pose begins about this time, in s, after its tick began: an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
 """Largest difference in s between the delays of two punctual reads, even with a USB adapter."""
 PACE_S: Final = 2e-4
@@ -79,7 +79,7 @@ _END: Final = attrgetter("end")
 
 
 class Gap(NamedTuple):
-    """A pause between two reads, before one of the bytes from ``first`` to ``before`` - 1.
+    """A pause before one of the bytes from ``first`` to ``before`` - 1, between two reads.
 
     During the pause the line was idle, or the reader was late. ``price``: cost of assuming a frame
     across the pause, if the line was idle; ``pause_s``: time in s between the two reads.

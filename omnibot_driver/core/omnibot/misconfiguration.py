@@ -83,7 +83,7 @@ class MisconfigurationChecks:
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
         """Check the rate of the deltas, with a delta that arrived at ``now`` in s.
 
-        ``imus``: number of IMU frames received since the delta before. This number shows the
+        ``imus``: number of IMU frames received since the previous delta. This number shows the
         period. Some IMU frames may be lost, so arrival times must confirm the period.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None

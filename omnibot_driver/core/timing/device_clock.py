@@ -259,8 +259,8 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set the stamp of a tick by the line, without a step back and without a large step ahead.
 
-        ``latest_s``: upper limit of the stamp; ``room_s``: largest step in s that leaves equal room
-        for each later stamp of this read.
+        ``latest_s``: upper limit of the stamp; ``room_s``: largest step in s that leaves the same
+        step for each later stamp of this read.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
