@@ -32,8 +32,9 @@ def obeying(
     """Return a callback that passes each message to ``action``; the link reports a refusal.
 
     ``expires_s`` returns the age in s at which a command expires. ``may_be_old`` returns True for a
-    message whose transit time does not matter, and ``is_stop`` for one that is always obeyed.
-    ``moves_base``: whether the commands move the base, and not another part of the robot.
+    message whose transit time does not matter. ``is_stop`` returns True for a message that stops
+    the robot; its age and a stall of this process do not matter. ``moves_base``: whether the
+    commands move the base, and not another part of the robot.
     """
     transit = Transit()
 

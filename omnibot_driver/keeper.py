@@ -51,7 +51,7 @@ class Keeper:
         self._descriptors = descriptors
         self.last_words = stop, emergency_stop
         self._ahead = 0
-        """Bytes of stop commands that the guard may not have read yet."""
+        """Number of bytes of stop commands that the guard may not have read yet."""
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
         """Killed processes that have not ended yet."""
@@ -77,7 +77,7 @@ class Keeper:
         return trouble
 
     def change(self, stop: Packets, emergency_stop: Packets) -> None:
-        """Replace the commands that the guard is to send, without waiting for any process."""
+        """Give the guard new stop commands, without waiting for any process."""
         self.last_words = stop, emergency_stop
         if (process := self._process) is None:
             return

@@ -145,7 +145,7 @@ class Link:
 
         Returns whether this call has sent Stop and ended the threads. If the port was lost while
         the robot drove, the reader sends Stop if it can open the port again. Afterwards ``stands``
-        tells whether the board has shown that the robot is at rest.
+        is True if the board has shown that the robot is at rest.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:
@@ -182,9 +182,9 @@ class Link:
         return self._shared.stood
 
     def _stop_for_good(self) -> None:
-        """Stop the robot and wait until it is at rest; the lock is held.
+        """Stop the robot and wait until it is at rest; the caller holds the lock.
 
-        Waiting releases the lock, so that the pacer repeats Stop meanwhile.
+        The lock is released during the wait, so that the pacer can repeat Stop.
         """
         self._session.shutdown.begin(now := time.monotonic())
         self._shared.settle()

@@ -29,7 +29,7 @@ class Outbox:
         self._closed = False
 
     def put(self, delivery: Delivery) -> None:
-        """Queue the next call, without blocking; the lock that the caller holds gives the order."""
+        """Queue the next call without blocking. Hold the lock under which the event occurred."""
         self._waiting.append(delivery)
 
     def claim(self) -> bool:

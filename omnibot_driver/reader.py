@@ -105,7 +105,7 @@ class Reader:
         self._outbox.deliver()
 
     def _attach_anew(self, port: Transport) -> None:
-        """Begin again on the lines that are present now, after a line was lost or came back."""
+        """Begin a new connection on the present lines, after a line was lost or came back."""
         with self._lock:
             self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
@@ -162,7 +162,7 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Process what the received bytes cause besides measurements; the lock is held."""
+        """Process the effects of received bytes, except measurements; the caller holds the lock."""
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:
             self._shared.settle()
@@ -170,7 +170,7 @@ class Reader:
             self._shared.tell_guard()
 
     def _count(self, port: Transport, now: float) -> None:
-        """Read the kernel's count of losses every ``COUNT_EVERY_S``; the lock is held."""
+        """Read the kernel's count of losses every COUNT_EVERY_S; the caller holds the lock."""
         if now < self._count_at:
             return
         self._count_at = now + COUNT_EVERY_S
@@ -179,7 +179,7 @@ class Reader:
             self._session.overran(self._earlier_overruns + self.overruns)
 
     def _detach(self, port: Transport, *, comes_back: bool) -> None:
-        """Stop the robot, then end the use of the port, whatever ended the reading."""
+        """Stop the robot, then end the use of the port, for whatever reason the reading ended."""
         with self._lock:
             if self._shared.write_error is None:
                 self._shared.write(

@@ -19,7 +19,7 @@ LONGEST_LATENCY_MS: Final = 5
 minimum 1 ms."""
 RECORDING: Final = "replay://"
 WITHOUT_CLOCK: Final = ("sim://", RECORDING)
-"""URL schemes of ports without a real robot."""
+"""URL schemes of ports without a real robot, for which simulated time is accepted."""
 
 
 def core_kind() -> str:

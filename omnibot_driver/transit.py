@@ -34,8 +34,8 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s/s. A crystal is off by a tenth of this value, and
 NTP corrects a clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""A sender is this many times less likely to have sent a message that seems early than one that
-seems late by the same time."""
+"""A message that seems early is this many times less likely to come from a sender than a message
+that seems late by the same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Among this many messages of a sender, at least one is assumed to have almost no delay. With fewer
@@ -68,8 +68,8 @@ class Arrival:
 class Delay:
     """The age of a message: ``total_s`` since the sending, including ``waited_s`` in our own queue.
 
-    ``sent_ns`` is when the message was sent, by our time of day in ns. There are two possible send
-    times until enough messages of the sender have arrived.
+    ``sent_ns`` holds the possible times at which the message was sent, by our time of day in ns.
+    There are two of them until enough messages of the sender have arrived.
     """
 
     total_s: float

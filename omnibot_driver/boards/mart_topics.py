@@ -191,7 +191,7 @@ class MartTopics:
             self._timer.cancel()
 
     def _set_time(self) -> None:
-        """Set the controller's clock once, at a proved standstill."""
+        """Set the controller's clock once, when measurements show that the robot is at rest."""
 
         def ask(session: Session, now: float) -> None:
             board = cast(MartBoard, session.board)

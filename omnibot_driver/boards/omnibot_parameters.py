@@ -140,7 +140,8 @@ OMNIBOT: Final = (
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
     """Reject axis signs with which a goal pose has no consistent meaning.
 
-    Mirroring x or y alone also reverses yaw, so the sign of yaw must be that of x times that of y.
+    If x or y alone is reversed, yaw is reversed too. So the sign of yaw must be the product of the
+    signs of x and y.
     """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:

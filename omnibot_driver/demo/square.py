@@ -26,9 +26,9 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
     """Return the present leg, and the velocity along it in the robot's own axes.
 
-    A leg is a side of the square. Legs are counted from 0 without end: +x, +y, -x, -y in the
-    odometry frame. The robot turns while it drives straight along a leg: by 90° to the left
-    on even legs, and back on odd legs.
+    A leg is a side of the square. Leg 0 leads along +x of the odometry frame, leg 1 along +y, leg 2
+    along -x, leg 3 along -y, and leg 4 along +x again. The robot turns while it drives straight
+    along a leg: by 90° to the left on even legs, and back on odd legs.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD

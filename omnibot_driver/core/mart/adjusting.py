@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The adjustment of the motors' units in a drive, and what the drive shows about the motors.
+"""The adjustment of the motors' units while the robot drives, and learning from its speed.
 
-This module knows the present motion and its measured speed; it does not know how a motion begins or
-ends. Time is an argument.
+The driver learns how fast each motor turns with its units. This module knows the present motion and
+its measured speed; it does not know how a motion begins or ends. Time is an argument.
 """
 
 import math
@@ -70,7 +70,7 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Pass the ratio of wheel speeds to the odometry if RMRA does not report the turn."""
+        """If RMRA does not report the turn, give the odometry the ratio of the wheel speeds."""
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
             self.odometry.left_over_right = self.loop.left_over_right
@@ -90,7 +90,7 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Learn that the motors do not turn with the units of the present motion.
 
-        A robot that has already moved in this motion is blocked now, so nothing is learned from it.
+        If the robot has already moved in this motion, it is blocked now, and nothing is learned.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.spun_rad) * self._settings.track_m / 2

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The queries to the server after the stop port was used for an unknown motion.
+"""The queries that show, after the stop port was used, which motion is in progress.
 
 SL ends RM and B in such a way that a later SM or SRM hangs the server permanently. So SM and SRM
 are sent only once RST IMU has shown that the server knows of no motion (it refuses RST IMU during a

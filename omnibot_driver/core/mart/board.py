@@ -143,7 +143,7 @@ class MartBoard(Board):
         return self._pilot.take()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the odometry that is due, and NOTHING_MEASURED while a silence is expected."""
+        """Return due odometry, and NOTHING_MEASURED while the server is expected to be silent."""
         readings = self._pilot.take()
         pilot = self._pilot
         if self._mode is not Mode.NOMINAL:
@@ -213,7 +213,7 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server's clock may be set back: no RM has run since the server's start.
+        """Whether no RM has run since the server's start, so that its clock may be set back.
 
         RM integrates the heading over the time since the previous RM. If the clock was set back in
         that time, the heading is useless.

@@ -123,7 +123,7 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record that the missing reply has come, unless ``reply`` is a copy of another reply."""
+        """Record that a missing reply has come: ``reply``, unless it is a copy of another reply."""
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
 

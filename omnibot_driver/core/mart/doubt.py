@@ -24,22 +24,28 @@ The motion shakes the gyro. The deviation grows with the square root of the time
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
 END_M, END_RAD = 0.004, math.radians(0.4)
-"""Standard deviations that start and roll-out of each motion add to position (m), heading (rad)."""
+"""Standard deviations of the errors from the start and the roll-out of each motion.
+
+END_M (m) applies to the position, END_RAD (rad) to the heading.
+"""
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviations of a turn on the spot that the server reports in whole degrees.
 
-TOLD_TURN_RAD is a constant in rad, TOLD_TURN is a part of the turn.
+TOLD_TURN_RAD (rad) applies to each turn; TOLD_TURN is a part of the turn. Both errors add up.
 """
 PIVOT: Final = 0.01
-"""Offset of the centre of a turn on the spot, as a part of the track."""
+"""Standard deviation of the offset between the robot's centre and the point about which it turns.
+
+The value is a part of the track, and applies to turns on the spot.
+"""
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation of the heading after a straight controlled move, in rad."""
 BEND_WALK: Final = 0.5
-"""Part of a turn's error that is independent in each step, if only commands show the turn."""
+"""If only commands show a turn, this part of the turn's error is independent in each step."""
 ASTRAY: Final = 0.7
 """Position error, as a part of the distance driven, per rad² of heading variance."""
 SPREAD: Final = 0.3
-"""Standard deviation of a time that is uniform in an interval of length 1 (1/√12)."""
+"""Standard deviation of a time that is uniformly distributed in an interval of length 1 (1/√12)."""
 CLOCK_S: Final = 0.01
 """Uncertainty of a reply's time on a good network, in s; on other networks it is larger."""
 Errors = list[tuple[float, float, float, float]]
@@ -106,7 +112,7 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Record that a motion has begun, whose heading error ``heading_told`` can remove."""
+        """Record that a motion has begun; ``heading_told`` can later remove its heading error."""
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:

@@ -40,7 +40,10 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Least improvement of the heading in degrees for which a turn is made."""
 WIDER: Final = 0.5
-"""Each successive turn adds this part of NEAR_RAD to the heading's tolerance: turns overshoot."""
+"""Each turn since the last straight move adds WIDER * NEAR_RAD to the allowed heading error.
+
+Turns overshoot, so a larger error is allowed after each of them.
+"""
 MOST_MOVES: Final = 9
 """Largest allowed number of moves to one goal; after them the goal is given up."""
 
@@ -157,7 +160,7 @@ class Move:
     def repeated(self) -> "Move":
         """Return the progress with which to continue after ``place`` was commanded again.
 
-        A robot that has come near enough to the goal is left where it is.
+        If the robot has come near enough to the goal, it needs no further moves to come nearer.
         """
         if not self.given_up:
             return self

@@ -37,15 +37,15 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Time in s from the first reply after an absence within which no motion is started.
+"""After an absence of the server, no motion is started for this time in s from its first reply.
 
 The server opens its ports before it has started up completely. VOLTS and most motions crash a
 server that has just started; a crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""A server was absent if its silence exceeds ABSENT_S (s) plus ABSENT_TRIPS exchange durations."""
+"""A longer silence than ABSENT_S (s) plus ABSENT_TRIPS exchange durations counts as an absence."""
 ABSENT_BUSY_S: Final = 2.5
-"""A server that may be busy was absent if its silence exceeds this time, in s.
+"""If the server may be busy, only a longer silence than this, in s, counts as an absence.
 
 A stop, for example, keeps the server busy.
 """

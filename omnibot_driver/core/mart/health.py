@@ -39,9 +39,9 @@ SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
-"""Two readings confirm each other if they differ by no more than this, in V or inches."""
+"""Two readings count as the same value if they differ by no more than this, in V or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of similar readings in a row that are accepted, even if a late reply may be among them."""
+"""A value that comes this number of times in a row is accepted, even if replies may be late."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0

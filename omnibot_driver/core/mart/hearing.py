@@ -19,9 +19,9 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""While the heading is unknown, the unanswered change of units may be at most this part of them.
+"""Largest change of the motors' units, as a part of them, that may remain unanswered.
 
-A larger unanswered change stops the robot.
+The limit applies while the heading is unknown: a larger unanswered change stops the robot.
 """
 
 
@@ -131,7 +131,7 @@ class Hearing(Measuring):
             self.state = State.SERVING if self.jobs.collecting else State.STILL
 
     def _missed(self, word: Word, now: float) -> None:
-        """React to the fact that the reply to ``word`` did not come in time."""
+        """Handle the missing reply to ``word``, which did not come in time."""
         if self.state is State.ASKING:
             self._unanswered(word)
         elif word.kind is Kind.START:

@@ -89,5 +89,5 @@ class ImuProof:
         return True
 
     def retries(self, now: float) -> bool:
-        """Return whether to check a dead IMU again now, which is done by RST IMU only."""
+        """Return whether to repeat the check of a dead IMU now; only RST IMU is repeated."""
         return self.dead and self.word is RESET and now >= self.again_s

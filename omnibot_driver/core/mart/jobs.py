@@ -169,7 +169,7 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """Repeat or end the job if ``word``, to which no reply came in time, was its request."""
+        """Repeat or end the job if ``word`` was its request; no reply to ``word`` came in time."""
         if not self._waiting or self._request is None or word is not self._request.word:
             return
         if self.job in REPEATED and self._tries < TIMES:

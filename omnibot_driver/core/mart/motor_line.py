@@ -64,7 +64,7 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Change slope and offset by as much as those of the other motor's line have changed."""
+        """Add the other motor's changes of slope and offset to those of this line."""
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
 
@@ -75,7 +75,7 @@ class MotorLine:
         return self._learned and self.speed(units) > SURE * math.hypot(math.sqrt(variance), noise)
 
     def restore(self, before: "MotorLine") -> None:
-        """Return to the state of ``before``, which is a copy of this line."""
+        """Return to the state of ``before``, an earlier copy of this line."""
         self.__dict__.update(before.__dict__)
 
     def rescale(self, factor: float) -> None:

@@ -58,7 +58,7 @@ class Motors:
         return _units(self._lines, self._spin_speed(rate_radps))
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
-        """Return the units for a turn at ``rate_radps``; ``units`` have led to ``seen_radps``."""
+        """Return the units for a turn at ``rate_radps``, after ``units`` gave ``seen_radps``."""
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
         return _units(lines, self._spin_speed(rate_radps))

@@ -189,9 +189,10 @@ class Pilot(Hearing):
 
     @property
     def _copy_stop_s(self) -> float:
-        """The time at which to stop a suspected duplicate of a controlled move; else infinite.
+        """The time at which to stop a suspected duplicate of a move; infinite if none is suspected.
 
-        The duplicate runs after the move and blocks the command port, so ENC is not answered.
+        The duplicate of a controlled move runs after the move and blocks the command port, so ENC
+        is not answered.
 
         The stops SL and SS would hang a server that drives by RM or B, but the last motion was a
         controlled move.

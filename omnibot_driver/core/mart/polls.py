@@ -55,7 +55,7 @@ class Polls:
         self._asked_s.clear()
 
     def due(self, state: State, now: float) -> list[Word]:
-        """Return the queries that are due, in the order in which they become a full period late.
+        """Return the queries that are due, sorted by the time at which each is a full period late.
 
         Thus each query gets its turn even if an exchange takes longer than a period.
         """
@@ -80,7 +80,7 @@ class Polls:
         self._asked_s.pop(word, None)
 
     def wake_at(self, state: State) -> float:
-        """Return the time at which the next query for encoder or heading is due; else infinite.
+        """Return when the next query for encoder or heading is due; infinite without such a query.
 
         The less frequent queries have no wake-ups of their own: they are sent at these times too.
         """

@@ -37,9 +37,9 @@ BLIND_MPS: Final = 0.3
 ACCELERATION_RADPS2: Final = 3.0
 """Standard deviation of the turn acceleration since the last count, in rad/s²."""
 FRESH_S: Final = 0.2
-"""Age in s up to which the last heading shows the present turn rate."""
+"""If the last heading is not older than this, in s, it shows the present turn rate."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations in m and rad of the unmeasured end of a motion, after a lost connection."""
+"""Standard deviations in m and rad of what the robot moves unmeasured after a lost connection."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 
@@ -85,7 +85,7 @@ class Reckoning:
         self._begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)
 
     def connect(self) -> None:
-        """Begin a new connection: the server may have continued or restarted during the silence."""
+        """Begin a new connection; the robot may have moved, or the server may have restarted."""
         self.wheel.connect()
         if self.motion is Motion.NONE:
             self.heading.forget()
@@ -152,7 +152,7 @@ class Reckoning:
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add the error due to the uncertain time of a change of the wheels' speed ratio.
+        """Add an error: the ratio of the wheels' speeds has changed at an uncertain time.
 
         ``part``: the change of the ratio; ``late_s``: the interval in s within which the change
         takes effect.
@@ -202,7 +202,7 @@ class Reckoning:
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Return the turn by ``wheel_m``, in rad; zero unless the motion is on the spot."""
+        """Convert a wheel's distance to a turn in rad; zero unless the robot turns on the spot."""
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property
@@ -292,9 +292,9 @@ class Reckoning:
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return for how long RM has driven without a fresh heading, in s.
+        """Return the seconds by which the last heading is older than FRESH_S; 0 unless RM drives.
 
-        The second value is the standard deviation of the turn within that time, in rad.
+        The second value is the standard deviation of the robot's turn within these seconds, in rad.
         """
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:

@@ -17,8 +17,10 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Commands below both limits, in m/s and rad/s, are regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Largest difference of a ramped yaw rate from its final value, as a part of that value, with which
-a turn on the spot begins."""
+"""Largest difference of a ramped yaw rate from its final value when a turn on the spot begins.
+
+The difference is a part of the final value.
+"""
 
 
 def is_standstill(wanted: Wanted) -> bool:

@@ -18,7 +18,7 @@ class MartSettings:
     the server's own SLOW speed; ``motor_balance``: speed of the left motor divided by that of the
     right one, at equal units; ``max_speed_mps``, ``max_yaw_rate_radps``: limits for the motions to
     a goal; the server has only a normal and a slow motion, and the driver uses the slow one if the
-    normal one exceeds its limit.
+    normal one would exceed the limit.
     """
 
     wheel_radius_m: float = 0.0625

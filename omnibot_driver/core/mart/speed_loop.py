@@ -22,7 +22,7 @@ MOST_CHANGE: Final = 15
 It is small, because a duplicated command acts twice.
 """
 MOST_BACKWARD: Final = 5
-"""Value of MOST_CHANGE while reversing on a slow network, which hides duplicates."""
+"""Limit in place of MOST_CHANGE while reversing on a slow network, where duplicates stay unseen."""
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s: SETTLE_S is the pause in learning after a large change; LEARN_S is the shortest
 window of learning."""
@@ -45,8 +45,9 @@ HOLD_AFTER_S: Final = 1.0
 """For this time in s after a change of the turn rate, the heading error is not integrated."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Variances per squared change of units: COPIED for a change that may arrive twice, MISSED for an
-unanswered change.
+"""Variances that a change of units adds to the ratio of speeds, per squared relative change.
+
+COPIED is for a change that may arrive twice, MISSED for a change that was not answered.
 
 A change may arrive twice if exchanges take longer than SLOW_TRIP_S (s). The variances are
 deliberately large, because a wrong ratio of speeds lasts for the whole motion.
@@ -100,9 +101,9 @@ class SpeedLoop(Motors):
         self._clear(now + SETTLE_S)
 
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
-        """Return the units with which both sides begin, for a speed along the motion.
+        """Return the units with which both sides start a motion of this speed and turn rate.
 
-        The units suit the slower side.
+        Both sides get the units that the slower side needs.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -151,7 +152,7 @@ class SpeedLoop(Motors):
 
     @property
     def balance(self) -> float:
-        """Ratio of the left to the right motor's speed at equal units of the present motion.
+        """Ratio of the left to the right motor's speed if both had the present motion's units.
 
         The ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
         """
@@ -259,7 +260,7 @@ class SpeedLoop(Motors):
         return self.trip_s > SLOW_TRIP_S
 
     def _clear(self, from_s: float) -> None:
-        """Begin a new window at this time."""
+        """Begin a new window of learning at the time ``from_s``."""
         self._window_from_s = from_s
         self._window_s = 0.0
         for side in (self._right, self._left):

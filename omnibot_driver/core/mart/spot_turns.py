@@ -22,8 +22,8 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN = 0.05, 0.12
 """Relative errors of a turn's rate at which the turn is begun anew, with other units.
 
-OFF holds until a turn has shown how fast the motors turn; then OFF_AGAIN holds, because a
-correction would often cost more than the error.
+The driver uses OFF until a turn has shown how fast the motors turn. Then it uses OFF_AGAIN, because
+to correct a smaller error would often do more harm than good.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Parts of the commanded rate, for turns in which the robot may be held.
@@ -37,10 +37,10 @@ HINDERED, TOO_FAST = 0.8, 1.12
 """Parts of the commanded rate. If a turn slower than HINDERED is followed by one faster than
 TOO_FAST, something held the robot in the slow turn, and what was learned from it is false."""
 SAME, CORRECTIONS = 0.2, 2
-"""Rates that differ relatively by no more than SAME count as equal. For one commanded rate, a turn
-is begun anew at most CORRECTIONS times because its measured rate is wrong."""
+"""Two rates count as equal if their relative difference is at most SAME. While the commanded rate
+stays equal, the driver begins the turn anew at most CORRECTIONS times to correct its rate."""
 STEADY: Final = 0.03
-"""Relative change of the commanded rate at which the rate is regarded as a new one."""
+"""A larger relative change than this makes the commanded rate count as a new rate."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """A turn shows how fast the motors turn if it takes SPINS_UP_S (s) plus the averaging time of
 speeds, and exceeds SEEN_RAD (rad).
@@ -228,11 +228,11 @@ class SpotTurns:
         self._has_learned = True
 
     def keep_lessons(self) -> None:
-        """Record that other lessons followed the last turn, so that a turn cannot undo them."""
+        """Keep what was learned until now: no later turn can undo it."""
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget the lesson of the slow turn if the present turn shows that the slow one was held.
+        """Forget what a slow turn taught if this turn shows that something held the robot then.
 
         ``part``: rate of this turn as a part of the commanded one. From the slow and the fast turn
         together, the driver would learn a dead zone that the motors do not have.

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The start of motions: a fresh proof of the IMU, then the start command.
+"""The start of motions: a new check that the IMU works, then the start command.
 
 This module knows the wanted motion and the start commands; it does not know when a motion must end.
 Time is an argument.
@@ -38,7 +38,10 @@ TIMED_OUT_S: Final = 0.5
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Time allowed for a controlled move beyond 3 s: s per inch (straight), s per degree (turn)."""
+"""Times in s that a controlled move may take in addition to 3 s, for each inch or degree.
+
+STRAIGHT_S_PER_IN is for an inch of a straight move, TURN_S_PER_DEG for a degree of a turn.
+"""
 REFERENCE_FAILS: Final = 2
 """Number of bare ``fail`` replies to RM in a row after which RM is not tried again.
 

@@ -164,7 +164,7 @@ WHILE: Final[Mapping[Motion, State]] = {
     Motion.STRAIGHT: State.MOVING,
     Motion.TURN: State.MOVING,
 }
-"""The state of the robot once the server has begun each motion."""
+"""By motion: the state of the robot as soon as the server has begun the motion."""
 
 
 def may_say(state: State, word: Word, motion: Motion) -> bool:

@@ -4,7 +4,7 @@
 
 The stop command is sent at once, even if another request is pending, and repeated until it is
 answered. The stop may overtake a start that is still on its way. So a reply is accepted only if it
-certainly answers a stop that was sent when no duplicate of the start could come any more. A bare
+certainly answers a stop, and if no duplicate of the start could arrive after that stop. A bare
 ``ok`` is accepted only if it cannot be the reply to the start; else the stop is repeated. The stop
 port is the last resort. It is not used right after SM or SRM, because its command would then run at
 the same time as SM or SRM, and a port could hang. This module knows commands, replies and times; it
@@ -30,7 +30,10 @@ ANSWERS: Final = {
 }
 """The forms of the reply ``ok`` with which the server reports that it has stopped each motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s, from the first stop command, within which a controlled move is expected to end."""
+"""Time in s from the first stop of a controlled move, after which the server's name is asked for.
+
+The move is expected to end within this time.
+"""
 
 
 class Stopping:
@@ -137,9 +140,10 @@ class Stopping:
 
     @property
     def doubtful_result(self) -> Ok | None:
-        """The reply to the stop if the network delays and duplicates nothing, or None.
+        """The last doubtful reply, if it is probably the reply to the stop; else None.
 
-        The reply is known if more replies came than were missing when the stop began.
+        It is regarded as such if more replies came than were missing when the stop began. This is
+        certain only on a network that neither delays nor duplicates datagrams.
         """
         return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 

@@ -130,9 +130,9 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user.
 
-        The user's command is discarded as well, unless its direction is blocked: a block lasts
-        until the command changes. ``arrived``: whether the start has certainly arrived, so that a
-        stop cannot overtake it.
+        With a nonempty ``why``, the user's command is discarded as well, unless its direction is
+        blocked: a block lasts until the command changes. ``arrived``: whether the start has
+        certainly arrived, so that a stop cannot overtake it.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)

@@ -29,7 +29,7 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""Number of counts that show a lost start, if they equal the last count before the start."""
+"""If this number of counts equal the last count before the start, the start was lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,9 @@ class WheelCount:
 
     ``last``: last accepted count, or None before the first; ``told_s``: time of that count;
     ``from_s``: earliest possible time of that count; ``certain``: whether the last reply cannot be
-    the answer to another query. ``maybe``: the present count if it equals the last count before an
-    unacknowledged start, so that it does not show whether the motion has begun; else 0.
+    the answer to another query. ``maybe``: a count that does not show whether the motion has begun,
+    because it equals the last count before a start that is not acknowledged; 0 if the last count is
+    not of this kind.
     """
 
     def __init__(self) -> None:
@@ -87,7 +88,7 @@ class WheelCount:
             self.last, self._begins = self._before, False
 
     def connect(self) -> None:
-        """Begin a new connection: the server may have continued or restarted during the silence."""
+        """Begin a new connection; the robot may have moved, or the server may have restarted."""
         self.may_begin_anew = self._unseen = True
 
     def rest(self) -> None:
@@ -144,7 +145,7 @@ class WheelCount:
         return Step(wheel_m, seconds, lost, unsure)
 
     def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
-        """Return None for an implausible count; accept the third in a row, and return ``step``."""
+        """Accept the third implausible count in a row and return ``step``; else return None."""
         self._odd += 1
         if self._odd < ODD_TIMES:
             return None

@@ -23,7 +23,7 @@ _TIMED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR)
 
 
 def stop_motors(server: "MartServer", motion: Motion) -> None:
-    """Write stop to the motors, and start to wait for the wheel to come to rest."""
+    """Set both motor registers to stop, and begin to wait until the wheel is at rest."""
     if motion.kind is Kind.REFERENCE and (
         motion.left < motions.FAST_REGISTER or motion.right < motions.FAST_REGISTER
     ):
@@ -182,7 +182,8 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels, in register units with forward positive.
 
-    Each speed is kept between stop and full speed; an excess over full speed slows the other wheel.
+    Each speed is kept between stop and full speed. If a wheel would exceed full speed, the other
+    wheel is slowed by the excess.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

@@ -24,10 +24,10 @@ RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 class Chassis:
     """The motor board with its motors, its encoder and the body of the robot.
 
-    right, left: registers. right_mps, left_mps: speeds in m/s. x_m, y_m, yaw_rad: the true pose,
-    yaw unwrapped. counts: encoder counts of the right wheel since the last reset. way_m: total
-    distance, forward and backward added. Set volts, stuck, motor_status and silent with ``change``
-    only.
+    right, left: registers of the two motors. right_mps, left_mps: speeds in m/s. x_m, y_m, yaw_rad:
+    the true pose, yaw unwrapped. counts: encoder counts of the right wheel since the last reset.
+    way_m: total distance, forward and backward added. Set volts, stuck, motor_status and silent
+    with ``change`` only.
     """
 
     def __init__(self, settings: MartSettings) -> None:

@@ -52,7 +52,7 @@ class FileNote:
 
 
 def note_of(server: "ServerState", motion: Motion) -> FileNote:
-    """Return the file of a motion that has ended."""
+    """Return the data for the file of a motion that has ended."""
     head = (
         server.date,
         "Gyro Z bias (\u00b0/sec): 0.000",

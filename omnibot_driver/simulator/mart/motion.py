@@ -51,10 +51,10 @@ RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
 class Motion:
     """The state of the last motion of a kind, kept after its end.
 
-    running: in progress, so that other motions are refused. watching: supervised by the alarm.
-    posts: notices of a start or a stop that are not consumed yet. error: failure text of this
-    motion. right, left: register values as the server knows them. encoder: the last count, which
-    the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
+    running: in progress, so that other motions are refused. watching: supervised by the module
+    ``alarms``. posts: notices of a start or a stop that are not consumed yet. error: failure text
+    of this motion. right, left: register values as the server knows them. encoder: the last count,
+    which the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
     turned_s: when the wheel began to turn, and when it last turned. angle_deg: angle since the
     start. released: whether the stop port ended the motion.
     """

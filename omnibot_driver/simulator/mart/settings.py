@@ -43,7 +43,7 @@ class Quirks:
     exit_is_silent: EXIT is not answered unless LOG was sent before.
     log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, so that these commands
         fail.
-    unknown_reset_repeats: RST with an unknown word is answered by the last reply.
+    unknown_reset_repeats: the reply to RST with an unknown word is a copy of the previous reply.
     clock_moves_heading: TIME during a motion integrates the turn rate over the jump of the clock.
     undocumented_commands: commands that are not in the manual are accepted. Without this quirk, ENC
         is the only undocumented command that is accepted.
@@ -86,7 +86,7 @@ FIRMWARE = Quirks(
 )
 """Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""Quirks as observed, except where the public source contradicts the observation."""
+"""Quirks of the public source where it contradicts the observation; elsewhere as observed."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {

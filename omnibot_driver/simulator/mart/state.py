@@ -43,8 +43,9 @@ class ServerState:
     now_s: simulated time since construction. crashed: why the server ended; empty while it runs.
     busy: whether a command is in progress. motions: state of each kind of motion; alarm: the kind
     that is supervised; starting: the kind whose command is not answered yet. custom: parameters set
-    by SLMP and SSP. sampling_since_s: since when a motion uses a sonar, or -1. front_m, rear_m,
-    dock_m and the attributes of the chassis and the IMU can be changed at any time.
+    by SLMP and SSP. sampling_since_s: time since which a motion uses a sonar, or -1 if none does.
+    front_m, rear_m, dock_m and the attributes of the chassis and the IMU can be changed at any
+    time.
     """
 
     def __init__(self, settings: MartSettings) -> None:
