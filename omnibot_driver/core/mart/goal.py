@@ -38,7 +38,7 @@ A request for 19 inches (0.48 m) becomes a move of 0.73 m.
 """
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
-"""Least improvement of the heading in degrees for which a turn is made."""
+"""A turn is made only if it reduces the heading error by at least this, in degrees."""
 WIDER: Final = 0.5
 """Each turn since the last straight move adds WIDER * NEAR_RAD to the allowed heading error.
 

@@ -18,7 +18,7 @@ SLOWEST_TURN_RADPS: Final = 0.01
 UNEQUAL: Final = 0.04
 """Standard deviation of the ratio of the two motors' speeds at equal units."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
-"""Largest relative difference of the two motors' gains that is used for predictions."""
+"""Predictions use at most this relative difference between the gains of the two motors."""
 Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Fewest units at which the motors are compared; at fewer, a line's error has too much effect."""

@@ -18,7 +18,7 @@ from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
-"""Relative change of the commanded rate at which a turn is begun anew."""
+"""If the relative change of the commanded rate is larger than this, the turn is begun anew."""
 OFF, OFF_AGAIN = 0.05, 0.12
 """Relative errors of a turn's rate at which the turn is begun anew, with other units.
 

@@ -29,7 +29,7 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 BLIND_S, TRIPS = 0.8, 3
 """Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
 FROZEN_S: Final = 0.5
-"""Time in s, plus two exchange durations, after which a constant heading shows a dead IMU."""
+"""A heading that is constant for this time in s plus two exchange durations shows a dead IMU."""
 NO_START_S: Final = 1.5
 """Time in s after the start within which the wheel must turn."""
 LATE: Final = " while the robot drives: check the network"
