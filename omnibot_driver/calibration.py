@@ -2,8 +2,8 @@
 
 """The calibration file: measured values of this robot, in YAML, read at start.
 
-A save replaces the file completely or not at all. It keeps names that the driver does not use, and
-loses comments.
+A save replaces the file completely or not at all. The new file also has the names that the driver
+does not use, but not the comments.
 """
 
 import contextlib

@@ -16,7 +16,7 @@ READ_TIMEOUT_S: Final = 0.2
 time."""
 WRITE_TIMEOUT_S: Final = 0.2
 NONE_MISSING: Final[Mapping[int, str]] = {}
-"""Value of ``missing`` for a transport that is open completely or not at all."""
+"""Value of ``missing`` for a transport that is never open in part."""
 
 
 class LinesChanged(Exception):

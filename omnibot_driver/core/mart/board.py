@@ -50,7 +50,7 @@ TRAITS: Final = Traits(
     },
 )
 UNREAD_S: Final = 0.5
-"""Time in s without a reading after which any reply is reported as NOTHING_MEASURED.
+"""If no reading has come for this time in s, the next reply is reported as NOTHING_MEASURED.
 
 Measurements of a moving robot come at shorter intervals.
 """
@@ -176,7 +176,7 @@ class MartBoard(Board):
         return min(times)
 
     def actuator(self, proof: StopProof) -> "Conductor":
-        """Return the actuator; its pilot notes stops and starts in ``proof``."""
+        """Return the actuator; its pilot records each stop and each start in ``proof``."""
         self._pilot.proof = proof
         return Conductor(self._pilot)
 

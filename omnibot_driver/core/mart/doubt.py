@@ -43,7 +43,7 @@ STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 BEND_WALK: Final = 0.5
 """If only commands show a turn, this part of the turn's error is independent in each step."""
 ASTRAY: Final = 0.7
-"""Position error, as a part of the distance driven, per rad² of heading variance."""
+"""Position error due to an uncertain heading: part of the distance, per rad² of variance."""
 SPREAD: Final = 0.3
 """Standard deviation of a time that is uniformly distributed in an interval of length 1 (1/√12)."""
 CLOCK_S: Final = 0.01

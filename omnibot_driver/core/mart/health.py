@@ -45,7 +45,7 @@ OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""An uncommanded motion within this time in s after a failed RM is attributed to that RM."""
+"""For this time in s after a failed RM, uncommanded motion is regarded as caused by that RM."""
 
 
 class Health:

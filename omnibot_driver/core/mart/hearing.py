@@ -19,7 +19,7 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest change of the motors' units, as a part of them, that may remain unanswered.
+"""Largest relative change of the motors' units that the server may leave unanswered.
 
 The limit applies while the heading is unknown: a larger unanswered change stops the robot.
 """

@@ -58,7 +58,7 @@ class MotorLine:
     def stood(self, units: float) -> None:
         """Record that the motor does not turn with ``units``.
 
-        Afterwards the offset is uncertain again, because the robot may only have been held.
+        Afterwards the offset is uncertain again, because an obstacle may have held the robot.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2

@@ -160,7 +160,7 @@ class SpeedLoop(Motors):
 
     @property
     def measured_balance(self) -> float | None:
-        """The ratio ``balance`` from a drive, without its limits; None before the first drive."""
+        """The ratio ``balance`` as learned in a drive, not limited; None before the first drive."""
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
     @property

@@ -23,7 +23,7 @@ OFF, OFF_AGAIN = 0.05, 0.12
 """Relative errors of a turn's rate at which the turn is begun anew, with other units.
 
 The driver uses OFF until a turn has shown how fast the motors turn. Then it uses OFF_AGAIN, because
-to correct a smaller error would often do more harm than good.
+to stop and start again would often disturb the motion more than a smaller error does.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Parts of the commanded rate, for turns in which the robot may be held.
@@ -232,7 +232,7 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what a slow turn taught if this turn shows that something held the robot then.
+        """Forget what a slow turn showed if this turn shows that something held the robot then.
 
         ``part``: rate of this turn as a part of the commanded one. From the slow and the fast turn
         together, the driver would learn a dead zone that the motors do not have.

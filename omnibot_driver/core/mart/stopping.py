@@ -30,7 +30,7 @@ ANSWERS: Final = {
 }
 """The forms of the reply ``ok`` with which the server reports that it has stopped each motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s from the first stop of a controlled move, after which the server's name is asked for.
+"""Time in s from the first stop of a controlled move until the driver asks for the server's name.
 
 The move is expected to end within this time.
 """
