@@ -76,9 +76,10 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: driving time that a start costs, in s. The controller integrates for 0.5 s before a
-    wheel turns, and the wheel then takes another 0.5 s to reach its speed. For a command of 0.3 m/s
-    for 4 s (1.2 m) the robot drives 0.97 m ("firmware") or 0.96 m ("documented").
+    ``late_s``: part of a command's duration, in s, that is lost at the start. The controller
+    integrates for 0.5 s before a wheel turns, and the wheel then takes another 0.5 s to reach its
+    speed. For a command of 0.3 m/s for 4 s (1.2 m) the robot drives 0.97 m ("firmware") or 0.96 m
+    ("documented").
     """
 
     late_s = 0.75
@@ -186,7 +187,7 @@ CORE = Path(core.__file__).parent
 BOARDS = [
     name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
 ]
-"""Names of the boards to test, without the boards whose folders have been removed."""
+"""Names of the boards to test; a board whose folder has been removed is not among them."""
 
 
 class AnyBench:

@@ -73,7 +73,7 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 
 
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
-    """The first 25 deltas are published together, later deltas one by one."""
+    """After a second, the 25 deltas so far are published together, later deltas one by one."""
     odometry = Odometry(SETTINGS)
     for _ in range(24):
         assert odometry.displace(earth(0.01, 0.0), 0.0) == []

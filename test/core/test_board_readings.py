@@ -94,7 +94,7 @@ def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: Any
 
 
 def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
-    """Predicted odometry does not let the driver drive on; only received data does."""
+    """If the board sends nothing, the driver refuses commands, although it predicts odometry."""
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from the board|connecting"):
@@ -127,7 +127,7 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
-    """A report of a reset that was on its way before the request is ignored."""
+    """The driver ignores a report of a reset that the board sent before the request."""
     bench.session.request(Request.RESET, "token", bench.now)
     bench.settle()
     tell(bench, ResetReading())

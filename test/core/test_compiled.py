@@ -23,7 +23,10 @@ LOST = (0.0, 0.001, 0.01)
 
 
 def told(piece: int, lost: float) -> str:
-    """Return a digest of all events and bytes of a session during the life of a board."""
+    """Return a digest of a session's events and bytes, while a board goes through all modes.
+
+    Received bytes come in pieces of length ``piece``, and are lost with chance ``lost``.
+    """
     random, bench = Random(piece), Bench()
     session, now = bench.session, 1000.0
     session.opened(now)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The motion rules, on every kind of board: only a fresh command moves the robot."""
+"""The motion rules, tested on every kind of board: only a fresh command moves the robot."""
 
 import math
 from collections.abc import Callable
@@ -23,7 +23,7 @@ def bench(request: pytest.FixtureRequest) -> AnyBench:
 
 
 def test_every_board_of_the_driver_is_among_them() -> None:
-    """A board that is missing from the list of boards would not be tested."""
+    """Every board of the driver must be in the list, because only listed boards are tested."""
     missing = set(PROFILES) - {name.split()[0] for name in MAKERS}
     assert not missing, "add a robot and an entry of MAKERS to test/core/any_board.py"
 
@@ -37,7 +37,7 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The robot drives at 0.3 m/s for 4 s, less the time until it reaches this speed."""
+    """The distance is that of 4 s at 0.3 m/s, minus the part that is lost at the start."""
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
     assert bench.robot.stands
@@ -64,7 +64,7 @@ def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: A
 
 
 def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
-    """Zero is a command like any other, and is never delayed."""
+    """The driver accepts a zero command like any other, and stops the robot at once."""
     bench.drive_on()
     for _ in range(10):
         bench.drive(0.0)

@@ -15,7 +15,7 @@ NAME = next(name for name in BOARDS if name == "two lines")
 
 
 def test_it_is_answered_once() -> None:
-    """Only the first end of a task is reported to the client."""
+    """A task has one result: once it has ended, a second end is not reported to the client."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.is_current("token")

@@ -49,7 +49,7 @@ def test_without_auto_start_a_paused_board_stays_paused() -> None:
 
 
 def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
-    """The board itself does not report that it is in IMU-only mode."""
+    """The board does not report IMU-only mode; IMU frames without any deltas show it."""
     bench = Bench(BoardSettings(imu_only=True))
     bench.open()
     bench.run_until_state("imu_only")

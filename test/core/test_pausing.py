@@ -65,7 +65,7 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """A P sent because of old data resumes a paused board, and is then sent again."""
+    """The driver sends P because of old data, which resumes a paused board; it sends P again."""
     data = bench.board.step()
     bench.board.receive(b"P")
     notice = bench.board.step()

@@ -246,9 +246,9 @@ def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wa
 ) -> None:
     """Check every write and answer during random actions.
 
-    Motion is never old, discarded or unfit for the mode; every request is answered in time; P is
-    never sent to a board that is not known to run. After the faults are over, the board reaches the
-    wanted mode and the robot stands still.
+    The driver never sends a command that is too old, was discarded or does not fit the board's
+    mode. It answers every request in time, and sends P only to a board that is known to run. After
+    the faults are over, the board reaches the wanted mode and the robot stands still.
     """
     walk = Walk(seed, latency_s, BoardSettings(boot_time_s=boot_time_s, seed=seed), run=run)
     walk.open()

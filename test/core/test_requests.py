@@ -101,7 +101,7 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 
 
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """S is harmless to a running board and undoes a P in flight; the command continues."""
+    """S has no effect on a running board, but undoes a P on its way; the command continues."""
     bench.drive(0.3)
     start = len(bench.written)
     assert bench.ask(Request.START, 1.0).message == "running (nominal)"

@@ -49,7 +49,7 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """For a base command after wheel commands, Stop is sent first, then the newest command."""
+    """If a base command follows wheel commands, the driver sends Stop, then the newest command."""
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)
@@ -70,7 +70,7 @@ def notices(bench: Bench) -> list[str]:
 
 
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
-    """A sideways speed is set to zero without slowing the robot down, but NaN is refused."""
+    """The driver omits a sideways speed and keeps the forward speed; it refuses NaN."""
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
     bench.session.configure(settings, bench.now)
@@ -127,7 +127,7 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """Each new command continues the ramp of the last one; a set point is due every 18 ms."""
+    """A new command continues the ramp of the last one; the driver sends set points every 18 ms."""
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)
@@ -230,7 +230,7 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """A refused command does not extend the previous command, which expires as usual."""
+    """After a refused command, the previous command expires at the same time as without it."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

@@ -21,7 +21,7 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """The robot stops, commands are refused, and only the e-stop with a Stop behind it is sent."""
+    """The robot stops. The driver refuses commands, and sends only e-stops, each with a Stop."""
     bench.drive(0.5)
     bench.run(0.1)
     start = len(bench.written)

@@ -145,7 +145,7 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear velocity changes as a vector, and reaches the wanted velocity."""
+    """The linear velocity changes in a straight line to the wanted one, within the acceleration."""
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)
     after = limits.approach(now, wanted, duration_s)

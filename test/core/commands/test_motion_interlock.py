@@ -60,7 +60,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A trip counts as a first one if it follows ~/start, or the last trip by over a minute."""
+    """A trip is a first trip after ~/start, or if the last trip was over a minute ago."""
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)

@@ -77,7 +77,7 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """A motion frame may contain the letter S, so none is sent once the board has booted."""
+    """A booted board would obey the letter S in a motion frame, so none is sent to it."""
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -104,7 +104,7 @@ def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Requ
 
 @pytest.mark.parametrize("state", ["connecting", "paused"])
 def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
-    """A paused board would take a byte 0x52 inside a motion command for the letter R."""
+    """A paused board would read a byte 0x52 of a motion command as the letter R, a reset."""
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state(state)
@@ -191,7 +191,7 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """After a stall of the driver, the last command is not repeated and nothing is reported."""
+    """After a stall of the driver, only Stop is sent; the notice names the driver as the cause."""
     bench.drive(vx=0.3)
     bench.run(0.2)
     mark = len(bench.written)

@@ -97,7 +97,7 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
 
 
 def test_a_robot_that_nobody_commands_hears_nothing_of_it() -> None:
-    """Without a current command, a change of scale writes nothing."""
+    """If no command is active, the driver sends nothing when a scale changes."""
     bench = driving()
     bench.run(3.0)
     start = len(bench.written)

@@ -64,7 +64,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
     heading: float, signs: tuple[int, int, int]
 ) -> None:
-    """The driver connects to a board whose pose is not zero and whose axes may be mirrored."""
+    """The robot reaches its goals, whatever the board's first pose and the signs of its axes."""
     bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
     bench.go_to(0.8, 0.4, 0.9)
     bench.run(8.0)
@@ -136,7 +136,7 @@ def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str,
 
 
 def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
-    """A displacement lost on the line does not change how a goal in odom is converted."""
+    """After a lost displacement, the driver still converts a goal in odom correctly."""
     bench.go_to(1.0, 0.0, 0.0)
     bench.run(0.5)
     bench.speaks = False
@@ -204,7 +204,10 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 def test_a_robot_that_drives_away_from_its_goal_is_stopped(
     goal: tuple[float, float, float],
 ) -> None:
-    """The board's switch is on velocity, although the driver's parameter says position."""
+    """The board's switch is on velocity, but the driver's parameter says position.
+
+    The board takes the goal for a velocity, so the robot drives away from the goal and is stopped.
+    """
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()
     bench.run(1.5)

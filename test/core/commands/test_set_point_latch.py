@@ -15,7 +15,7 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """On a new connection the e-stop is sent twice, even just after another e-stop."""
+    """On a new connection the driver sends the e-stop twice, even if it has just sent one."""
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -23,7 +23,7 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """The e-stop cancels the Stop and the command that a change of authority had made due."""
+    """A change of authority makes a Stop and a command due; an e-stop cancels both."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -33,7 +33,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """A Stop follows each ES, for firmware without mode 10; the first ES and Stop go out twice."""
+    """A Stop follows each ES, for firmware without mode 10; the first ES and Stop come twice."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
@@ -58,7 +58,7 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A node may request e-stops at any rate; 20 a second are sent, to leave room on the line."""
+    """A node may request e-stops at any rate; the driver sends 20 a second, to spare the line."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001

@@ -46,13 +46,13 @@ def stream() -> Stream:
 
 
 def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> None:
-    """On an idle line a command is sent at once, without waiting for a timer."""
+    """If nothing was sent for a while, the driver sends a command at once."""
     order(stream, GO, 1.0)
     assert stream.write(1.0) == GO
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """Older commands are left out, because each frame adds bytes that may be corrupted."""
+    """Of several commands within 18 ms, the driver sends only the newest, to save bytes."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
@@ -98,7 +98,7 @@ def test_stop_never_waits(stream: Stream) -> None:
 
 
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
-    """A new command is delayed by the last new command, but not by a repetition."""
+    """A new command may have to wait after another new command, but not after a repetition."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(1.05) == GO
@@ -178,7 +178,7 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
     stream: Stream,
 ) -> None:
-    """If Stop has just been sent, a second Stop between two authorities is left out."""
+    """If the driver has just sent Stop, a change of authority does not cause a second Stop."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)

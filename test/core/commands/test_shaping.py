@@ -46,7 +46,7 @@ def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: float) -> None:
-    """A command with infinity or NaN neither moves the robot nor keeps the last command alive."""
+    """A command with infinity or NaN does not move the robot; the last command expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match="NaN or infinity"):

@@ -32,7 +32,7 @@ def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """A P has been sent, but is not confirmed yet; a second P would resume the board."""
+    """A sent P is not confirmed yet; the shutdown sends no second P, which would undo the first."""
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
     bench.speaks = False
@@ -47,7 +47,7 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """The board's last notice says paused, but an S, which starts the board, is on its way."""
+    """A paused board receives S just before the shutdown; the shutdown pauses it again."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()

@@ -47,7 +47,7 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """With displacements every 0.4 s, the first one after Stop may have begun before Stop."""
+    """With displacements every 0.4 s a proof takes longer, as the first may begin before Stop."""
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
     proof.look(rare, 10.3)
@@ -83,7 +83,7 @@ def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
 
 
 def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopProof) -> None:
-    """A displacement that arrives within 50 ms of Stop may have ended before Stop arrived."""
+    """A displacement that arrives up to 50 ms after Stop may have ended before Stop arrived."""
     for _ in range(10):
         proof.look(moved(), 10.049)
     assert not proof.proved
@@ -165,7 +165,7 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
-    """The board misses Stop and drives on, while the motion monitor is off."""
+    """The board misses Stop while the motion monitor is off; the log says that the robot moves."""
     bench = driving()
     bench.configure(motion_monitor=False)
     bench.hears = False

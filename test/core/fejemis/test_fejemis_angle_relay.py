@@ -25,7 +25,7 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether an angle to the right has a digit 6 within half a degree.
+    """Return whether some angle to the right within half a degree of this one has a digit 6.
 
     Such angles are about -60° to -69°, and -6°, -16° and so on.
     """

@@ -19,7 +19,7 @@ TICK_S = 0.015
 
 
 def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
-    """Hold the wheel at ``angle_rad`` with 1.5 rad commanded; return the time of the fault in s."""
+    """Command 1.5 rad, but hold the wheel at ``angle_rad``; return the time of the fault in s."""
     follower.aim(1.5)
     for n in range(200):
         if follower.look(angle_rad, since + TICK_S * n):
@@ -38,7 +38,7 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """A new commanded angle, here far from the wheel, restarts the time that the wheel may take."""
+    """If the commanded angle changes, the wheel gets the full time again to reach the new angle."""
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.02 * n, TICK_S * n) for n in range(60))
@@ -57,7 +57,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """If the driver did not refuse motion, each command would move the robot for 1 s again."""
+    """Motion is refused while the wheel is blocked; each command would move the robot for 1 s."""
     follower = Follower()
     at = blocked(follower, 0.0)
     assert follower.refusal == UNTIL_IT_MOVES

@@ -31,7 +31,7 @@ def assert_stands(bench: Bench) -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
-    """Heartbeats identify the two boards, so the channels are assigned by them."""
+    """The heartbeats show the driver which board is connected to which port."""
     bench = nominal(Simulated(swapped=swapped))
     bench.drive_on()
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
@@ -152,7 +152,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
-    """A ``start`` from this driver could release a robot that another user has stopped."""
+    """The driver sends no ``start``, which could release a robot that another user stopped."""
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -195,7 +195,7 @@ def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
-    """When checksums appear or disappear, the robot stops once, and then drives as before."""
+    """If the boards begin or end checksums, the robot stops once, and then drives as before."""
     bench = nominal(Simulated(firmware=Firmware(sums=not begins)))
     bench.drive_on()
     bench.robot.drive.sums = bench.robot.front.sums = begins
@@ -278,7 +278,7 @@ def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_t
 
 
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
-    """Lines of help text are skipped, and an unknown line is shown in diagnostics."""
+    """The driver ignores lines of help text; the diagnostics show an unknown line."""
     bench = nominal()
     bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
     bench.robot.receive(b"help\nxyz\n", bench.now, FRONT)

@@ -33,8 +33,8 @@ class Line:
 class Layout:
     """The order of the lines in a cycle.
 
-    ``apart_s``: time between the two lines of a sample, in s. ``odd``: whether the lines that come
-    in every second cycle come with samples of odd number.
+    ``apart_s``: time between the two lines of a sample, in s. Some kinds of lines come only in
+    every second cycle; ``odd``: whether these are the cycles of the samples with odd numbers.
     """
 
     order: str
@@ -72,13 +72,13 @@ Read = tuple[float, list[Line]]
 
 
 def damaged(lines: list[Line], chance: random.Random, lost: float, twice: float) -> list[Line]:
-    """Return the lines; each is lost with chance ``lost``, or comes twice (``twice``)."""
+    """Return the lines that arrive: each is lost with chance ``lost``, doubled with ``twice``."""
     kept = [line for line in lines if chance.random() >= lost]
     return [line for line in kept for _ in range(1 + (chance.random() < twice))]
 
 
 def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) -> list[Read]:
-    """Return the reads, each with its time, of a reader that reads every ``period_s``."""
+    """Return the time and the lines of each read of a reader that reads every ``period_s``."""
 
     def read(line: Line) -> int:
         return math.floor((line.sent_s - phase_s) / period_s) + 1
@@ -128,11 +128,11 @@ class Outcome:
     given: list[tuple[int, int]]
     false: list[tuple[int, int]]
     excused: list[tuple[int, int]]
-    """Pairs with lines of two samples, which nothing in the stream shows to be wrong."""
+    """Wrong pairs (lines of two samples), if nothing in the stream shows that they are wrong."""
 
 
 def outcome(reads: list[Read]) -> Outcome:
-    """Pair the lines of the reads; return the pairs."""
+    """Give the lines of the reads to ``ImuPairs``; return the pairs that it finds."""
     pairs, given = ImuPairs(), []
     for now, lines in reads:
         for line in lines:
@@ -157,7 +157,7 @@ def outcome(reads: list[Read]) -> Outcome:
 
 
 def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
-    """Return whether the stream shows that the lines of a wrong pair are of two samples."""
+    """Return whether the stream shows that ``pair``, with lines of two samples, is wrong."""
     wanted = {("gyro", pair[0]), ("acc", pair[1])}
     found = [(now, line) for now, lines in reads for line in lines]
     both = [
@@ -236,7 +236,7 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Up to a tenth of the lines are lost or come twice; reads are regular or stalled.
 
-    A wrong pair is tolerated only if its lines came late, and no pose follows them in their read.
+    A wrong pair is allowed only if its lines arrived late, and no pose follows in the same read.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

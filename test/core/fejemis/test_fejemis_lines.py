@@ -248,7 +248,10 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """A new number of decimals is accepted after three lines, or at once if it always varies."""
+    """Of five lines with a new number of decimals, the decoder discards only the first two.
+
+    If the number of decimals varies from the beginning, the decoder accepts any number at once.
+    """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
     assert len(feed(decoder, b"gyro 1.0 2.0 3.0\n" * 5)) == 3
@@ -288,7 +291,7 @@ def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
 
 
 def test_what_is_a_command_without_its_last_character_is_asked_with_a_sum_alone() -> None:
-    """``svpi`` (a query) that loses its ``i`` is ``svp``, which sets the servo."""
+    """The query ``svpi`` without its ``i`` would set the servo, so it always has a checksum."""
     for sums in (True, False):
         polls = Polls("front")
         texts = [text for n in range(40) for text in polls.due(float(n), sums=sums)]

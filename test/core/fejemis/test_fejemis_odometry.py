@@ -203,7 +203,10 @@ def figure_eight(bench: Bench, speed: float = 0.4, radius_m: float = 0.8) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> None:
-    """With one character in a thousand lost both ways, the error after 10 m is below 1 % and 2°."""
+    """The error after 10 m is below 1 % and 2°.
+
+    One character in a thousand is lost, in both directions.
+    """
     chance = random.Random(seed)
     bench = nominal(Simulated(seed=seed, lose_inbound=1e-3))
     bench.carry = lambda _, data: bytes(byte for byte in data if chance.random() >= 1e-3)
@@ -217,7 +220,7 @@ def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> Non
 
 
 def test_joint_states_follow_the_wheels() -> None:
-    """The distances rolled by odometry equal those that the simulated wheels have turned."""
+    """The rolled distances in the odometry equal those of the simulated wheels."""
     bench = nominal()
     bench.drive_on(0.3, 0.3, 3.0)
     bench.run(1.5)

@@ -91,7 +91,7 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
-    """The driver keeps its estimate of the board's clock, so it notices the restart later."""
+    """After a reconnect, the estimate of the board's clock shows that the board has restarted."""
     bench.run(5.0)
     bench.close()
     bench.speaks = set()

@@ -26,7 +26,7 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 
 
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
-    """Messages are handled in order, so the start line resets the board's clock after the pose."""
+    """The driver handles the pose first, then the start line, which resets the board's clock."""
     bench = nominal()
     drive = bench.robot.drive
     pose = with_sum(drive._pose().encode("ascii")) + b"\n"

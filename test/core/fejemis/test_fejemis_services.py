@@ -56,7 +56,7 @@ def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
 
 
 def lose(bench: Bench, word: bytes, times: int) -> None:
-    """Lose the first ``times`` transmissions to the boards that contain ``word``."""
+    """On the way to the boards, lose the first ``times`` packets that contain ``word``."""
     receive, left = bench.robot.receive, [times]
 
     def lossy(data: bytes, now: float, channel: int) -> None:
@@ -100,7 +100,7 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
 
 
 def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets() -> None:
-    """A parameter that sets the offsets would undo a calibration, so none is started."""
+    """The driver refuses a calibration if a parameter sets the offsets and would undo it."""
     offsets = (0.1, 0.2, 0.3, 1.0, 1.0, 1.0)
     bench = nominal(settings=FejemisSettings(written={Written.ACCELEROMETER: offsets}))
     bench.run(2.0)
@@ -114,7 +114,7 @@ def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets(
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
     """While the robot is driven, no job is accepted but the loading of a configuration.
 
-    It stops the robot first.
+    Loading a configuration first stops the robot.
     """
     bench = nominal()
     bench.drive_on()

@@ -54,7 +54,7 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """By the manual, an ``rc`` line with v and w gives the body another speed and turn rate."""
+    """By the manual's equations, ``rc`` with v and w does not move the body at v and w."""
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
 
@@ -82,7 +82,7 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """The tolerance on the body's speed is that of a wheel angle which is wrong by 5°."""
+    """The body may be faster only by as much as an error of 5° in the wheel's angle explains."""
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist

@@ -108,7 +108,7 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The lift voltage is sent with a time limit, so the lift stops even if the driver dies."""
+    """The lift voltage is sent with a time limit, so the lift stops even if the driver crashes."""
     bench = nominal()
     lift_it(bench)
     bench.hears = {DRIVE}
@@ -133,7 +133,8 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
     """Lift voltages and colours are sent at most twenty times a second, the newest ones last.
 
-    A stop is sent at once. Frequent voltages and colours do not make the brush line frequent.
+    A stop is sent at once. However many voltages and colours come, the driver sends the line for
+    the brush no more often.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -189,7 +190,7 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
-    """After a stop, brush and lift are still off when the robot works again."""
+    """An event stops brush and lift; they stay off when the robot works again."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     lift_it(bench)
@@ -246,7 +247,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The guard's lines (stop, latched e-stop) and those of the exit all stop the motors."""
+    """The guard's lines (after a stop or an e-stop) and those at the exit stop all motors."""
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
         bench.board.services.set_brush(True, bench.now)
@@ -319,7 +320,7 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
 
 @pytest.mark.parametrize("seconds", [0.7, 3.0])
 def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(seconds: float) -> None:
-    """A board that hangs for a time misses the stop and then continues with its last commands."""
+    """A board that hangs misses the stop of its brush, so the driver sends the stop again."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()

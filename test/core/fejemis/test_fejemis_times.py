@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stamps of readings: a Teensy's clock as the host sees it, and the samples of the IMU."""
+"""Stamps of readings: of lines that contain a Teensy's time, and of IMU lines, which do not."""
 
 import itertools
 import math
@@ -27,7 +27,7 @@ def late(chance: random.Random) -> float:
 
 
 def within(errors: list[float]) -> float:
-    """Return half the width of the narrowest interval that holds 99 % of the errors, in s."""
+    """Return half the width, in s, of the narrowest interval that contains 99 % of the errors."""
     errors = sorted(errors)
     most = int(0.99 * len(errors))
     return min(b - a for a, b in zip(errors, errors[most:], strict=False)) / 2
@@ -73,7 +73,7 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
 
 
 def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """A single implausible time is damaged; several that agree show that the board restarted."""
+    """The clock ignores a single implausible time; several that agree show a restart."""
     clock = TeensyClock()
     assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
     assert not clock.see(10.98, 6.0)
@@ -86,7 +86,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
-    """After a restart, the board's times could be late ones, but they are lower than before."""
+    """A restart soon after the start looks almost like late lines, but the times begin again."""
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
     restarts = 0
@@ -184,7 +184,7 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 
 
 def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
-    """After a stall of the host, lines arrive all at once, but the times in them increase."""
+    """After a stall of the host, many lines arrive at once; their times increase: no restart."""
     clock = TeensyClock()
     for n in range(100):
         assert clock.see(5.0 + 0.02 * n, 100.0 + 0.02 * n)

@@ -155,7 +155,7 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """With ``auto_gyro_bias``, half of the bias is found in 15 s at rest, and no more in motion."""
+    """With ``auto_gyro_bias``, 15 s at rest find half of the bias; motion does not change it."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)

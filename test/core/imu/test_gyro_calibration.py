@@ -119,7 +119,7 @@ def test_a_robot_that_moves_is_refused_with_what_showed_it(
 
 
 def test_a_shaken_accelerometer_is_motion() -> None:
-    """A calibration fails for a robot carried so gently that only the accelerometer shows it."""
+    """A calibration fails even if only the accelerometer shows that the robot is carried."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     for number, rate in enumerate(itertools.islice(noisy(NONE, NOISE_RADPS), 210)):
@@ -138,7 +138,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """A gap in the readings restarts a calibration; too few readings make it fail in time."""
+    """A gap in the readings restarts a calibration; with too few readings it fails at its limit."""
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)
     for start_s in (100.0, 102.0, 104.0):
@@ -153,7 +153,7 @@ def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
 
 
 def test_a_measurement_that_is_given_up_says_why_once() -> None:
-    """A calibration that is given up is answered once, with the reason."""
+    """If a calibration is cancelled, the caller gets one answer, with the reason."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.give_up("not asked")
     assert not calibration.answers

@@ -76,7 +76,7 @@ def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_
 
 @pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
 def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
-    """If gravity fits none of the ranges, the advice is to check range, bias and sensor."""
+    """If the measured gravity fits no range, the advice is to check range, bias and sensor."""
     assert gravity_advice(gravity, 2).endswith(
         "check `accel_range` and `accel_bias`, or the sensor"
     )

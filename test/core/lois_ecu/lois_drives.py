@@ -69,9 +69,9 @@ VARIED = (
     "straight back",
     "curve back",
 )
-"""Motions of ``test/integrity/lois_odometry.py``: a way of 5 m, or a turn by 80° to 400°.
+"""Motions of ``test/integrity/lois_odometry.py``: drives of 5 m, and turns by 80° to 400°.
 
-The seed gives the speed.
+The seed of a drive gives its speed.
 """
 
 
@@ -142,7 +142,7 @@ class Drive:
 
     @property
     def sigmas(self) -> float:
-        """Largest error of x, y or yaw, in its standard deviations."""
+        """Largest of the errors of x, y and yaw, each divided by its standard deviation."""
         c, e = self.last.covariance, self.error
         pairs = ((e.x_m, c.xx), (e.y_m, c.yy), (e.yaw_rad, c.yaw_yaw))
         return max(abs(error) / math.sqrt(variance) for error, variance in pairs)
@@ -234,7 +234,7 @@ class Rig:
         return self.outcome()
 
     def outcome(self) -> Drive:
-        """Return the outcome of the drive, by the last estimate of the odometry."""
+        """Return the outcome so far: the last estimate of odometry, and the truth at its time."""
         last, true = self.estimates[-1]
         return Drive(true, self.way_m, self.turned_rad, last, self.driver)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The delay with which ticks are read, estimated from the board's time in them."""
+"""The delay of a read, estimated from the board's time in each group of ticks."""
 
 from random import Random
 
@@ -27,7 +27,7 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """The times of groups that are read together stay in order, whatever the first delay is."""
+    """Groups that are read together get times in the order in which the board sent them."""
     board = BoardTime()
     taken_s = []
     for step in range(60):
@@ -49,7 +49,7 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """Without a known clock, also after a restart, the delay is 0, with a sigma of 12 ms."""
+    """Before the clock's unit is known, and after a restart, the delay is 0 with sigma 12 ms."""
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
     for step in range(20):
@@ -78,7 +78,10 @@ def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
 def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
     reads: list[tuple[float, int]],
 ) -> None:
-    """Reads are 0 to 4 s apart, and the board's clock runs at any rate."""
+    """At any times of reads and any rate of the board's clock, delays are finite.
+
+    Groups stay in order.
+    """
     board, now, counts, taken_s = BoardTime(), 10.0, 0, 0.0
     for seconds, passed in reads * 3:
         now, counts = now + seconds, counts + passed

@@ -102,7 +102,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """Value 4 of command 0x11 selects lines without checksum.
 
-    The command overwrites the left short correction, which the driver then restores.
+    The command overwrites the left wheel's "short correction", which the driver then restores.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     for _ in range(140):

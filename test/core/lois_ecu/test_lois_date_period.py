@@ -11,7 +11,10 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 class DeafBench(Bench):
-    """A bench whose robot does not receive copy ``nth`` of ``lost``, the line with the period."""
+    """A bench whose board does not receive copy number ``nth`` of the line ``lost``.
+
+    That line sets the period of the GPS date.
+    """
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
         self.lost = encode_command(SetPeriod(Stream.GPS_DATE, period_ms))
@@ -40,7 +43,7 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """Each line that sets the date period restarts it, so requested dates confirm settings."""
+    """The settings restart the date period, so only dates on request can confirm the settings."""
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)
     assert bench.session.board._ecu.confirmed

@@ -31,7 +31,7 @@ GROUPS: dict[str, list[Report]] = {"0x20": [*ODOMETRY], "0x12": [*TICKS], "0x0d"
 
 
 def rounded(found: list[Report]) -> list[bytes]:
-    """Return the lines of the reports; the lines are equal even if floats were rounded."""
+    """Encode the reports as lines, to compare them; rounded floats do not change the lines."""
     return [encode_report(report) for report in found]
 
 
@@ -185,7 +185,7 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 
 
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
-    """A record that was not requested has an unknown length, so lost lines could not be noticed."""
+    """In a record that was not requested, lost lines could not be noticed, so it is discarded."""
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
     assert decoder.group_statistics.damaged_groups == 1

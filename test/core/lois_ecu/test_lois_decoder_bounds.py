@@ -77,7 +77,10 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A torque sample of 0/0 looks like the end of the record, under either command number."""
+    """A torque sample of 0/0 looks like the end of a record, but must not end it.
+
+    The record may come under either of two command numbers.
+    """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)
     zero, some = b":" + code + b"00000000", b":" + code + b"00010002"
@@ -103,7 +106,7 @@ def test_a_record_without_end_is_not_kept() -> None:
 @pytest.mark.parametrize("sum_required", [True, False], ids=["with sum", "sum off"])
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmware: bool) -> None:
-    """Each seed is a drive of ten minutes; 85 % of the reports of each kind must arrive."""
+    """In drives of ten minutes no report is wrong, and at least 85 % of each kind arrive."""
     sent, came, wrong = Counter[str](), Counter[str](), Counter[str]()
     for seed in range(SEEDS):
         said = reports(600.0, firmware=firmware)

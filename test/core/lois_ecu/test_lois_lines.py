@@ -127,7 +127,10 @@ def test_a_command_without_checksum_is_two_characters_shorter(
 
 @pytest.mark.parametrize(("lines", "report"), REPORTS, ids=lambda value: str(value)[:32])
 def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
-    """Lines give the report and the report the lines; upper case is decoded like lower case."""
+    """The lines are decoded to the report, and the report is encoded to the lines.
+
+    Upper case is decoded like lower case.
+    """
     assert encode_report(report) == lines
     for form in (lines, in_capitals(lines), sum_in_capitals(lines), lines.replace(b"\n", b"\r\n")):
         decoder = LoisDecoder()
@@ -159,7 +162,7 @@ def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """Zeros end a record of tick times; the padding of 10 on the shorter channel is removed."""
+    """Zeros end a record of tick times; the decoder removes the padding (10) from a channel."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 2, 1)
     data = b":04000a000b3d\n" + encode_report(Record(RecordKind.RPM, (10, 12), (11,)))[14:]
@@ -201,7 +204,7 @@ def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
     ids=str,
 )
 def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
-    """A period of 0 makes the board deaf; a record of over 1024 samples never completes."""
+    """The encoder refuses, for example, a period of 0, which would make the board deaf."""
     with pytest.raises(FrameError):
         encode_command(command)
 

@@ -122,7 +122,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 
 
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
-    """A restart sets the counters to zero, which is not motion; the roll-out adds at most 5 cm."""
+    """A restart sets the counters to zero; odometry adds at most 5 cm, in which the robot stops."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
     for step in range(1, 11):
@@ -184,7 +184,10 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
-    """When a setting changes, part of the next group's ticks belong to a way already predicted."""
+    """The odometry predicts motion between two groups of ticks, and a setting changes meanwhile.
+
+    The next group must not add the predicted motion again.
+    """
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)

@@ -10,7 +10,10 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def test_odometry_before_the_first_ticks_of_a_new_line_leaves_the_covariance_finite() -> None:
-    """After a reconnect, a backward command precedes the first ticks, and the last group is old."""
+    """After a reconnect, a backward command precedes the first ticks, and the last group is old.
+
+    The covariance stays finite.
+    """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     for step in range(3):

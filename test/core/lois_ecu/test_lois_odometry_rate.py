@@ -23,7 +23,7 @@ def published(board: LoisEcuBoard, now: float) -> bool:
 def test_odometry_that_is_late_is_not_published_twice_at_once(
     firmware: str, delay_s: float
 ) -> None:
-    """After a short delay the times of publication stay; after a long one they begin anew."""
+    """After a short delay the schedule of publication stays; after a long one it begins anew."""
     bench = Bench(firmware)
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)

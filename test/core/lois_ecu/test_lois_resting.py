@@ -43,7 +43,7 @@ def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """The tick after a late one seems early, so the board once reports a high speed: 27 RPM."""
+    """A late tick makes the next one seem early, so one report shows 27 RPM instead of 18."""
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 
@@ -59,7 +59,7 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels have the same speed, the board reports no speed; estimates are used."""
+    """The board reports no speed while both wheels are equally fast; then estimates show a fall."""
     wheel = told(12)
     for rpm in (30.0, 28.0):
         wheel.note(rpm, GROUP_S)

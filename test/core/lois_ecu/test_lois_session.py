@@ -19,7 +19,7 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """While the button is held, the e-stop stays latched; the board would obey set points."""
+    """The board obeys set points even while its button is held, so the e-stop stays latched."""
     bench = Bench(firmware)
     bench.drive_on()
     bench.presses(True)
@@ -58,7 +58,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """The few ticks of a drive of 1.2 s prove a reset that is sent while the wheels are at rest."""
+    """Even after a drive of 1.2 s, with few ticks, the counters' change to zero is a proof."""
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
     bench.run(3.0)

@@ -118,7 +118,7 @@ def test_a_record_that_cannot_complete_is_refused() -> None:
     ],
 )
 def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
-    """The request is sent three times within 0.3 s, since each copy makes the board start again."""
+    """The request is sent three times, in case one is lost, and soon: each restarts the record."""
     ecu = started()
     ecu.record(kind, samples)
     sent = b"".join(ecu.due(0.01 * step) for step in range(100))

@@ -147,7 +147,7 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 
 
 def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
-    """A saturated controller keeps a wheel at 68 RPM, with a set point of -31, until RPM 0/0."""
+    """A saturated controller keeps a wheel at 68 RPM instead of -31 until RPM 0/0 is sent."""
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
     for step in range(30):

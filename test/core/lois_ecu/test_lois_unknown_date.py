@@ -89,7 +89,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 
 @WORKS
 def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Quirks) -> None:
-    """The date is requested until it is known; a zero date only ends the rounds of settings."""
+    """The driver requests the date until it is known; a date of zeros does not end this."""
     rig = GpsRig(quirks)
     rig.run(5.0)
     rig.sent.clear()

@@ -148,7 +148,7 @@ def _ends(world: World) -> Iterator[Step]:
 
 
 def _waits(world: World) -> Iterator[Step]:
-    """Yield what needs no command: a stop is requested, a wait ends, a poll is answered."""
+    """Yield steps without a command to the server: a requested stop, an ended wait, a poll."""
     server, driver = world.server, world.driver
     state = driver.state
     if state in (State.STARTING, State.DRIVING, State.REVERSING, State.TURNING, State.MOVING):
@@ -180,7 +180,7 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Return whether a driver that has never known the server's motion used the stop port."""
+    """Return whether the driver used the stop port before it ever knew the server's motion."""
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
 

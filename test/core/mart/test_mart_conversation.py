@@ -64,7 +64,7 @@ def conversation() -> Conversation:
 
 
 def test_a_reply_answers_the_pending_request() -> None:
-    """The answer contains the command, and the time from the request to the reply."""
+    """An answer has the command of the pending request, and the time from request to reply."""
     talk = conversation()
     assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
     answer = talk.hear(parse(b"ok 123"), 1.01)
@@ -211,7 +211,7 @@ def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
 
 
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
-    """After three stops, and the longest time that an answer may take, the stop port is used."""
+    """After three unanswered stops the driver uses the stop port, and then ignores replies."""
     stop = stopping(Motion.REVERSE)
     said = [word for tick in range(60) for word in stop.due(10.0 + 0.1 * tick)]
     before = said.index(words.SL)

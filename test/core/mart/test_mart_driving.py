@@ -97,7 +97,7 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """A door sill, for example, brakes the robot for a second while it turns on the spot."""
+    """A door sill, for example, slows a turn for a second; the next turn must not be too fast."""
     bench = MartBench("source").ready()
     if learned:
         bench.command(0.0, 0.5, 4.0)
@@ -137,7 +137,10 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Whole units make slow turns up to 17 % faster; the first turn was slow by a dead zone."""
+    """Rounding to whole units makes slow turns up to 17 % too fast.
+
+    The measured motor balance must not change by this.
+    """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):
         bench.command(vx, yaw_rate, 6.0)
@@ -147,7 +150,7 @@ def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
 
 @pytest.mark.parametrize("noise_mps", [0.0, 0.02])
 def test_an_acceleration_limit_of_the_speed_delays_no_turn_on_the_spot(noise_mps: float) -> None:
-    """A joystick sends some linear speed beside the turn."""
+    """With a turn, a joystick also sends some linear speed; its limit must not delay the turn."""
     bench = MartBench().ready()
     ramp = SessionSettings(
         limits=SpeedLimits(linear_mps2=0.1), commands=CommandSettings(), odometry=OdometrySettings()
@@ -351,7 +354,7 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By chance, the first heading of RM may equal the last heading before RM.
+    """By chance, the first heading in RM may be equal to the last heading before it.
 
     RM then seems to be lost, until the encoder shows that the robot moves.
     """

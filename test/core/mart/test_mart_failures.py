@@ -43,7 +43,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 
 
 def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
-    """A failed RST IMU leaves the IMU closed, so it is repeated; a third failure is believed."""
+    """If RST IMU fails, the driver repeats it; only a third failure shows that the IMU is dead."""
     bench = MartBench("source").ready()
     bench.server.imu.alive = False
     bench.try_command(0.3, 0.0)

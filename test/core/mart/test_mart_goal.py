@@ -21,7 +21,7 @@ from omnibot_driver.simulator.mart import Firmware
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """A requested turn of 1° turns the robot by 7°; the driver does not use up its moves on it."""
+    """If 1° is requested, the robot turns by 7°; it still reaches its goals in few moves."""
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
         goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
@@ -108,7 +108,7 @@ def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: flo
 def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
     firmware: Firmware,
 ) -> None:
-    """The reply to the first move shows that it has stopped; the server was not restarted."""
+    """The reply to the first move shows that it ended; the driver must not assume a restart."""
     bench = MartBench(firmware).ready()
     assert bench.job(Job.LOG).success
     bench.go_to(2.0, 0.0, 0.0)

@@ -242,7 +242,7 @@ def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
 
 
 def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
-    """In a curve of 1.2 s the count is known, but the heading only later, with the next count."""
+    """During 1.2 s of a curve no reply comes; the covariance covers the unknown path."""
     settings = MartSettings()
     odometry = MartOdometry(settings)
     odometry.counted(0, at(0.9))

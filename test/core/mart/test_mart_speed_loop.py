@@ -34,7 +34,7 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
     slope: float, dead: float, rate_radps: float
 ) -> None:
-    """The units for a turn are right within one, even if motors need some units to begin."""
+    """The number of units for a turn is off by at most one, even if motors need some to begin."""
     settings = MartSettings()
     per_unit_mps = settings.speed_per_unit * slope
     loop, now = SpeedLoop(settings), 0.0

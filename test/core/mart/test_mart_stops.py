@@ -37,7 +37,7 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
-    """The stop comes while the IMU is checked, while RM is on its way or while its reply is due."""
+    """The stop comes while the IMU is checked, RM is on its way, or the reply to RM is awaited."""
     bench = MartBench(firmware, faults=NetworkFaults(delay_s=0.02), seed=1).ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)):
         bench.try_command(vx, yaw_rate)
@@ -97,7 +97,7 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """A late copy of a controlled move only shows in a command port that does not answer."""
+    """Only a command port that does not answer shows a late copy of a controlled move."""
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
     bench.run_until(lambda: b"TF" in bench.server.executed[-1].encode(), 10.0)

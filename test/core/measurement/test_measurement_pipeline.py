@@ -132,7 +132,7 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
 
 
 def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
-    """The cable is unplugged for three seconds, while the board carries out its last command."""
+    """The cable is unplugged for 3 s while the robot drives on; odom then includes this motion."""
     bench = Bench(BoardSettings(initial_pose=BoardPose(4000.0, 0.0, 1571.0), running=True))
     bench.open()
     bench.run(1.0)

@@ -41,7 +41,7 @@ def gate() -> OutlierFilter:
 
 
 def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Reading]]:
-    """Return a list for each reading: the readings that the filter releases at that time."""
+    """Return one list per reading: what the filter releases when it receives this reading."""
     return [
         [found for found, _ in through.admit(reading, number * TICK_S)]
         for number, reading in enumerate(readings)
@@ -74,7 +74,7 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """Each jump is the value of a high bit of a word, in the ranges of 2 g and 250 °/s."""
+    """A word jumps once by the value of one of its high bits, in the ranges 2 g and 250 °/s."""
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -107,13 +107,13 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
-    """A knock in one reading is delivered at once if its size is not that of a single bit."""
+    """A knock in one reading is delivered at once, unless a single changed bit can explain it."""
     readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A reading at the end of the 2 g scale is delivered, as a knock that saturates the sensor."""
+    """A reading at the end of the 2 g scale is delivered, since a knock can saturate the sensor."""
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
@@ -121,7 +121,7 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """With a larger ``full_scale_mps2``, jumps of the size of that scale's bits are rejected."""
+    """``full_scale_mps2`` decides which jumps have the size of a changed bit and are rejected."""
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
     assert came[50] == []
@@ -171,7 +171,7 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """A jump from 0.25 to 1.5 m/s and back in 80 ms is rejected; a pose waits for the verdict."""
+    """The filter rejects a jump from 0.25 to 1.5 m/s and back in 80 ms; until then a pose waits."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
@@ -195,7 +195,7 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """The next displacement takes over the restart and unknown duration of a rejected one."""
+    """The restart or unknown duration that a rejected displacement shows is in the next one."""
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
     assert came[2:] == [[replace(ahead(), duration_s=None, restarted=True)], [ahead()]]
@@ -230,7 +230,10 @@ readings = st.one_of(
 
 @given(st.lists(readings, max_size=60))
 def test_what_is_not_refused_comes_out_once_in_order_and_unchanged(given: list[Reading]) -> None:
-    """Accepted readings keep their order and values, except for losses, restarts and durations."""
+    """Accepted readings keep their order and values.
+
+    Only the losses, restarts and durations of rejected readings are added to later ones.
+    """
     through = gate()
     came = list(chain(*admitted(given, through)))
     came += [reading for reading, _ in through.release()]

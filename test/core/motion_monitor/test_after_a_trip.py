@@ -19,7 +19,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """A calibration measures wrong settings, so the motion monitor must be off during it."""
+    """To calibrate wrong settings, a user drives with the monitor off; on again, it trips."""
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
     bench.configure(motion_monitor=False)

@@ -75,7 +75,7 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """The monitor needs only two displacements after the first deviating displacement."""
+    """With a displacement every 0.1 s, three that deviate are enough to detect the fault."""
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
         bench.run(phase * TICK_S)
@@ -87,7 +87,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """Distance lost in one long displacement does not excuse motion in the wrong direction."""
+    """A robot that reverses within one long displacement must not look like one that is held."""
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The envelope of velocities that recent set points explain, and how set points fade."""
+"""The range of velocities that recent set points explain; older set points lose their weight."""
 
 import math
 
@@ -67,7 +67,7 @@ def test_what_is_on_the_way_is_inside(
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 1.0, math.pi, -2.0])
 def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> None:
-    """A twist exceeds the envelope by its distance from the hull less the margin."""
+    """The excess of a twist is its distance from the hull of the set points, minus the margin."""
     away = BodyTwist(-0.3 * math.cos(angle), -0.3 * math.sin(angle), 0.0)
     way_mps, turn_radps = outside(
         away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True

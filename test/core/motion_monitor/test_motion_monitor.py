@@ -83,7 +83,7 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """A robot that moves the wrong way is found out within 0.3 s of reaching 0.05 m/s.
+    """The monitor detects a robot that moves the wrong way within 0.3 s after it reached 0.05 m/s.
 
     Its motion must not be taken for that of a held robot, which is excused for up to 0.4 s while
     its wound-up controllers unwind.
@@ -143,7 +143,7 @@ def test_a_new_command_may_be_followed_late() -> None:
 
 
 def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
-    """A robot that keeps its speed when commanded to slow down to a fifth is found out."""
+    """A robot is commanded to slow down to a fifth, but keeps its speed: the monitor detects it."""
     drive = Drive()
     drive.command(0.5, 0.0, 0.0)
     drive.move((0.5, 0.0, 0.0), 1.0)
@@ -154,7 +154,7 @@ def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
 
 
 def test_two_senders_in_turn_do_not_trip() -> None:
-    """Two senders command motion and rest in turn; the robot moves at a speed in between."""
+    """Two senders command motion and rest alternately; the robot moves at a speed in between."""
     drive = Drive()
     for step in range(100):
         drive.command(*((0.4, 0.0, 0.0) if step % 2 else REST))
@@ -253,7 +253,7 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """A fault is reported once, and again only after the robot has obeyed in between."""
+    """A fault is news once, and again only if the robot has obeyed a command in between."""
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
     assert not drive.monitor.is_news(Fault.BLOCKED)

@@ -37,7 +37,10 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """For all signs and frames, ``rolled`` is the sum of the tangents in the board's own axes."""
+    """For all signs and frames, ``rolled`` is the sum of the tangents in the board's own axes.
+
+    A tangent is the constant twist of a period, times the period.
+    """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
         odometry.settle(PoseReading(board.x_m, board.y_m, board.yaw_rad))

@@ -34,7 +34,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     held_s: float, gains: WheelGains
 ) -> None:
-    """A released robot may leap: its controllers have wound up, and Stop would not unwind them."""
+    """A released robot may leap, as its wheel controllers have wound up; the monitor allows it."""
     bench = driving(wheel_gains=gains)
     bench.board.grip()
     for _ in range(round(held_s / PERIOD_S)):

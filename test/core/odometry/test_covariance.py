@@ -76,7 +76,7 @@ def test_a_robot_at_rest_grows_no_less_sure() -> None:
 
 
 def test_the_covariance_is_a_random_walk_over_the_way() -> None:
-    """Over 1 m, wheels A and B roll 0.87 m; their variances add up in any number of steps."""
+    """Wheels A and B roll 0.87 m over 1 m; ten steps or a hundred give the same covariance."""
     noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
     for steps in (10, 100):
         odometry = Odometry(OdometrySettings(noise=noise))
@@ -172,7 +172,7 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board's pose is computed from the wheels, so it cannot remove the wheels' drift."""
+    """A pose of the board is computed from its wheels, so it cannot correct the wheels' drift."""
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):

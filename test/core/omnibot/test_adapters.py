@@ -22,7 +22,7 @@ SETTLED = 300
 """Number of readings after which the decoder has learned how the adapter sends."""
 IMU_LENGTH = 14
 DRIFT = 1.0002
-"""Relative rate of the adapter's clock; the packets end at every phase of a tick."""
+"""Relative rate of the adapter's clock; so its packets end at all phases of a tick, in turn."""
 
 Handed = Iterator[tuple[float, bytes]]
 

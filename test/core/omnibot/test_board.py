@@ -164,7 +164,7 @@ def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> N
 
 
 def test_a_regular_sequence_has_no_losses() -> None:
-    """SEQ wraps twice in 600 deltas."""
+    """In 600 regular deltas SEQ wraps twice, and no delta counts as lost."""
     assert sum(lost(bot(), *[moved(n % 256) for n in range(600)])) == 0
 
 

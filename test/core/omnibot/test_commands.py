@@ -61,7 +61,7 @@ def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
 
 
 def test_commands_are_rounded_to_the_nearest() -> None:
-    """0.0493 m/s is 3.451 LSB, 0.0508 m/s is 3.556."""
+    """0.0493 m/s is 3.451 LSB and is sent as 3; 0.0508 m/s is 3.556 LSB and is sent as 4."""
     assert bare(encoder().velocity(BodyTwist(0.0493, -0.0508, 0.0)))[3:7] == bytes.fromhex(
         "00 03 FF FC"
     )

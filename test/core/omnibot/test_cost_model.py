@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Cost of a frame's content, given the frames before it."""
+"""The cost of a frame, by which the decoder judges whether its content fits earlier frames."""
 
 import pytest
 

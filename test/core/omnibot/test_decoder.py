@@ -157,7 +157,7 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
     name: str, by: str
 ) -> None:
-    """The stream starts at places in its first 345 bytes, about a fifth of a second."""
+    """Decoding starts at various positions in the first 345 bytes, about a fifth of a second."""
     ticks = ticks_of(name)[:60]
     stream = b"".join(ticks)
     sent = frames_of(stream)

@@ -234,7 +234,7 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """``flush`` returns a complete frame in step, but no partial and no unproved frame."""
+    """``flush`` returns a complete frame if the decoder is in step, but never a partial one."""
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()
     in_step.feed(LEAD_IN + encode(doubtful), 0.0)

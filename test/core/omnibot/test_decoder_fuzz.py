@@ -35,7 +35,7 @@ times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
 def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
     """Check that the stream holds the frames in order.
 
-    Frames are compared as text, because a pose may hold NaN.
+    Frames are compared as text, because a pose may contain NaN, which does not equal itself.
     """
     at = 0
     for frame in found:

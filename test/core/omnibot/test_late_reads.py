@@ -19,7 +19,7 @@ Reads = Iterator[tuple[bytes, float]]
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
 """Durations for which a reader stops, in s.
 
-The line is idle for 8.8 ms between two ticks, and longer by multiples of 10 ms if frames are lost.
+The line is idle for 8.8 ms between two ticks; each tick without frames adds 10 ms.
 """
 
 
@@ -142,7 +142,10 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter that collects 8 bytes holds the end of one text until the next text begins."""
+    """An adapter sends 8 bytes at a time: a piece may hold parts of two texts.
+
+    The silence between the texts then lies within the piece.
+    """
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
     for number in range(0, len(texts), 8):

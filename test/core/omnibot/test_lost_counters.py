@@ -49,7 +49,7 @@ def test_a_short_gap_is_bridged_at_once() -> None:
 
 
 def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
-    """For ten seconds no pose arrives, and deltas alone stay within 5 mm."""
+    """For ten seconds no pose arrives; odometry from deltas alone is right within 5 mm."""
     on = line(1)
     lose(on, 10.0, POSE)
     assert on.error.way_m < 0.005
@@ -76,7 +76,7 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """Steps of odom stay below 2 m/s and 8 rad/s; the first step may use the time of the gap."""
+    """Steps of odom are below 2 m/s and 8 rad/s; the first step may take as long as the gap."""
     for seed in range(5):
         on = line(seed, frame=frame)
         before = on.estimates[-1]
@@ -153,7 +153,7 @@ def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> N
 
 @pytest.mark.parametrize("lost", [2, 5, 10])
 def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: int) -> None:
-    """Settling a gap removes the variance of the gap, but not the variance of the drift."""
+    """A pose after the gap removes the variance of the gap, but not the variance of the drift."""
     whole, torn = line(2), line(2)
     whole.run(lost * PERIOD_S)
     lose(torn, lost * PERIOD_S)
@@ -240,7 +240,7 @@ def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
 
 
 losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
-"""Pairs: the number of frames that arrive, then of frames that are lost, deltas and poses alike."""
+"""Pairs of numbers of frames (deltas and poses): how many arrive, then how many are lost."""
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """After 24 IMU frames alone, five deltas may be lost by chance; 25 mean IMU-only mode."""
+    """After 24 IMU frames in a row, five deltas may be lost by chance; 25 prove IMU-only mode."""
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
         made.hear(DELTA)

@@ -90,7 +90,7 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """The nearest harmless goal may be 0.26 m away from the requested goal."""
+    """The nearest harmless goal could be 0.26 m away, so the driver refuses the goal."""
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset if the line"):
         encoder.drive_to(Pose(x_mm / 1000, 0.0, 0.0))

@@ -44,7 +44,10 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """A count means a restart if it implies no more lost deltas than a continued count does."""
+    """Two explanations of a count are compared: a restart, and a count that continues.
+
+    The one with fewer lost deltas is accepted; if both have equally many, it is the restart.
+    """
     sequence = begun(count)
     sequence.pause()
     goes_on = (lost - count - 1) % 256
@@ -92,7 +95,7 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 
 
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
-    """Deltas that a pose includes are not counted as lost again by the next delta."""
+    """If a pose has shown that deltas were lost, the next delta does not count them again."""
     sequence = Sequence()
     for count in range(10):
         sequence.delta(count, count * 0.04)
@@ -182,7 +185,7 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """Frames held as uncertain come out late, so the next delta may follow at once."""
+    """The decoder may hold a pose and release it late, so the next delta may follow at once."""
     sequence = Sequence()
     for count in range(11):
         sequence.delta(count, count * 0.04, imus=4)
@@ -196,7 +199,7 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """Only four IMU frames arrived, too few for the deltas that a continued count would lack."""
+    """A continued count would mean many lost deltas, but only four IMU frames have arrived."""
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted

@@ -26,7 +26,7 @@ Change = Callable[["Robot"], None]
 
 
 class Robot:
-    """The figures of a healthy robot; ``seconds`` lets time pass, with a diagnosis each second."""
+    """The figures of a healthy robot; the method ``seconds`` makes a diagnosis each second."""
 
     def __init__(self) -> None:
         self.diagnosis = Diagnosis("its power, cable and baudrate")
@@ -247,7 +247,7 @@ def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str,
 
 
 def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
-    """Rates are counted within one state, so a board that has just started is not too slow."""
+    """Rates are counted within one state, so a board that just started is not called too slow."""
     robot = Robot()
     robot.set(state="paused")
     robot.per_second.update(imu=0, displacements=0, poses=0)

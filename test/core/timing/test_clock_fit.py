@@ -15,7 +15,10 @@ NEVER_BELOW = -1.0
 def followed(
     skew: float, above: Callable[[int], float], below: Callable[[int], float], *, ticks: int = 2000
 ) -> tuple[ClockFit, float]:
-    """Fit a line between bounds above and below the truth; return the line and its last error."""
+    """Fit a line to the ticks; return it, and its error in s at the last tick.
+
+    ``above``, ``below``: distance in s of the bounds of a tick from its true time.
+    """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
     for tick in range(ticks):
@@ -40,7 +43,7 @@ def test_between_near_bounds_the_middle_is_taken() -> None:
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """Bounds that drift by 0.1 ms per second for 8 s bend the line by less than 0.5 ms."""
+    """For 8 s both bounds drift by 0.1 ms per second; the line's error stays below 0.5 ms."""
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
         start = 0.0 if drift[-1] > 0.0 else 0.87e-3

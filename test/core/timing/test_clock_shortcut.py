@@ -76,7 +76,7 @@ surprises = st.tuples(
     edges,
     st.sampled_from([0, 1, 14]),
 )
-"""Readings, ticks since the last ones, lateness in s, sample boundary, number of later reads."""
+"""Tuples: readings, ticks since the reading before, delay in s, boundary, number of later reads."""
 
 
 @pytest.mark.slow

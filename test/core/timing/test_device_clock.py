@@ -119,7 +119,7 @@ def test_stamps_are_even_and_true_to_a_constant(
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     skew: float, imu_only: bool
 ) -> None:
-    """With a free timer of 16 ms, a delay of 0.8 ms looks like no delay for seconds."""
+    """With a free timer of 16 ms, arrival times may hide a delay of 0.8 ms for several seconds."""
     stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -128,7 +128,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [bursts, singles], ids=["bursts", "bytes"])
 def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Chunker) -> None:
-    """On an ideal line, neither error nor evenness is worse than that of arrival times."""
+    """On an ideal line, the stamps are at least as accurate and as even as the arrival times."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=1e-4), chunker, seed)
         arrivals = Stamped(stamped.board, [(tick, at, at) for tick, _, at in stamped.samples])
@@ -276,7 +276,7 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Whatever counters and frame boundaries claim, stamps never decrease or pass the arrival."""
+    """Even if counters and boundaries are wrong, stamps do not decrease or exceed arrival times."""
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
     for passed_s, readings, edge in reads:

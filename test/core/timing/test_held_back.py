@@ -53,7 +53,7 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 @example(ticks=592, frame="earth", vx=0.0)
 @example(ticks=291, frame="body", vx=0.4)
 def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
-    """Whatever a stall loses, no step of odom is too large, and odom is right 2 s later."""
+    """Whatever data a stall loses, no step of odom is too large, and odom is right 2 s later."""
     bench = through_a_stall(ticks, frame, vx, 0.5)
     fastest_mps = OdometrySettings().fastest_mps
     for before, after in pairwise(bench.odometry):
