@@ -51,7 +51,7 @@ def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
 
 
 def test_a_lost_p_is_said_again(bench: Bench) -> None:
-    """If data continues for longer than the time between two notices, P is sent again."""
+    """A paused board only sends notices; if other data continues for long, P is sent again."""
     bench.hears = False
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.settle()

@@ -89,7 +89,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """During requests and in silence, the session never asks to be woken at once."""
+    """During requests and in silence, the session's next wake-up is always in the future."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()

@@ -72,7 +72,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The heartbeat tells what stopped the board; a pause lasts beyond an e-stop, until a start."""
+    """The heartbeat says what stopped the board. A pause continues after an e-stop is released."""
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)

@@ -85,7 +85,7 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
 def test_a_board_that_was_left_in_another_mode_is_fetched_back(
     firmware: Firmware, before: TerminalMode
 ) -> None:
-    """A previous program may have set any mode of the board, even commands without checksums."""
+    """Another program may have left the board in any mode; the driver restores its own mode."""
     rig = Rig(nominal(firmware))
     rig.run(2.1)
     for _ in range(6):

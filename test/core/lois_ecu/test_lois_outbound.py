@@ -72,7 +72,7 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """A lost run shorter than a line cannot join two neighbouring lines into a valid one."""
+    """A loss of fewer characters than a line has cannot join two lines to another valid line."""
     length = 14 if with_sum else 12
     for talk in TALKS.values():
         data = b"".join(encode_command(command, with_sum=with_sum) for command in talk)

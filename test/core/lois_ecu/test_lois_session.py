@@ -102,7 +102,7 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
-    """The first reset has set the counters to zero, so zeros do not prove the lost second one."""
+    """The first reset set the counters to zero, so zeros do not prove the second, which is lost."""
     bench = Bench(firmware)
     bench.drive_on(0.2, 6.0)
     bench.run(3.0)
@@ -145,7 +145,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """Half a line before a silence is reported as missing data, without advice on the baud rate."""
+    """Half a line arrives, then nothing: the notice says so, and does not blame the baud rate."""
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)

@@ -62,7 +62,7 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 
 
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
-    """A pause of 13 ms could cut the LED's line and a motion line into one wrong motion."""
+    """If 13 ms of bytes are lost, the LED's line and a motion line could become a wrong motion."""
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)
     switch_led(bench, on=True)

@@ -148,7 +148,7 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Yield the trials of every pair of wishes: each fate of each datagram."""
+    """Yield the trials of every pair of wishes: one trial for each fate of each datagram."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 

@@ -107,8 +107,8 @@ def test_no_late_ok_proves_the_imu() -> None:
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
     """The reply to RST IMU comes so soon that its time does not distinguish it from a late ``ok``.
 
-    So RST IMU waits until a late copy of the last ``ok``, or a reply that was given up, must have
-    come.
+    So the driver sends RST IMU only when no late copy of the last ``ok``, and no reply that it no
+    longer awaits, can still come.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)

@@ -56,7 +56,7 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
 
 
 def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
-    """After a stop of 0.56 s to 0.6 s the server's next RM fails at once, and is sent again."""
+    """If a stop takes 0.56 s to 0.6 s, the next RM fails at once; the driver sends RM again."""
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
     bench.command(0.3, 0.0, 4.0)

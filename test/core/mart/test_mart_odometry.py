@@ -120,7 +120,7 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
     """An unchanged count means that the start was lost, or that an equal motion has ended.
 
-    The covariance includes the equal motion, also after a count that is certain.
+    The covariance covers an equal motion, even after a later count that is certain.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)

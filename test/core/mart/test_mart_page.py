@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""docs/boards/mart.md lists each command of the controller: where it is used, or why not."""
+"""docs/boards/mart.md says for each command where the driver uses it, or why it does not."""
 
 import re
 from pathlib import Path

@@ -44,7 +44,7 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the pilot to send SRM and SM after the stop port, without asking what moves."""
+    """Patch the pilot to send SRM and SM after a stop on the stop port, whatever moves."""
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 
 

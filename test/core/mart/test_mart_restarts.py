@@ -80,7 +80,7 @@ def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(se
 def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_soon(
     after_s: float,
 ) -> None:
-    """The check of the IMU is not answered; the server's absence shows that it was restarted."""
+    """The server does not answer the check of the IMU, so the driver assumes a restart."""
     bench = MartBench().ready()
     bench.run_until(lambda: bench.try_command(0.0, 0.5) or b"RST IMU" in bench.said()[-1:], 2.0)
     bench.run(after_s)

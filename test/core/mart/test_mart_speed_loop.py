@@ -17,7 +17,7 @@ STEP_S = 0.1
 
 
 def test_before_anything_is_measured_a_motor_is_taken_for_ideal() -> None:
-    """Before any measurement, a motor needs as many units as an ideal motor: its nominal speed."""
+    """Before any measurement, the driver assumes an ideal motor with its nominal speed."""
     assert MotorLine().units(12.0) == 12.0
 
 

@@ -267,7 +267,7 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A sensor that sends text has no bits that could flip; its full scale is infinite."""
+    """A sensor that sends text has no bits to flip, so its full scale is set to infinity."""
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
     assert admitted(list(given), through) == [[reading] for reading in given]

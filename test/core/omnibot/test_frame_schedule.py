@@ -67,7 +67,7 @@ def test_imu_frames_alone_are_all_that_was_lost() -> None:
 
 @given(st.lists(st.tuples(kinds, st.integers(0, 500))))
 def test_any_order_of_frames_is_borne(heard: list[tuple[type, int]]) -> None:
-    """At most one IMU frame is counted as lost for each seven bytes."""
+    """For seven bytes that form no frame, at most one IMU frame is counted as lost."""
     rhythm = FrameSchedule()
     skipped = lost = 0
     for kind, count in heard:

@@ -199,7 +199,10 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""Reads after the first two bytes of a delta: milliseconds since the read before, and bytes."""
+"""For each case, the reads after the first two bytes of a delta.
+
+A read is the time in ms since the read before, and the bytes.
+"""
 
 
 @pytest.mark.parametrize("name", LATE_ENDS)

@@ -101,7 +101,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Calm lines use the shortcut; without that, the other tests would prove nothing."""
+    """Calm lines really use the shortcut; otherwise the other tests would prove nothing."""
     compared = 0
     compare = DeviceClock._compare
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The delay of measurements, to which only measurements contribute."""
+"""The delay of measurements; readings of other kinds must not change it."""
 
 import pytest
 from session_bench import TICK_S, Bench
