@@ -26,9 +26,12 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""Longest search, in deltas, to either side of the delta that a message's timestamp suggests."""
+"""Largest distance, in deltas, of a message's delta from the one that its timestamp suggests."""
 LONGEST_STALL = 1000
-"""Longest search, in IMU frames; after a stall of the computer, time may jump this far."""
+"""Largest distance, in IMU frames, of a message's frame from the one that its timestamp suggests.
+
+A stall of the computer may shift timestamps by this distance.
+"""
 
 Triple = tuple[float, float, float]
 
@@ -185,7 +188,10 @@ def trace(
 
 
 def since(found: Sequence[int | None]) -> int:
-    """Return the index of the first received frame; the listener was not ready for earlier ones."""
+    """Return the index of the first IMU frame that arrived as a message.
+
+    The listener was not ready for earlier frames.
+    """
     return next(number for number in found if number is not None)
 
 
@@ -240,7 +246,10 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Return the displacement behind a message's twist: length in 0.1 mm, turn in 0.1 mrad."""
+    """Return the displacement from which the driver computed a message's twist.
+
+    The length is in units of 0.1 mm, the turn in units of 0.1 mrad.
+    """
     twist = message.twist.twist
     turn = twist.angular.z * PERIOD_S
     shrink = math.sin(turn / 2) / (turn / 2) if turn else 1.0

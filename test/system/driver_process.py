@@ -65,7 +65,7 @@ class Driver:
             self.process = _nursery.start(arguments, environment)
         self.lines: list[str] = []
         self.answers: dict[str, Callable[[], None]] = {}
-        """Functions by text; each is called for every line of output that contains its text."""
+        """For each text, a function that is called for every line of output with this text."""
         self._said = threading.Condition()
         self._listener = threading.Thread(target=self._listen)
         self._listener.start()

@@ -119,7 +119,8 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again, after a delay that is longer than a stall.
 
-        After the delay the driver logs a refusal again, so the probe notices a second stall.
+        The driver logs refusals only every ``WARN_EVERY_S``. The delay is longer, so the probe also
+        notices if the driver refuses the message again.
         """
 
         def publish() -> None:

@@ -27,7 +27,10 @@ pytestmark = pytest.mark.skipif(SERVER is None, reason="fast-discovery-server is
 def program(
     command: list[str], environment: dict[str, str], ends_within_s: float
 ) -> Iterator[subprocess.Popen[str]]:
-    """Run a program in the context; then close its input, and kill it after ``ends_within_s``."""
+    """Run a program while the context lasts.
+
+    Then close its input, and kill it if it has not ended after ``ends_within_s``.
+    """
     process = subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -56,7 +59,10 @@ def free_udp_port() -> int:
 
 
 def test_a_super_client_finds_16_drivers_through_the_server() -> None:
-    """All participants are clients of the server, so the observer finds no driver by multicast."""
+    """The observer finds 16 drivers through the discovery server.
+
+    All participants are clients of the server, so the observer finds no driver by multicast.
+    """
     port = str(free_udp_port())
     environment = {
         **os.environ,

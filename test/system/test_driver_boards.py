@@ -79,7 +79,10 @@ def test_what_a_board_lacks_is_not_advertised(
 def test_a_deleted_parameter_does_not_block_the_others(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver refuses to delete an optional parameter, because each later change reads it."""
+    """The driver refuses to delete an optional parameter.
+
+    The driver reads this parameter at each later change of any parameter.
+    """
     probe: Probe = probe_of(start_plain(start_driver, start_board().path))
     deleted = [RosParameter(name="gain", value=ParameterValue())]
     (result,) = probe.call(SetParameters, "set_parameters", parameters=deleted).results

@@ -35,7 +35,10 @@ def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
 
 
 def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) -> None:
-    """One line names the parameters that the file sets, but not the notes of the tools."""
+    """The driver names the parameters that the file sets in a single line of its log.
+
+    The line omits the notes that the tools add to the file.
+    """
     path = tmp_path / "robot.yaml"
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
     line = said_of(path, start_driver)

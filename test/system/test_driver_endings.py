@@ -133,7 +133,10 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
 def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
     start_driver: Start, probe_of: Start, silent_terminal: tuple[int, str]
 ) -> None:
-    """If the kernel's buffer is full, the driver ends, and the guard keeps trying to send Stop."""
+    """The driver ends even if the kernel's buffer for data to the board is full.
+
+    The guard then keeps trying to send Stop.
+    """
     far, path = silent_terminal
     driver: Driver = start_driver(path, auto_start=False)
     probe_of(driver).wait_for_state("connecting")

@@ -82,7 +82,7 @@ def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
 def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """If the driver dies during the e-stop, the guard sends emergency stop and Stop in turn."""
+    """If the driver dies during the e-stop, the guard repeats emergency stop and then Stop."""
     driving(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
     mark = len(board.board.received)

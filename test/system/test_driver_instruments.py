@@ -142,7 +142,10 @@ def test_the_bias_is_what_was_set_last(
 
 
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
-    """Order, signs and units of wheel_cmd and joint_states agree, and wheel angles accumulate."""
+    """In joint_states the wheels turn as wheel_cmd commands: same order, signs and units.
+
+    The angles of the wheels grow while the wheels turn.
+    """
     joints = robot.probe.listen(JointState, "joint_states")
     commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
     wanted = [4.0, -2.0, 1.0]

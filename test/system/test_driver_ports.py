@@ -22,7 +22,10 @@ Start = Callable[..., Any]
 
 
 def descriptors(driver: Driver) -> int:
-    """Return how many file descriptors the driver has open, including those it closes soon."""
+    """Return how many file descriptors the driver has open.
+
+    The number includes descriptors that the driver will soon close.
+    """
     return len(os.listdir(f"/proc/{driver.process.pid}/fd"))
 
 

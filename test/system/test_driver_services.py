@@ -57,7 +57,10 @@ def drive_away(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
-    """A hundred simultaneous calls of ``~/estop`` are all answered, and the last one decides."""
+    """The driver answers each of a hundred simultaneous calls of ``~/estop``.
+
+    The last call decides whether the e-stop is latched.
+    """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     answers = [probe.call_async(SetBool, "estop", data=bool(n % 2)) for n in range(100)]
     assert all(answer.wait().success for answer in answers)
@@ -69,7 +72,8 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
 ) -> None:
     """The value true on ``estop`` latches the e-stop, even if false follows at once.
 
-    All messages wait while the driver is suspended. A button publishes false when it is released.
+    In the test all messages wait while the driver is suspended. A real button publishes false when
+    the user releases it.
     """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
@@ -82,7 +86,10 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
-    """Repeated calls of ``~/pause`` keep the requested mode; P, which toggles, is sent once."""
+    """Repeated calls of ``~/pause`` keep the requested mode, because the driver sends P only once.
+
+    P toggles between running and paused.
+    """
     for data, mode in [
         (True, BoardMode.PAUSED),
         (True, BoardMode.PAUSED),

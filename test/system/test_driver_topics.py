@@ -159,7 +159,7 @@ def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Star
 def test_an_imu_only_board_is_shown_as_such(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """For a board that sends only IMU frames, the state is ``imu_only``, and odom is silent."""
+    """For a board that sends only IMU frames, the state is ``imu_only``, and odom stays empty."""
     board = start_board(imu_only=True)
     probe: Probe = probe_of(start_driver(board.path))
     imu, odometry = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")

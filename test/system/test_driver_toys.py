@@ -52,7 +52,10 @@ class Toy:
         assert self.served.wait_for(predicate, PATIENCE_S), self.served.board.heard[-20:]
 
     def comes_to_a_stand(self) -> None:
-        """Wait until the robot has been at rest for 1.5 s, longer than between blocking moves."""
+        """Wait until the robot has been at rest for 1.5 s.
+
+        A robot with blocking moves also rests between two moves, but for a shorter time.
+        """
         ways: deque[float] = deque(maxlen=150)
 
         def stood(robot: Any) -> bool:
@@ -77,7 +80,10 @@ def start_toy(start_driver: Start, toy: Toy, **parameters: object) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, toy: Toy) -> Iterator[None]:
-    """Command the robot at 10 Hz in the context, which begins when the robot moves."""
+    """Command the robot at 10 Hz until the context ends.
+
+    The context begins when the robot moves.
+    """
     with probe.commanding(0.2):
         toy.wait_for(lambda robot: not robot.stands)
         yield
@@ -113,7 +119,7 @@ def test_the_estop_stops_a_toy_until_it_is_released(
 def test_whatever_ends_the_driver_stops_a_toy(
     start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
 ) -> None:
-    """When the driver ends or hangs, its exit or the guard stops a toy robot."""
+    """When a signal ends or suspends the driver, the driver or its guard stops the robot."""
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")

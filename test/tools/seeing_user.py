@@ -9,7 +9,10 @@ LOOKED_AT = 150
 
 
 class User:
-    """A user who first gives the ``wrong`` answers, then answers by the wheels' true motion."""
+    """A user who first gives the answers ``wrong``.
+
+    All later answers describe how the wheels really turned.
+    """
 
     def __init__(self, port: PtyBoard, *wrong: str) -> None:
         self._port, self._wrong = port, list(wrong)

@@ -97,7 +97,7 @@ class Deaf:
 
 
 def walk(*answers: str) -> Found:
-    """Run the part of the walk on wheels and axes with these answers; return its findings."""
+    """Run the part of the procedure for wheels and axes with these answers; return its findings."""
     left = list(answers)
     found = Found(before=Deaf.parameters)
     commission.Walk(Deaf(), Console(read=lambda _question: left.pop(0))).wheels(found)

@@ -104,7 +104,7 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
     """The picture of a long rest is smaller than 170 kB.
 
-    Noise does not compress, so the picture shows fewer points than were measured.
+    A picture of noise does not compress well, so it shows fewer points than were measured.
     """
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"

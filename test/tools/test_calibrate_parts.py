@@ -30,7 +30,10 @@ commands = st.tuples(speeds, speeds, speeds)
 
 
 def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
-    """Watch for two simulated seconds whether a constant velocity obeys a constant command."""
+    """Check for two simulated seconds that a robot obeys ``command``.
+
+    ``measured``: the constant velocity of the robot.
+    """
     obedience = Obedience(topic, PARAMETERS.by_name)
     for tick in range(200):
         obedience.look(tick / 100, 0.01, command, measured)

@@ -114,7 +114,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
 
 
 def test_a_value_of_the_diagnostics_is_found_by_its_name(robot: Robot, rigged: Rig) -> None:
-    """``diagnosed`` returns the value of this name from the driver's diagnostics."""
+    """``diagnosed`` returns the value that the driver's diagnostics have under a given name."""
     assert robot.diagnosed("Port") == rigged.port.path
 
 

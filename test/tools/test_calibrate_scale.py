@@ -72,7 +72,10 @@ def test_any_scale_is_found_within_what_is_claimed(
 def test_what_is_commanded_is_a_whole_count_of_the_board(
     units: float, top: float, levels: int
 ) -> None:
-    """Planned commands are whole counts, and at most the requested maximum or one count."""
+    """Planned commands are whole counts, and at most ``top``.
+
+    If ``top`` is less than one count, they are at most one count.
+    """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
         assert counts == pytest.approx([round(count) for count in counts], abs=1e-9)
@@ -80,7 +83,10 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """A speed is not used if its commands paused, as the driver may have stopped the robot."""
+    """The tool does not measure a speed whose commands paused.
+
+    The driver may have stopped the robot during the pause.
+    """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
     middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]

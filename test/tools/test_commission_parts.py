@@ -253,7 +253,10 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
     ],
 )
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
-    """Under positional control a speed is neither held nor doubled with the command."""
+    """The tool recognises positional control by the motion of the robot.
+
+    The robot stops at its goal, or drives with both commands at the same speed.
+    """
     assert control_method(slow, fast, 0.06) == "position"
 
 
@@ -266,7 +269,10 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     ],
 )
 def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
-    """If a robot becomes faster under one command, the control method stays unknown."""
+    """If the motion fits neither control method, the tool finds none.
+
+    For example, the robot becomes faster under one command, because this command came late.
+    """
     assert control_method(slow, fast, 0.06) is None
 
 
@@ -274,7 +280,11 @@ def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """In the right delta frame a command keeps its direction in the body when the robot turns."""
+    """With the right delta frame, the odometry shows the same direction before and after a turn.
+
+    With the wrong frame, the direction changes by the angle of the turn. Any other change is an
+    error.
+    """
 
     def heading(rad: float) -> Drift:
         return steady(0.1 * math.cos(rad), 0.1 * math.sin(rad))

@@ -22,7 +22,7 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 
 @given(st.floats(0.5, 120.0), st.floats(2.0, 30.0), st.floats(0.0, 1e6))
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
-    """The rate of a steady stream is exact to one message per window, at any time."""
+    """The measured rate of a steady stream is right within one message per window."""
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):
         rate.arrived(began_s + number / hz)
@@ -70,7 +70,7 @@ def test_the_way_is_kept_in_steps() -> None:
 
 
 def test_the_way_is_bounded() -> None:
-    """Hours of driving need no more memory than ``LONGEST_PATH`` points."""
+    """The path never has more than ``LONGEST_PATH`` points, even after hours of driving."""
     model = Model("/omnibot_driver", 0.0)
     for tick in range(2 * LONGEST_PATH):
         model.odom(Pose(0.03 * tick, 0.0), HALT, 0.04 * tick)
@@ -104,7 +104,7 @@ def test_a_command_that_nobody_repeats_is_none() -> None:
 
 
 def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
-    """Commands do not end the silence of a driver; only messages from the driver itself do."""
+    """Only messages from the driver end the driver's silence; commands of other nodes do not."""
     model = Model("/omnibot_driver", 0.0)
     model.state("nominal", 1.0)
     model.commanded(HALT, 9.0)
@@ -112,7 +112,7 @@ def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
 
 
 def test_what_was_measured_once_is_not_what_is_measured() -> None:
-    """Outdated velocities, IMU data and diagnostics are removed; the last pose stays."""
+    """The view omits outdated velocities, IMU data and diagnostics, but keeps the last pose."""
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(1.0, 0.0), BodyTwist(0.2, 0.0, 0.0), 1.0)
     model.imu((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)

@@ -28,7 +28,7 @@ def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | 
 
 @given(st.lists(st.tuples(keys, st.floats(0.0, ASLEEP_S - 0.01)), min_size=1, max_size=20))
 def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
-    """At the latest ``FIRST_S`` after the last key, ``ZEROS`` zero commands end the motion."""
+    """A motion ends with ``ZEROS`` zero commands, at the latest ``FIRST_S`` after the last key."""
     dead_man, now_s = DeadMan(), 0.0
     for key, wait_s in presses:
         now_s += wait_s
@@ -88,7 +88,10 @@ def test_stop_is_at_once() -> None:
 
 
 def test_who_has_not_steered_commands_nothing() -> None:
-    """A user who has not steered sends nothing, not even zeros, as another source may drive."""
+    """Before the first steering key the monitor publishes nothing, not even zero commands.
+
+    Another node may be driving the robot.
+    """
     dead_man = DeadMan()
     assert not dead_man.press("x", 0.0)
     assert commands(dead_man, 0.0, 100) == [None] * 100

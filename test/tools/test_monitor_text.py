@@ -83,7 +83,10 @@ def test_what_has_happened_is_counted() -> None:
 
 
 def test_a_message_cannot_move_the_cursor() -> None:
-    """Escape sequences in a text from /diagnostics are removed."""
+    """The monitor replaces control characters in a text from /diagnostics by question marks.
+
+    Otherwise a message could move the cursor.
+    """
     rude = Status("Link", Level.ERROR, "\x1b[2J\nbad\x07", {"Port": "\x1b]0;owned\x07"})
     shown = view(statuses=(rude,), state="\x1b[31m")
     everything = text.report(shown).replace("\n", "") + text.title(shown)

@@ -95,7 +95,7 @@ def test_metadata_that_make_no_sense_are_not_needed(
 def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     tmp_path: Path, mode: CompressionMode
 ) -> None:
-    """Of an MCAP file that breaks off, all complete chunks are read."""
+    """If an MCAP file breaks off, the report reads all complete chunks."""
     drive = Drive(40.0)  # long enough for several chunks
     bag = write(tmp_path / "bag", [drive], compression=mode)
     size = (bag / "bag.mcap").stat().st_size

@@ -51,5 +51,5 @@ def test_every_subject_has_a_row() -> None:
     ],
 )
 def test_the_limits_are_those_of_the_code(subject: str, limit: str) -> None:
-    """In docs/tools/report.md each limit of the code is in the row of its subject."""
+    """The table in docs/tools/report.md gives each limit of the code in the row of its subject."""
     assert limit in ROWS[subject]

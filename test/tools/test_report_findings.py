@@ -40,7 +40,10 @@ def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
 
 
 def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None:
-    """If the driver's count of lost frames grows during a gap, the report blames the line."""
+    """The report names the serial line as the cause of a gap in which frames were lost on it.
+
+    The driver's diagnostics count these frames.
+    """
     drive.imu.drop(6.0, 6.1)
     for at_s, *_, values in drive.statuses:
         values["IMU frames lost"] = "7" if at_s < 7.0 else "17"
@@ -63,7 +66,10 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """A lost board shows in the state and in gaps, but is reported once, by the state."""
+    """The report names the loss of a board once, by the driver's state.
+
+    It does not report the gaps in the board's data as well.
+    """
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
     drive.odom.drop(16.9, 18.0)
@@ -80,7 +86,7 @@ def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
     """Timestamps that jump ahead by 20 ms and slowly return are reported as a jump, not a gap.
 
-    A driver that was kept from reading gives such timestamps.
+    A driver that could not read for some time gives such timestamps.
     """
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
@@ -106,7 +112,10 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 
 
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
-    """The gap of a stream that ends early lasts to the end, unless the state explains it."""
+    """If a stream ends early, the report shows a gap from there to the end of the log.
+
+    If the driver's state explains the end of the stream, the report shows no gap.
+    """
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
     assert gap.level is Level.BAD
@@ -118,7 +127,10 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
-    """If every second reading of a log is missing, the report names the rate, not the gaps."""
+    """If every second reading of a log is missing, the report says that the rate is wrong.
+
+    The report then shows no gaps.
+    """
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.imu, name, getattr(drive.imu, name)[::2])
     found = [finding.text for finding in troubles(drive) if finding.subject in ("Timing", "Gaps")]
@@ -184,7 +196,10 @@ def test_nothing_but_nan_is_told(drive: Drive) -> None:
 
 
 def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
-    """Warnings of commands that an e-stop refuses are not reported; other refusals are."""
+    """The report omits warnings of commands that the driver refused because of the e-stop.
+
+    The report has warnings of other refusals.
+    """
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
     assert not troubles(drive)
@@ -193,7 +208,7 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
 
 
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
-    """Each status is reported by its worst level, with its message and the number of reports."""
+    """The report gives the worst level of each status, its message, and its number of reports."""
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.6, "omnibot_driver: IMU", 2, "the gyro is stuck", {}))

@@ -71,9 +71,9 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """A turn during lost messages is not taken for a difference between gyro and wheels.
+    """The report does not compare gyro and wheels during lost messages.
 
-    The next pose contains the lost two seconds of the turn in a single step.
+    The first pose after the loss contains the turn of two seconds in a single step.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
@@ -109,7 +109,10 @@ def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
 
 
 def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
-    """The lag of the robot is found within a step of the search and half a step of odometry."""
+    """The report finds the lag of the robot.
+
+    The tolerance is one step of the search plus half a step of the odometry.
+    """
     text = said(drive, "Commands", "followed").text
     lag_s = float(text.split("lag of ")[1].split(" ms")[0]) / 1e3
     assert lag_s == pytest.approx(DELAY_S, abs=0.041)

@@ -74,7 +74,10 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
 @settings(max_examples=25)
 @given(wheel_motors, st.floats(0.02, 3.0))
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
-    """At no frequency does the sensitivity, computed from the impulse response, exceed Ms."""
+    """The sensitivity at any frequency is at most Ms.
+
+    The test computes the sensitivity from the impulse response of the motor.
+    """
     ticks = 4000
     pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks).speed, prepend=0.0)
     z = np.exp(1j * frequency)

@@ -15,13 +15,14 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Least number of averages from which a deviation is computed.
+"""Least number of averages from which the tool computes an Allan deviation.
 
-The longest averaging time is therefore one ninth of the recorded time.
+Each of them is the mean of the readings over one averaging time. The longest averaging time is
+therefore one ninth of the recorded time.
 """
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 60.0
-"""Shortest recording at rest, in s, to which the random walk of a bias is fitted."""
+"""Shortest recording, in s, from which the tool estimates instability and random walk of a bias."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def allan(readings: Column, period_s: float) -> Allan:
 def noise(curve: Allan) -> Noise:
     """Return the noise terms that fit the curve best.
 
-    A recording shorter than ``WALK_FROM_S`` is fitted with white noise only.
+    If the recording is shorter than ``WALK_FROM_S``, the tool fits white noise only.
     """
     tau_s, variance = curve.tau_s, curve.deviation**2
     terms = [1 / tau_s]

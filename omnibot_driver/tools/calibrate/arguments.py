@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The command line.
+"""The command line of the calibrations.
 
 Must not import libraries that only a calibration needs, so that ``--help`` works without them.
 """

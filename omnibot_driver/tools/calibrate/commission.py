@@ -99,7 +99,10 @@ class Walk:
     # Found from the board's data
 
     def board(self, found: Found) -> None:
-        """Find the position of the board's mode switch, and the frame of the odometry deltas."""
+        """Find the position of the board's mode switch, and the frame of the odometry deltas.
+
+        ``found`` receives the results.
+        """
         say = self._console.say
         slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
         say("Checking the mode switch: the wheels drive forward slowly, then twice as fast.")
@@ -164,7 +167,10 @@ class Walk:
     # Found by looking at the wheels
 
     def wheels(self, found: Found) -> None:
-        """Check the order of the wheels, and find the signs of the axes."""
+        """Check the order of the wheels, and find the signs of the axes.
+
+        ``found`` receives the results.
+        """
         self._console.say(
             "Look at each wheel from outside, towards the robot's centre. According to the"
             " manual, A is front right, B front left, C at the back.\nAnswer with three signs, for"
@@ -208,7 +214,10 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Show a motion, as often as the user asks for it; return the pattern that the user saw."""
+        """Run a motion that the user watches; return how the user saw the wheels turn.
+
+        The user may ask to see the motion again.
+        """
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
@@ -255,7 +264,11 @@ class Walk:
     # Common to all parts
 
     def _until_possible(self, find: Callable[[], T]) -> T:
-        """Call ``find`` up to ``TRIES`` times. Raises ToolError if no answer is plausible."""
+        """Call ``find`` until it succeeds, at most ``TRIES`` times; return its result.
+
+        ``find`` raises Contradiction if an answer or a measurement is not possible. Raises
+        ToolError if the last try fails, too.
+        """
         for _ in range(TRIES):
             try:
                 return find()

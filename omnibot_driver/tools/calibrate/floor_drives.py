@@ -36,9 +36,10 @@ def measured(
     go: Callable[[Drive], Column],
     measure: Callable[[Drive, Column], Measured],
 ) -> list[Measured]:
-    """Run each drive with ``go``; return what ``measure`` finds from the poses of each drive.
+    """Run each drive with ``go``, then call ``measure``; return the results of ``measure``.
 
-    Raises ToolError if the user does not confirm that there is room, or if a drive fails.
+    ``go`` returns the poses of the drive by the odometry; ``measure`` receives the drive and these
+    poses. Raises ToolError if the user does not confirm that there is room, or if a drive fails.
     """
     console.confirm(
         f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"

@@ -51,7 +51,10 @@ class Interruption:
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """A context during which signals are only noted: `check` raises only afterwards."""
+        """A context in which `check` does not raise.
+
+        After the context, `check` raises if a signal was received in it.
+        """
         self._deferred = True
         try:
             yield

@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 
 IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
-"""Time without data, in s, after which a motion is stopped."""
+"""Time without data, in s, after which the tool stops a motion."""
 AT_ONCE: Final = 100
 """Largest number of pending messages that are read at once."""
 LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -109,7 +109,8 @@ class Listener(Client):
     def _begin(self, states: Sequence[str]) -> None:
         """Wait for fresh data, then start a new log.
 
-        The last data may be old, because no data are received while the user is asked.
+        While the tool waits for the user's answer, it receives no data, so its last data may be
+        old.
         """
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
@@ -146,7 +147,10 @@ class Listener(Client):
 
 
 def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:
-    """Return the topics in ``wanted`` whose last message, at ``heard_s``, is too long ago."""
+    """Return those of the topics ``wanted`` that have been silent for more than ``LOST_S``.
+
+    ``heard_s``: time of the last message of each topic, in s.
+    """
     return [topic for topic in wanted if now_s - heard_s[topic] > LOST_S]
 
 

@@ -34,7 +34,7 @@ PURE_TURN: Final = 0.5
 The ratio is 0 if the odometry deltas are interpreted correctly, else 2 or more.
 """
 ALIKE: Final = 0.35
-"""Angles are regarded as equal if they differ by less than this fraction of the robot's turn."""
+"""Largest difference of equal angles, as a fraction of the angle by which the robot turned."""
 
 
 LEAST_M: Final = 1e-3

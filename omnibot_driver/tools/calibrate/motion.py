@@ -26,7 +26,7 @@ A, B, C for ``wheel_cmd``; None ends the motion.
 """
 
 LOOK_S: Final = 1.0
-"""Time, in s, over which commanded and measured motion are compared."""
+"""Time, in s, over which the tool compares commanded and measured motion."""
 SLOW_LOOK_S: Final = 3.0
 """Value of ``LOOK_S`` for boards that measure so rarely that odometry is partly a prediction."""
 OBEYED_PART: Final = 0.2
@@ -92,7 +92,10 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """Return the command on a ramp from ``now`` to ``wanted``, ``seconds`` after ``now``."""
+        """Return the command on a ramp from ``now`` to ``wanted``.
+
+        ``seconds``: time since the command ``now``.
+        """
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
             return a, b, c

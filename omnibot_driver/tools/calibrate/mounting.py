@@ -33,11 +33,11 @@ SQUARE_RAD: Final = math.radians(35)
 """Largest accepted deviation, in rad, of the angle between the two tilts from a right angle."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""A mounting within this angle, in rad, of a right-angled mounting is taken as right-angled."""
+"""Largest angle, in rad, between a mounting and the right-angled one that the tool uses instead."""
 HAND_RAD: Final = math.radians(2)
 """Least assumed standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
-"""Weight of the level posture relative to a tilted one; a floor is more exact than a hand."""
+"""Weight of the level posture relative to a tilted one, because tilts by hand are less exact."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ def _level_part(level: Array, tilted: Array) -> Array:
 
 
 def _right_angles() -> list[Array]:
-    """Return the 24 rotations that map axes onto axes."""
+    """Return the 24 rotations that turn every axis onto an axis, in either direction."""
     found = []
     for places in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):

@@ -27,14 +27,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Number of straight drives; if the tape is misread once, the results of the drives disagree."""
+"""Number of straight drives.
+
+If the user misreads the tape once, the results of the two drives differ, and the tool says so.
+"""
 UNLIKE: Final = 4.0
 """Two ratios disagree if they differ by more than this number of standard deviations."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of parameters: COUNT, distance per encoder count; UNITS, the motors' units per m/s.
 
-If the distance per count is found to be longer, the units per m/s become fewer in proportion.
+If a calibration increases the distance per count, it reduces the units per m/s in proportion.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """The balance of the two motors, which the driver measures during the drives.

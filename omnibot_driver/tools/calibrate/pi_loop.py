@@ -61,7 +61,10 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Ratio of a time constant written to the board to the time constant that results."""
+        """Ratio of the time constant that is written to the board to the one that takes effect.
+
+        The ratio differs from 1 because the board's control period is not the nominal one.
+        """
         return self.nominal_s / self.period_s
 
 

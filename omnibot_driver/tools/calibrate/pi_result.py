@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""The new gains are regarded as worse if they increase the error of a step by this factor."""
+"""The tool regards new gains as worse if they increase the error of a step by this factor."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,7 +50,7 @@ QUIET_S: Final = 0.5
 The board does not measure ticks while it sends, so it should send as rarely as possible.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
-"""Parameters that are restored after the wheels have been recorded."""
+"""Parameters that the tool restores after it has recorded the wheels."""
 
 Records = dict[str, list[Column]]
 """For each side (left or right), the times between ticks of each record, in s."""
@@ -181,7 +181,10 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant, with gain and dead zone from the speeds at full duty and at half duty."""
+    """Return the plant; its gain and its dead zone follow from the speeds at two duties.
+
+    ``found``: the fit to starts at full duty; ``free``: the measurement at half duty.
+    """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
         raise ToolError(

@@ -45,7 +45,7 @@ SENT: Final = np.arange(0.0, 1.0, 0.125)
 The time decides which ticks are noticed late, which changes the response too.
 """
 DISTURBED: Final = 0.02
-"""Additional overshoot that is allowed for a step during which the board sends ticks."""
+"""Overshoot that is allowed in addition to the goal if the board sends ticks during a step."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)

@@ -19,7 +19,11 @@ from omnibot_driver.tools.calibrate.log import Column, Imu, Log
 from omnibot_driver.tools.needs import ToolError
 
 BLOCK_S: Final = 1.0
-"""Length of a block, in s: noise is measured within blocks, drift between blocks."""
+"""Length of a block of readings, in s.
+
+The scatter of readings within a block shows the noise; the scatter of the means of blocks shows the
+drift.
+"""
 FEWEST: Final = 100
 LOST_PART: Final = 0.02
 

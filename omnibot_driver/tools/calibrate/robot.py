@@ -266,7 +266,10 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError if ``silence_s`` without commands exceeds the driver's timeout."""
+        """Raise ToolError if the time ``silence_s`` without a command is too long for the driver.
+
+        The driver stops the robot after its ``cmd_vel_timeout``.
+        """
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(
                 f"this program did not run for {silence_s:.1f} s, so the driver stopped the"

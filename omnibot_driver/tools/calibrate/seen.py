@@ -94,9 +94,10 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 
 
 def mirrored(signs: Sequence[int]) -> bool:
-    """Return whether these signs of the axes mirror the robot.
+    """Return whether these signs of the axes describe a mirror image of the robot.
 
-    Choosing another side of the robot as its front cannot cause such signs.
+    That is so if x · y is not the sign of yaw. If the user only regards another side of the robot
+    as its front, the signs describe no mirror image.
     """
     x, y, yaw = signs
     return x * y != yaw

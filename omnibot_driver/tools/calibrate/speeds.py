@@ -157,7 +157,11 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return each pose's coordinate along the body's axis ``axis``, taken at the mean heading."""
+    """Return how far each pose lies along the robot's axis ``axis``.
+
+    For x and y (0, 1), the axis has the direction that it has at the mean heading. For the yaw (2),
+    the result is the yaw itself.
+    """
     if axis == 2:
         return np.asarray(pose[:, 2])
     heading_rad = pose[:, 2].mean() + axis * np.pi / 2

@@ -38,7 +38,7 @@ ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
 """Range of corrections of an onset, in ticks: positive is earlier, negative later."""
 UNLIKE: Final = 3.0
-"""A step is rejected if its misfit is more than this many times the median misfit."""
+"""The tool rejects a step if its misfit is more than this many times the median misfit."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)

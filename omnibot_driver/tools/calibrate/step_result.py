@@ -11,14 +11,14 @@ from omnibot_driver.tools.calibrate.tuning import Behaviour, behaviour, better_g
 from omnibot_driver.tools.calibrate.wheel_loop import Gains
 
 UNLIKE_ONE: Final = 0.02
-"""`calibrate scale` is recommended if a wheel's gain differs from 1 by more than this."""
+"""The tool recommends `calibrate scale` if a wheel's gain differs from 1 by more than this."""
 QUANTUM_RADPS: Final = 0.05
 """Standard deviation, in rad/s, that quantisation causes in the rate of an odometry delta.
 
 Both the encoder and the protocol, with its unit of 0.1 mm, quantise a delta.
 """
 MANY: Final = 1.5
-"""The user is warned if the residuals exceed this multiple of ``QUANTUM_RADPS``.
+"""The tool warns the user if the residuals exceed this multiple of ``QUANTUM_RADPS``.
 
 On a computer that delayed commands the residuals were twice ``QUANTUM_RADPS``, and the fitted delay
 was 4 ms too long.

@@ -18,9 +18,12 @@ Column = NDArray[np.float64]
 
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
-"""Largest plausible relative error of a time between ticks; beyond it an edge was missed."""
+"""Largest plausible relative error of a time between ticks.
+
+A larger error shows that the board missed an edge.
+"""
 OUTLIER: Final = 4.5
-"""An edge is regarded as late if its time's error exceeds this number of standard deviations."""
+"""An edge is regarded as late if the error of its time exceeds this many standard deviations."""
 EXPLAINED: Final = 0.4
 """Least fraction of the variance that fitted marks must explain to be accepted.
 
@@ -45,11 +48,17 @@ class Marks:
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the index in ``steps`` of the step that caused ``off[0]``, a relative error."""
+        """Return the index in ``steps`` of the step with which a record begins.
+
+        ``off``: relative errors of the record's times between ticks.
+        """
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors of ``count`` successive times, from step ``first`` on."""
+        """Return the relative errors that the marks cause in ``count`` successive times.
+
+        ``first``: index in ``steps`` of the step that belongs to the first time.
+        """
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
 
@@ -79,7 +88,10 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the index of the step with which ``row`` begins, found by the best agreement."""
+    """Return the index in ``steps`` of the step with which ``row`` begins.
+
+    From this step on, ``row`` and ``steps`` agree best.
+    """
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
     turned = np.arange(marks)[:, None] + np.arange(marks)
@@ -87,7 +99,10 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return the median error of each step over all rows, shifted to a mean of zero."""
+    """Return the median error of each step over all rows, shifted to a mean of zero.
+
+    ``rows``: relative errors, by record; ``firsts``: the step with which each row begins.
+    """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]
     )

@@ -20,11 +20,15 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest fraction of a record's times that may be missing."""
 UNLIKE: Final = 1.5
-"""Largest ratio of a time to the median time; beyond it an edge was missed or came late."""
+"""Largest accepted ratio of a time to the median time.
+
+If the ratio is larger, the board missed an edge, or noticed it late.
+"""
 SMOOTHED: Final = 4
 """Number of ticks over which a speed is averaged.
 
-A displaced mark causes no larger error in a sum of intervals than in a single interval.
+A displaced mark changes the sum of several times by no more than a single time, so the relative
+error of the sum is smaller.
 """
 
 
@@ -69,9 +73,9 @@ class Levels:
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the corrections of an encoder's two levels, for a wheel that turns at constant duty.
 
-    The record must be made with corrections of 1. The two levels alternate; the one with the
-    shorter mean is the short level. After a missed edge the levels are assigned again. Raises
-    ToolError if the ticks are not regular.
+    The board must make the record while both corrections are 1. The two levels alternate; the level
+    with the shorter mean time is the short level. After a missed edge the levels are assigned
+    again. Raises ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

@@ -21,7 +21,7 @@ from omnibot_driver.tools.calibrate.whitening import correlation, whitener
 Column = NDArray[np.float64]
 
 SIGMA: Final = 0.1
-"""Relative noise of one time between ticks, until the positions of the marks are known."""
+"""Assumed relative noise of one time between ticks while the positions of the marks are unknown."""
 SHARPEST: Final = 0.002
 """Least relative noise of one time between ticks; the board reports times in steps of 0.1 ms."""
 SHORTEST_S: Final = 0.005
@@ -102,7 +102,10 @@ class Search:
         self._good = np.ones(len(self._measured), dtype=bool)
 
     def roughly(self) -> Column:
-        """Return first estimates of the values: second order, even marks, independent noise."""
+        """Return first estimates of all values.
+
+        They assume a plant of second order, evenly spaced marks, and independent noise.
+        """
         records = len(self._lengths)
         starts = []
         for total_s in STARTS_S:
@@ -123,9 +126,10 @@ class Search:
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return the relative difference of each time from that with evenly spaced marks.
+        """Return the relative difference of each time between ticks from that with even marks.
 
-        The result has a row for each record. A row is NaN for the distances beside a missed mark.
+        The result has a row for each record. If the board missed a mark, the row has NaN for the
+        distances before and after this mark.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -136,7 +140,10 @@ class Search:
         return found
 
     def find_missed(self, values: Column) -> bool:
-        """Find missed marks, and correct the counts; return whether the board missed any."""
+        """Find missed marks; return whether the board missed any.
+
+        From then on, the search counts a time with a missed mark as the time for two distances.
+        """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
             both = row + np.append(row[1:], 0.0)
@@ -162,7 +169,7 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """From now on, whiten all residuals by the correlation of the residuals at these values.
+        """From now on, whiten all residuals by the correlation that they have at these values.
 
         If the positions of the marks are not known, the marks cause the correlation; otherwise the
         changing load causes it.

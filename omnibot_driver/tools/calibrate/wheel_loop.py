@@ -43,7 +43,10 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A wheel's response: speed and effort at each tick, from the first tick that can show it."""
+    """A wheel's response: for each tick, its speed during the tick, and the effort computed in it.
+
+    The first tick is the first one whose control law uses the new command.
+    """
 
     speed: Array
     effort: Array
@@ -103,9 +106,9 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     decay = np.exp(-1.0 / lag)
 
     def way(share: float) -> float:
-        """Return the counts turned from rest after ``share`` ticks.
+        """Return how many counts the wheel turns from rest in a time of ``share`` ticks.
 
-        The effort is the one that finally turns the wheel by one count per tick.
+        The effort is constant. With this effort the wheel's final speed is one count per tick.
         """
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 

@@ -88,7 +88,7 @@ class View:
         return ""
 
     def missing(self, diagnostics: bool) -> list[str]:
-        """Return the topics that a driver in this state publishes, but that are not received."""
+        """Return the topics that the driver should publish in its state, but that are silent."""
         wanted = {
             "state": bool(self.state),
             "estop_active": self.estop is not None,
@@ -158,7 +158,10 @@ class Model:
         self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
 
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
-        """Store a message of ``cmd_vel``, which does not show that the driver runs."""
+        """Store a message of ``cmd_vel``.
+
+        Another node sends it, so it does not show that the driver runs.
+        """
         self._commanded = twist, now_s
 
     def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:

@@ -10,7 +10,10 @@ HISTORY_S: Final = 60
 
 
 class Rate:
-    """Counts arrivals since ``began_s``; times are in s, of one clock, and never decrease."""
+    """Counts messages since ``began_s``.
+
+    Times are in s, of one clock, and never decrease.
+    """
 
     def __init__(self, began_s: float) -> None:
         self._began_s = began_s

@@ -19,13 +19,17 @@ Most keyboards begin to repeat a held key after 0.25 s to 0.6 s.
 REPEAT_S: Final = 0.3
 """Time for which a repeated key moves the robot, in s; several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
-"""Time between two calls of ``command``, in s, that shows that the program was suspended; older
-keys are then discarded."""
+"""Time without a call of ``command``, in s, that shows that the program was suspended.
+
+After a suspension, older keys are discarded.
+"""
 DEAF_S: Final = 0.3
 """Time after a suspension, in s, in which keys do not steer, because earlier keys still arrive."""
 ZEROS: Final = 5
-"""Number of zero commands after a motion. Then nothing is published: other nodes may want to
-drive."""
+"""Number of zero commands after a motion.
+
+Then the monitor publishes nothing, because other nodes may want to drive.
+"""
 LEVELS: Final = 10
 NOTHING: Final = ("", -math.inf)
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)

@@ -81,7 +81,10 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """Return lines with their levels: one per status that is not OK, one for all OK statuses."""
+    """Return lines of text, each with its level.
+
+    Each status that is not OK has a line of its own; all OK statuses share one line.
+    """
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)

@@ -20,7 +20,7 @@ SILENT_S: Final = 2.0
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge states, e-stop and diagnostics, in this order."""
+    """Judge what the driver reported: states, e-stop and diagnostics, in this order."""
     yield from _states(log)
     yield from _estop(log)
     yield from _diagnostics(log)

@@ -56,7 +56,10 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """Return the names of the parameters that correct wrong speeds of a base with these wheels."""
+    """Return the parameter names of the linear and the angular scale that correct wrong speeds.
+
+    For two wheels they are the scales of the odometry, otherwise those of the commands.
+    """
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"
@@ -84,7 +87,10 @@ def wheel_name(joint: str) -> str:
 
 
 def shown(log: Log) -> list[Pair]:
-    """Return the pairs to show; if there are none, the measurements of odom."""
+    """Return the pairs of commands and measurements to show.
+
+    If the log has no commands, return one pair, with the measurements of odom.
+    """
     return pairs(log) or [twists(log)]
 
 
@@ -128,7 +134,10 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge the commands (valid, uninterrupted, followed), and motion without a command."""
+    """Judge the commands: whether they were valid, uninterrupted, and followed by the robot.
+
+    Also report motion without a command.
+    """
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(
             Level.NOTE,
@@ -164,8 +173,10 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
-    """Return the commanded and the measured speed of a wheel's rim in m/s, and the times of the
-    first pair's measurements in s."""
+    """Return the commanded and the measured speed of a wheel's rim in m/s, and their times in s.
+
+    The times are those of the first pair's measurements.
+    """
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
     times_s = found[0].measured.stamp_s
@@ -179,7 +190,11 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Return which times lie in, or shortly after, spans in which commands were not carried out."""
+    """Return which of these times lie in a span in which the driver did not carry out commands.
+
+    These are the spans with a state other than running, and those with a latched e-stop, each
+    extended by ``COMMAND_TIMEOUT_S``.
+    """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [
         Span(item.begin_s, item.end_s + COMMAND_TIMEOUT_S, "") for item in (*off, *log.latched)

@@ -40,8 +40,10 @@ class Series:
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
-        """Return the newest row at each of these times; zeros where it is older than the
-        timeout."""
+        """Return the newest row at each of these times.
+
+        A row that is older than the timeout is replaced by zeros.
+        """
         held = np.zeros((len(at_s), self.values.shape[1]))
         if len(self):
             newest = np.searchsorted(self.arrived_s, at_s, "right") - 1
@@ -52,7 +54,10 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A state and the time in which it held."""
+    """A span of time from ``begin_s`` to ``end_s``, and the state ``what`` during this time.
+
+    ``what`` is empty if the span is not that of a state.
+    """
 
     begin_s: float
     end_s: float

@@ -39,8 +39,10 @@ LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""Range of the axis of times, in multiples of their 99 % quantile; larger values are drawn at the
-edge of the range."""
+"""Largest value on the axis of a plot of times, as a multiple of their 99 % quantile.
+
+Larger values are drawn at the edge of the plot.
+"""
 
 
 def path(log: Log) -> Figure:

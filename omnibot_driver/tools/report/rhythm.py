@@ -137,7 +137,10 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 
 
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
-    """Return the gap from the last message to the end, or None if no more were expected."""
+    """Return the gap from the last message to the end of the log, or None.
+
+    Return None if this time is shorter than ``LONG_GAP_S``, or if the driver's state explains it.
+    """
     rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
         return None
@@ -155,7 +158,7 @@ def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
 
 
 def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
-    """Judge rate, steps, gaps and arrival."""
+    """Judge the timing of a stream: its rate, uneven timestamps, gaps, and delays of arrival."""
     stream = stream.promised(log)
     rhythm = measure(log, series, stream)
     unstamped = int(np.isnan(series.stamp_s).sum())
@@ -288,9 +291,11 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 
 
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
-    """Return the growth of this robot's counts in /diagnostics; None where they are not reported.
+    """Return by how much this robot's counts ``keys`` in /diagnostics grew; None if not known.
 
-    If a count falls, another driver has begun to count at zero, and its count is added.
+    The growth is not known if the log has too few of these counts, or if several robots share
+    /diagnostics. If a count falls, another driver has begun to count at zero, and its count is
+    added.
     """
     if not log.alone:
         return None

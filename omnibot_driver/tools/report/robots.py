@@ -33,7 +33,11 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return, for each possible role of ``topic``, the namespace and whether ``kind`` fits."""
+    """Return a namespace, and whether the topic fits, for each role that the topic's name allows.
+
+    The topic fits if the role uses the message type ``kind``. A topic in the namespace of a
+    driver's node fits only if the node is in ``drivers``.
+    """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
         if topic.endswith(f"/{role}"):

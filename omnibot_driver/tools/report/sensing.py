@@ -34,10 +34,10 @@ LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
-"""Fraction of an odometry step for which gyro data is needed to compare gyro and odometry."""
+"""Fraction of an odometry step that gyro readings must cover, so that both can be compared."""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
-"""Frequency in Hz below which a vibration is regarded as caused by driving."""
+"""Frequency, in Hz, up to which the report regards a vibration as caused by driving."""
 SEGMENT: Final = 256
 
 
@@ -49,7 +49,10 @@ def rate_hz(imu: Series) -> float:
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """Return which readings are at rest, by odometry or, without it, by blocks of IMU readings."""
+    """Return at which readings the robot was at rest.
+
+    The odometry decides this or, if there is none, blocks of IMU readings.
+    """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
         unheard = np.diff(odom.stamp_s) > SHORT_GAP_S
@@ -99,7 +102,7 @@ def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge invalid numbers, stuck values, rest, turns and vibration."""
+    """Judge the IMU: invalid numbers, stuck values, readings at rest, turns, and vibration."""
     broken = int((~log.imu.finite).sum())
     if broken:
         yield Finding(
@@ -199,9 +202,10 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 
 
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
-    """Return the ratio of gyro z to the odometry's yaw, and the angle turned in all, in rad.
+    """Return the ratio of turns by gyro to turns by odometry, and the whole angle turned, in rad.
 
-    Only steps in which both gyro and odometry were received are evaluated.
+    The whole angle is the sum of the sizes of all turns by odometry. Only steps in which both gyro
+    and odometry were received count.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

@@ -27,7 +27,7 @@ SHORT_GAP_S: Final = 0.1
 
 
 def moving(odom: Series) -> Mask:
-    """Return a mask of the messages at which the robot moved, by their twists."""
+    """Return a mask of the messages whose twist shows that the robot moved."""
     return np.asarray((np.abs(odom.values[:, 3:]) > MOVING).any(axis=1))
 
 
@@ -49,7 +49,10 @@ class Steps:
 
 
 def steps(odom: Series) -> Steps:
-    """Return the steps between at least two finite messages."""
+    """Return the steps between successive messages.
+
+    ``odom`` must have at least two messages, all finite.
+    """
     steps_s = np.diff(odom.stamp_s)
     x, y, yaw = odom.values[:, :3].T
     turned = np.remainder(np.diff(yaw) + np.pi, 2 * np.pi) - np.pi

@@ -29,7 +29,10 @@ def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Drive
 
 @contextmanager
 def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command ``vx`` and ``yaw`` at 10 Hz in the context, which begins when the robot moves."""
+    """Command ``vx`` and ``yaw`` at 10 Hz until the context ends.
+
+    The context begins when the robot moves.
+    """
     with probe.commanding(vx, yaw):
         robot.wait_until(lambda board: not board.standing)
         yield

@@ -88,7 +88,10 @@ def test_its_sensors_are_published(
 
 
 def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: Probe) -> None:
-    """The real parameter ``tof_maximum`` accepts the integer 2, as ``ros2 param set`` sends it."""
+    """The parameter ``tof_maximum`` is a real number, but also accepts the integer 2.
+
+    ``ros2 param set`` sends 2 as an integer.
+    """
     ranges = probe.listen(Range, "range/tof")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=2)
     changes = [Parameter(name="tof_maximum", value=whole)]

@@ -23,9 +23,9 @@ Start = Callable[..., Any]
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """The driver stops the connected half of the Fejemis, and the other half after its return.
+    """The driver stops the half of the Fejemis that is still connected.
 
-    The brush is switched off, and stays off.
+    When the other half is plugged in again, the driver stops it, too. The brush stays off.
     """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fixtures: a driver with a simulated LOIS ECU that behaves as documented, or as its firmware."""
+"""Fixtures: a driver, and a simulated LOIS ECU with the documented or the real behaviour."""
 
 from collections.abc import Callable
 from contextlib import ExitStack

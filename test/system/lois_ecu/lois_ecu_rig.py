@@ -57,7 +57,10 @@ def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
 
 @contextmanager
 def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command ``vx`` and ``yaw`` at 10 Hz in the context, which begins when the robot moves."""
+    """Command ``vx`` and ``yaw`` at 10 Hz until the context ends.
+
+    The context begins when the robot moves.
+    """
     with probe.commanding(vx, yaw):
         ecu.wait_for(lambda board: not board.standing)
         yield

@@ -83,7 +83,7 @@ def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     ecu: Ecu, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """If a signal ends or suspends the driver, the driver's exit or the guard stops the robot."""
+    """If a signal ends or suspends the driver, the driver or its guard stops the robot."""
     with driven(probe, ecu):
         driver.process.send_signal(number)
         ecu.stands_for_good()
@@ -117,7 +117,10 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """After a restart of the board the driver writes the low-pass again, and odometry continues."""
+    """After a restart of the board the driver writes the setting of the low-pass filter again.
+
+    The pose in odom continues from its value before the restart.
+    """
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.4)
@@ -134,7 +137,10 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 
 
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
-    """A reset sets the ticks of the wheels to 0; the robot drives again, and odometry continues."""
+    """A reset sets the ticks of the wheels to 0, but the pose in odom continues.
+
+    After the reset the robot drives again.
+    """
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.6)

@@ -39,7 +39,7 @@ def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
 def test_gps_time_and_heading_are_published_where_the_board_tells_them(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The compass shows east, and a declination of 0.1 rad gives a heading of -0.1 rad in ENU.
+    """If the compass shows east at a declination of 0.1 rad, the heading is -0.1 rad in ENU.
 
     Position and time of the GPS receiver are published, too.
     """
@@ -95,7 +95,8 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 ) -> None:
     """The driver refuses a duty that was sent while the driver was stalled.
 
-    The refusal does not depend on the sender's clock, which is unknown at a first message.
+    The refusal does not depend on the sender's clock. When the first message of a sender arrives,
+    the driver does not know this clock yet.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")
@@ -139,7 +140,10 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 
 
 def recorded(robot: Any) -> Path:
-    """Record while driving, and return the path; retry if a busy computer stopped the robot."""
+    """Record while the robot drives; return the path of the record.
+
+    If a busy computer stopped the robot, try again.
+    """
     for _ in range(10):
         try:
             return Path(robot.record("record_rpm", "wheel_cmd", [3.0, 3.0]))
@@ -154,7 +158,7 @@ def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
 ) -> None:
     """The file has the ticks of both wheels, and the robot is at rest after the record.
 
-    The tool shows a refusal by the driver unchanged.
+    If the driver refuses a record, the tool reports the driver's reason.
     """
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(

@@ -67,7 +67,10 @@ class Mart:
         assert not self.do(lambda board: board.server.hung)
 
     def answer(self, probe: Probe, service: str) -> Any:
-        """Call the service, again each second while it is refused; return the last answer."""
+        """Call the service each second until the driver does not refuse it.
+
+        Return the last answer.
+        """
         for _ in range(round(PATIENCE_S)):
             done = probe.call(Trigger, service)
             if "refused" not in done.message:
@@ -90,7 +93,10 @@ def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[None]:
-    """Command a velocity at 10 Hz in the context, which begins when the robot moves."""
+    """Command a velocity at 10 Hz until the context ends.
+
+    The context begins when the robot moves.
+    """
     with probe.commanding(vx, yaw_rate):
         mart.wait_for(lambda board: board.server.chassis.moving)
         yield
@@ -134,7 +140,10 @@ def test_a_download_that_cannot_be_saved_ends_with_the_reason(
 
 
 def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
-    """The e-stop ends each kind of motion by its own stop command, and the server still answers."""
+    """The e-stop ends each kind of motion by the stop command for this kind.
+
+    Afterwards the MART server still answers.
+    """
     for motion in MOTIONS.values():
         with driven(probe, mart, *motion):
             assert probe.call(SetBool, "estop", data=True).success
@@ -148,7 +157,7 @@ def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
 def test_whatever_ends_the_driver_stops_each_motion(
     mart: Mart, driver: Driver, probe: Probe, motion: str, number: signal.Signals
 ) -> None:
-    """When the driver ends, its exit or the guard stops the robot by the motion's stop command."""
+    """When a signal ends the driver, the driver or its guard sends the motion's stop command."""
     with driven(probe, mart, *MOTIONS[motion]):
         driver.process.send_signal(number)
         mart.stands_for_good()
@@ -158,7 +167,10 @@ def test_whatever_ends_the_driver_stops_each_motion(
 def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
     mart: Mart, driver: Driver, probe: Probe, word: str
 ) -> None:
-    """The guard stops the robot if the driver is killed during a command or a controlled move."""
+    """The guard stops the robot if the driver is killed just after it has sent a motion.
+
+    The motion is a velocity or a controlled move. The server has not replied yet.
+    """
     if word == "TF":
         goal = PoseStamped()
         goal.header.frame_id = "odom"
@@ -212,7 +224,8 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 ) -> None:
     """New values of ``range_maximum`` and ``dock_distance`` take effect while the driver runs.
 
-    An integer is accepted for a real number. For a distance of 0.1 m the driver requests 2 inches.
+    An integer is accepted for a real number. For a distance of 0.1 m the driver requests 2 inches,
+    because the robot may drive 1.6 times as far as requested.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)

@@ -84,9 +84,9 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """The fit finds the places of the marks, and so reduces noise of 10 % to less than 1 %.
+    """The fit finds the places of the marks, which change the times between ticks by 10 %.
 
-    The remaining noise is the rounding of the clock.
+    With these places the remaining error is less than 1 %; it comes from the rounding of the clock.
     """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
@@ -174,7 +174,10 @@ def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plan
 
 
 def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
-    """Sending after the end of a step does not change the response; sending during it does."""
+    """If the board sends its ticks after the end of a step, the response does not change.
+
+    If the board sends them during the step, the response changes.
+    """
     loop, gains = replace(LOOP, sends_each_s=100.0), PiGains(0.8, 0.6, 0.1)
     calm = answer(PLANT, gains, loop, 31.0, 3.0)
     late = answer(PLANT, gains, loop, 31.0, 3.0, sent_s=np.arange(50.0, 49.9, -0.01))
@@ -206,7 +209,7 @@ def test_a_phase_margin_is_that_of_the_open_loop() -> None:
 
 
 def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
-    """A dead time of 40 ms is found within 11 ms from the response to a step."""
+    """The fit finds a dead time of 40 ms in the response to a step, within 11 ms."""
     gains = tune(PLANT, LOOP, Goals()).gains
     dead_s = 0.04
     rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0, begun=0.6)
@@ -258,7 +261,7 @@ def test_a_step_is_predicted_as_the_simulated_board_makes_it(
 
 
 def test_traits_of_an_answer_are_read_off_it() -> None:
-    """The overshoot and the settling time of a decaying oscillation are found."""
+    """The function ``traits`` finds overshoot and settling time of a decaying oscillation."""
     times_s = np.arange(0.0, 4.0, 1e-3)
     rpm = 40.0 * (1 - np.exp(-3 * times_s) * np.cos(6 * times_s))
     found = traits(rpm, 40.0, 0.05)
@@ -268,9 +271,10 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 
 
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
-    """A record of times that have overflowed is refused.
+    """The tool refuses a record whose times have overflowed.
 
-    In the unit of 100 ns, which the manual gives, the time of a tick of a usual wheel overflows.
+    The manual gives 100 ns as the unit of these times. In this unit, the time between two ticks of
+    a usual wheel exceeds the largest number that a record can have.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
@@ -324,7 +328,7 @@ def test_a_robot_is_calibrated_from_its_records(
 
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
-    """With slow gains the predicted control error of a step is larger than with tuned gains."""
+    """The predicted control error of a step is larger with slow gains than with tuned gains."""
     good = tune(PLANT, LOOP, Goals()).gains
     slow = PiGains(0.05, 2.0, 1.0)
     assert told(PLANT, slow, LOOP, Goals()).error_s > told(PLANT, good, LOOP, Goals()).error_s
