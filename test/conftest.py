@@ -84,7 +84,7 @@ def driver_threads() -> list[str]:
 
 @pytest.fixture
 def terminal() -> Iterator[Terminal]:
-    """Yield a terminal, closed before ``nothing_left_behind`` looks for open descriptors."""
+    """Yield a terminal; close it before ``nothing_left_behind`` looks for open descriptors."""
     terminal = Terminal()
     yield terminal
     terminal.close()

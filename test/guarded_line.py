@@ -86,7 +86,7 @@ def status_of(pid: int, field: str) -> str:
 
 
 def alive(keeper: Keeper, seconds: float) -> float:
-    """Send heartbeats for ``seconds`` at the driver's pace; return the longest pause, in s."""
+    """Send heartbeats for ``seconds`` at the driver's rate; return their longest interval in s."""
     begun_s = beaten_s = time.monotonic()
     longest_s = 0.0
     while (now := time.monotonic()) < begun_s + seconds:
@@ -97,7 +97,7 @@ def alive(keeper: Keeper, seconds: float) -> float:
 
 
 def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
-    """Send heartbeats at the driver's pace until ``predicate`` holds; return all messages."""
+    """Send heartbeats at the driver's rate until ``predicate`` holds; return the log messages."""
     told, end = "", time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end
@@ -107,6 +107,6 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
 
 
 def replaced(line: Line, guard: int) -> bool:
-    """Return whether the guard with this process id was reaped and another guard runs."""
+    """Return whether the guard with this process id is gone, and another guard runs."""
     found = line.children()
     return bool(found) and guard not in found

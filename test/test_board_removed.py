@@ -18,7 +18,7 @@ REMAINS: Final = (
     "test/system/test_driver_toys.py::test_a_toy_drives_and_is_heard[line_board]",
     "test/transports/test_simulated.py",
 )
-"""One test each of the remaining boards, of the complete driver, and of the built-in simulators."""
+"""Tests to run: one of the remaining boards, one of the complete driver, and one of ``sim://``."""
 IMPORT_AND_TEST: Final = """
 import importlib, pkgutil, sys
 import pytest
@@ -35,7 +35,7 @@ sys.exit(pytest.main(sys.argv[1:]))
 def test_without_the_folders_of_one_board_the_tests_of_the_rest_are_green(
     board: str, tmp_path: Path
 ) -> None:
-    """In a copy without one board's folders, all other modules are imported, and tests pass."""
+    """In a copy without one board's folders, all other modules can be imported, and tests pass."""
     ignored = shutil.ignore_patterns(board, f"{board}.py", f"{board}_*.py", "__pycache__")
     for folder in ("omnibot_driver", "test"):
         shutil.copytree(HOME / folder, tmp_path / folder, ignore=ignored)

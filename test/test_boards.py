@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Profiles: each connects a kind of board to the rest of the driver."""
+"""Tests of the profiles; a profile connects one kind of board to the rest of the driver."""
 
 import ast
 import re
@@ -50,7 +50,7 @@ def imported(path: Path) -> set[str]:
     ids=lambda path: str(path.relative_to(PACKAGE)),
 )
 def test_common_code_imports_no_board(path: Path) -> None:
-    """Session, link, node and all other common code use only what the profile made."""
+    """Session, link, node and all other common code import no module of a particular board."""
     known = {
         f"omnibot_driver.{place}.{name}" for place in ("core", "boards") for name in boards.PROFILES
     }
@@ -86,7 +86,7 @@ def test_an_unknown_board_is_refused_with_the_names_of_the_known_ones(wrong: obj
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_has_a_table_of_its_own(name: str) -> None:
-    """Each profile's parameter names are unique, and ``board`` can only have the profile's name."""
+    """In a profile's table, names are unique, and ``board`` can only have the profile's name."""
     table = boards.load(name).PARAMETERS
     assert sum(map(len, table.sections.values())) == len(table.rows)
     assert (table.board, table.by_name["board"].choices) == (name, (name,))
@@ -124,9 +124,9 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """A board's table has the common rows that fit its abilities, with the board's defaults.
+    """A board's table has the common parameters that the board can use, with its own defaults.
 
-    The table also has the board's own rows.
+    The table also has the parameters that only this board has.
     """
     own = table(
         "few",
@@ -155,13 +155,13 @@ def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
 
 @pytest.mark.parametrize("name", ["guard", "port", "on_exit", "auto_gyro_bias", "max_linear_speed"])
 def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
-    """A profile cannot drop a row that the driver reads; the error lists which rows it can drop."""
+    """A profile cannot omit a parameter that the driver needs; the error lists what it can omit."""
     with pytest.raises(ValueError, match=f"few must not lack {name}, .* may only lack axis_signs"):
         table("few", FEW, without=("baudrate", name))
 
 
 def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
-    """Only boards and tools index a parameter that a board may lack; other code uses a default."""
+    """Common code reads a parameter that a board may lack with a default, never by indexing."""
     indexed = {
         node.slice.value
         for path in PACKAGE.rglob("*.py")

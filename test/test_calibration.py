@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calibration file: written completely or not at all, keeping other names in it."""
+"""The calibration file: a save is complete or changes nothing, and keeps other names in it."""
 
 import stat
 from pathlib import Path

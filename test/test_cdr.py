@@ -53,7 +53,7 @@ def message_name(message: object) -> str:
 
 @st.composite
 def settings(draw: st.DrawFn) -> MessageSettings:
-    """Draw settings with any noise, and frame names of any length so that all alignments occur."""
+    """Draw settings: any noise, and frame names of any length, which give every alignment."""
     values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
@@ -61,7 +61,7 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 
 
 def padded(data: bytes, like: bytes) -> bytes:
-    """Return ``data`` with padding as in ``like``, since rclpy may leave anything there.
+    """Return ``data`` with the padding of ``like``; rclpy may leave any bytes there.
 
     Padding is the bytes after a string's NUL up to the next multiple of eight.
     """
@@ -95,7 +95,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
 
 
 def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
-    """Both wheels of a differential drive, of 0.1 m radius, turn by 10 rad for 1 m forward."""
+    """For 1 m forward, both wheels of a differential drive (radius 0.1 m) turn by 10 rad."""
     two = replace(
         MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS)),
         wheels=DifferentialKinematics(wheel_radius_m=0.1, track_m=0.4),
@@ -129,7 +129,10 @@ def test_no_frame_length_is_refused_at_start(length: int) -> None:
 def test_a_difference_is_found_at_start(
     monkeypatch: pytest.MonkeyPatch, name: str, wrong: object, strange: str
 ) -> None:
-    """The constant parts of messages are checked at the start; another test has varying values."""
+    """At its start the driver compares the constant parts of messages with those of rclpy.
+
+    Another test compares messages with varying values.
+    """
     monkeypatch.setattr(cdr, name, wrong)
     chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     assert difference(chosen) == strange

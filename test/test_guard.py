@@ -56,7 +56,7 @@ def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
-    """When heartbeats are missing, the guard stops the robot, and again at the next silence."""
+    """When heartbeats are missing, the guard sends stops until they return; then it waits again."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"so far: ")
@@ -72,7 +72,7 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
     """Changed stop bytes are used by this guard and the next one.
 
-    Which bytes stop a board may depend on the board's current state.
+    The bytes that stop a board may depend on its current state.
     """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
@@ -104,7 +104,7 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 
 
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
-    """A guard with a dead port ends by itself, so the driver does not wait for the guard."""
+    """A guard whose port has failed ends by itself, so that the driver need not wait for it."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     process = keeper._process
     assert process is not None
@@ -115,7 +115,10 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """A guard ignores signals that are meant for the driver; ctrl-C does not reach its session."""
+    """A guard ignores signals that are meant for the driver.
+
+    It has its own session, so ctrl-C in the driver's terminal does not reach it.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     assert os.getsid(pid) == pid
@@ -129,9 +132,9 @@ def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
 def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
     line: Line, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A user may run ``pkill -9 -f omnibot_driver`` while the robot drives.
+    """``pkill -9 -f omnibot_driver`` kills the driver, but not its guard.
 
-    The path of a clone with its .venv contains that name too.
+    The guard's command line has no "omnibot", even if the path of the interpreter contains it.
     """
     interpreter = tmp_path / "omnibot_driver" / ".venv" / "bin" / "python"
     interpreter.parent.mkdir(parents=True)
@@ -173,7 +176,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """Each line gets its own stop bytes, even if another line is gone."""
+    """The guard writes to each line its own stop bytes, even if another line is gone."""
     other = Line()
     try:
         words = ((0, b"drive stands"), (1, b"front stands"))
@@ -188,9 +191,9 @@ def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line
 
 
 def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
-    """Each stop is a datagram.
+    """The guard sends each stop as a datagram.
 
-    The guard survives lost datagrams, so that a late host is stopped.
+    It continues after the error for an absent host, so a host that starts late is stopped, too.
     """
     host = socket.socket(type=socket.SOCK_DGRAM)
     host.bind(("127.0.0.1", 0))
@@ -210,7 +213,7 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """The guard writes the newest stop bytes, which are in its pipe before the driver ends."""
+    """If stop bytes are replaced just before the driver ends, the guard writes the new ones."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):
@@ -220,7 +223,10 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """Stop bytes may contain the letter of a latched heartbeat; a read may cut their line."""
+    """The guard separates heartbeats and stop bytes correctly, however reads cut the data.
+
+    Stop bytes may contain the letter that means a heartbeat with a latched e-stop.
+    """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")
     assert guard.parted(b".=3:be") == (b".", b"", b"=3:be")

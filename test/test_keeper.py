@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Guards that die, hang, or cannot be started: the driver replaces them and never waits."""
+"""Guards that end, hang, or cannot be started: the driver replaces them without waiting."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """A guard that reads nothing is replaced, because it would write outdated stop bytes."""
+    """The driver replaces a guard that reads nothing: it would later write outdated stop bytes."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGSTOP)
@@ -40,7 +40,7 @@ def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
-    """A guard that dies is replaced by one that works; a second death is not reported again."""
+    """The driver replaces a guard process that ends early; it reports only the first such end."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
@@ -70,7 +70,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
-    """A hung guard, which would not stop the robot, is replaced before the guard's pipe is full."""
+    """The driver replaces a guard that hangs before the guard's pipe is full of heartbeats."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     started(first)
@@ -87,9 +87,9 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A guard that does not die is replaced at once and reaped later.
+    """The driver at once replaces a guard that cannot be killed, and reaps it later.
 
-    A process in uninterruptible sleep behaves like this guard.
+    A process in uninterruptible sleep cannot be killed.
     """
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -113,7 +113,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 
 
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The number of guards that cannot be killed is limited, since more guards would not help."""
+    """The driver starts no more guards when a certain number of them cannot be killed."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:

@@ -13,7 +13,7 @@ from omnibot_driver.kernel_counts import TIOCGICOUNT, overruns, waited_s
 
 
 def test_a_pseudo_terminal_counts_no_overruns() -> None:
-    """A pseudo-terminal has no overruns, because its writer waits instead."""
+    """A pseudo-terminal counts no overruns: if its buffer is full, the writing program waits."""
     ours, theirs = os.openpty()
     try:
         assert overruns(theirs) is None

@@ -58,9 +58,9 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard gets heartbeats at a fixed rate, although the pacer runs at each repeated command.
+    """The guard gets heartbeats at a fixed rate, although the pacer runs more often.
 
-    Unread heartbeats must show for how long a guard hangs.
+    The driver recognizes a guard that hangs by the number of its unread heartbeats.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")

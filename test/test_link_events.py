@@ -99,7 +99,10 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """A refusal is delivered after its cause, so that the log shows the reason first."""
+    """The notice of a refused command leaves after the event that caused the refusal.
+
+    The log therefore shows the reason first.
+    """
     listener, ours = Listener(), session()
     link = link_to(
         board.path, listener, ours, refused=lambda text: listener.deliver([Notice(text)])

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A link whose port accepts no more data: Stop is written first when the port does so again."""
+"""A link whose port accepts no data for a while: afterwards the link writes Stop first."""
 
 import os
 import threading
@@ -48,7 +48,7 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
 
 
 def at_rest(terminal: Terminal) -> tuple[Link, Session]:
-    """Return a link that has opened this port and sends nothing more to the board."""
+    """Return a link that has opened this port; it will write nothing to the board by itself."""
     ours = session(run=False)
     link = link_to(terminal.path, Listener(), ours)
     link.start()

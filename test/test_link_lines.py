@@ -69,7 +69,7 @@ def command(link: Link) -> None:
 
 
 class Lines:
-    """Both lines of a board without a simulator, and a link to them."""
+    """Pseudo-terminals in place of a board with two lines, and a link to them."""
 
     def __init__(self, folder: Path, board: LineBoard | None = None) -> None:
         self.drive, self.sense = Terminal(), Terminal()
@@ -84,7 +84,7 @@ class Lines:
         self.name.symlink_to(self.sense.path)
 
     def say_that_it_stands(self) -> None:
-        """Report a standstill once the line is open, because data sent before is dropped."""
+        """Send a report of standstill when the line is open; earlier data would be lost."""
         self.listener.wait_for(lambda: self.listener.reports[-1:] == [None])
         os.write(self.sense.far, b"d 0 0\n")
         self.come_to_state("nominal")
@@ -196,7 +196,7 @@ def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> No
 
 
 def ends_at_rest() -> bool:
-    """Close the link of a driving robot; return whether the robot was proved to be at rest."""
+    """Close the link of a driving robot; return whether odometry showed the robot at rest."""
     with ServedBoard(LineRobot()) as robot:
         lines = [partial(SerialPort, path, 115200) for path in robot.addresses]
         listener, ours = Listener(), session_of(LineBoard())

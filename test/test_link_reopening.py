@@ -34,9 +34,9 @@ def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
 def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each wait before an attempt to open the port is 1.5 times the one before, up to a limit.
+    """Before each attempt to open the port, the link waits 1.5 times as long, up to a limit.
 
-    The limit keeps the wait for a board short.
+    Because of the limit, a board that is plugged in late is found soon.
     """
 
     class Timed(Listener):

@@ -74,7 +74,10 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 
 
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A suspended host stops the robot, though by the steady clock no heartbeat is missing."""
+    """After a suspension of the host, the driver stops the robot.
+
+    By the steady clock, which does not count the suspension, no heartbeat is missing.
+    """
     suspended_s = 0.0
     monkeypatch.setattr(
         "omnibot_driver.shared_session.boot_time_s",

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Values to ROS messages: the place of each number, by REP-103, REP-105 and REP-145."""
+"""The conversion of values to ROS messages puts each number where the REPs require it.
+
+The rules are in REP-103, REP-105 and REP-145.
+"""
 
 import math
 
@@ -41,7 +44,7 @@ def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, ag
 
 
 def test_a_zero_stamp_is_not_a_stamp() -> None:
-    """A command without a stamp is as old as its message."""
+    """A zero stamp means that a command has no stamp, so its age is 0."""
     assert messages.age(Time(), 1_700_000_000 * 10**9) == 0.0
 
 
@@ -95,7 +98,7 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """Slow readings of the clocks do not change the offset; a step of a clock changes it."""
+    """A delay between the readings of two clocks does not change their offset; a step does."""
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
     assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset
@@ -212,7 +215,7 @@ def test_joints_whose_rate_is_not_known_have_none() -> None:
 
 
 def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
-    """Each distance is divided by the wheel radius at its time.
+    """The driver divides each new distance by the current wheel radius.
 
     A new radius alone turns no joint.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Deliveries of several threads: in order, one at a time, and without waits for other threads."""
+"""The outbox: threads deliver events in order, one at a time, without waiting for each other."""
 
 import random
 import threading
@@ -87,7 +87,7 @@ def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed:
 
 
 def test_nobody_claims_what_is_not_next() -> None:
-    """No thread may claim a delivery while another thread delivers or other events wait."""
+    """A thread gets the right to deliver only if no other thread delivers and no event waits."""
     outbox = Outbox()
     held = Held(outbox)
     assert not outbox.claim()

@@ -45,7 +45,7 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
 
 
 def test_output_that_is_not_read_does_not_block_the_program() -> None:
-    """Unread output does not block the program, even if it exceeds all buffers up to the reader."""
+    """Unread output does not block the program, even if there is more than all buffers can hold."""
     program = """
 import contextlib, os
 from omnibot_driver.output import UnblockedOutput

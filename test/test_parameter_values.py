@@ -113,7 +113,7 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
     ],
 )
 def test_types_are_told_in_the_words_of_ros(name: str, wrong: object, words: str) -> None:
-    """Types have the names of ``ros2 param describe``; a message explains how YAML reads ``no``."""
+    """Messages name types as ``ros2 param describe`` does, and explain how YAML reads ``no``."""
     with pytest.raises(ParameterError) as caught:
         PARAMETERS.by_name[name].check(wrong)
     message = str(caught.value)
@@ -235,7 +235,9 @@ def test_a_wrong_list_is_refused_with_what_it_may_be(
 
 
 def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
-    """A value that the board keeps is None until it is given; its default only gives the type.
+    """A parameter that the board stores is None until the user gives it.
+
+    Its default only gives the type.
 
     None is refused for other parameters.
     """

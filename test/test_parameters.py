@@ -73,7 +73,7 @@ DIMENSIONLESS = {
     "left_short_correction", "low_pass", "motor_balance", "right_feed_forward", "right_kp",
     "right_long_correction", "right_short_correction", "steering_gains",
 }  # fmt: skip
-"""Parameters whose numbers have no unit, or have items with different units."""
+"""Parameters without a unit: pure numbers, and lists whose items have different units."""
 
 
 def name_of(parameter: object) -> str | None:
@@ -120,7 +120,7 @@ def test_tuning_may_change_while_it_runs(name: str) -> None:
 
 
 def test_what_is_not_given_is_the_default() -> None:
-    """A parameter that is not given has its default; a given value is used."""
+    """A parameter has its default value unless the user gives another."""
     assert check_all({}) == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     values = check_all({"max_linear_speed": 1, "port": "/dev/ttyACM3"})
     assert values["max_linear_speed"] == 1.0
@@ -181,7 +181,10 @@ def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_contro
 
 
 def test_values_reach_the_core_under_their_meaning() -> None:
-    """Every parameter differs from its default, so the test finds one in a wrong setting."""
+    """The value of each parameter arrives in the setting that has the same meaning.
+
+    All values differ from their defaults, so the test would find one in the wrong place.
+    """
     values = check_all(
         {
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",

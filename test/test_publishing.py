@@ -48,7 +48,7 @@ def node() -> Iterator[Node]:
 
 
 def session_with(node: Node) -> tuple[Session, Publishing]:
-    """Return a session that receives only what the test gives it, and the session's publishing."""
+    """Return a session, to which only the test gives data, and the publishing of its results."""
     session = Session(
         omnibot.make(VALUES),
         parameters.session_settings(VALUES, omnibot.kinematics(VALUES)),
@@ -64,7 +64,7 @@ def session_with(node: Node) -> tuple[Session, Publishing]:
 
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:
-    """No publisher has event handlers: they cost time, because the executor checks each one."""
+    """No publisher has event handlers, because the executor would spend time on each of them."""
     script = (
         "import rclpy\n"
         "from omnibot_driver.node import OmniBotDriver\n"
@@ -110,7 +110,7 @@ def test_stamps_follow_simulated_time_while_there_is_any(
 def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stamps increase even between two steps of the simulated clock; a jump back is followed."""
+    """Stamps increase even between two steps of the simulated clock, and follow its jump back."""
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
     stamps_ns: dict[str, list[int]] = {"_imu": [], "_odometry": []}

@@ -68,7 +68,7 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """Lines come back as the board's channels, whatever the topics' names.
+    """A replay gives the bytes of each recorded line as those of the right channel of the board.
 
     The topic of one line selects the robot.
     """
@@ -163,7 +163,7 @@ def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> Non
 
 
 def test_only_its_own_urls_are_taken() -> None:
-    """Only URLs with ``replay:`` are recordings; a device may have any other name."""
+    """Only URLs that begin with ``replay:`` are recordings; any other name may be a device."""
     assert is_recording("replay://x")
     assert not is_recording("/dev/replay")
     assert not is_recording("sim://")

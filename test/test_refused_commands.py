@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands that are refused before they reach the motion interlock, after it has tripped."""
+"""After a stop by the motion monitor: commands that the session refuses for other reasons."""
 
 import math
 from collections.abc import Callable

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A recorded line, replayed: the same result every time, at any speed, and as when recorded."""
+"""Replays of a recorded line give the same result every time, at any speed.
+
+It is also the result that the session had during the recording.
+"""
 
 import itertools
 import math
@@ -83,7 +86,7 @@ def play(tape: Tape) -> Heard:
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:
-    """Return a moving board's bytes with their times, without those of the ``silent`` ticks."""
+    """Return the bytes of a moving board, with times; the ``silent`` ticks are left out."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     board.receive(bytes.fromhex("FF FE 01 00 0E 00 07 00 32"))
     found = []
@@ -163,7 +166,7 @@ def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
 
 
 def test_stamps_are_times_of_the_recording() -> None:
-    """The stamps begin with the first bytes and continue with the board's ticks."""
+    """Stamps begin at the recorded time of the first bytes and continue with the board's ticks."""
     heard = play(Tape(simulated(300)))
     stamps = [event.stamp_s for event in heard.events if isinstance(event, ImuEstimate)]
     assert len(stamps) == 300
@@ -185,7 +188,7 @@ def test_a_recording_can_be_left_before_its_end() -> None:
 
 
 def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
-    """A request that is open at the recording's end is answered.
+    """At the end of the recording, a request that still waits is answered.
 
     Later requests find the port closed.
     """

@@ -11,7 +11,7 @@ from omnibot_driver import selfcheck
 
 
 def adapter(root: Path, device: str, latency: str) -> Path:
-    """Create a copy of sysfs with one adapter in this folder; return the root of the copy."""
+    """Create an imitation of sysfs with one adapter in this folder; return its root."""
     folder = root / "class/tty" / device / "device"
     folder.mkdir(parents=True)
     (folder / "latency_timer").write_text(latency)
@@ -19,7 +19,7 @@ def adapter(root: Path, device: str, latency: str) -> Path:
 
 
 def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) -> None:
-    """The message for FTDI's default has a permanent remedy and one that lasts until unplugging."""
+    """For the default timer of FTDI, the message has a permanent remedy and a temporary one."""
     text = selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", "16\n"))
     assert "16 ms" in text
     assert "udev/99-omnibot.rules" in text
@@ -39,7 +39,7 @@ def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("latency", ["1\n", "5\n", "", "soon\n"])
 def test_a_short_timer_or_one_that_says_nothing_is_left_alone(tmp_path: Path, latency: str) -> None:
-    """A short latency timer, or one without a readable value, leads to no message."""
+    """The check gives no message for a short latency timer or one whose value is unreadable."""
     assert selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", latency)) == ""
 
 
@@ -113,7 +113,7 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """Only publishers of the wrong message type are named; both types are tried."""
+    """The warning names only publishers of the wrong message type; the test tries both types."""
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert selfcheck.type_conflict([teleop], stamped=False) == ""
     assert selfcheck.type_conflict([nav], stamped=True) == ""

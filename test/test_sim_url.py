@@ -53,7 +53,7 @@ def test_options_come_after_a_question_mark() -> None:
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A board's dead thread is reported as a defect with its cause, not as a lost cable."""
+    """If the board's thread fails, the driver reports a defect with its cause, not a lost cable."""
 
     def explode(_board: SimulatedBoard) -> bytes:
         raise ZeroDivisionError

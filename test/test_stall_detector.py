@@ -17,7 +17,7 @@ def wall_ns(now: float) -> int:
 
 
 def resumed(length_s: float) -> StallDetector:
-    """Return a detector that ran until 100 s, and again from ``length_s`` later."""
+    """Return a detector whose thread ran until 100 s, then stalled for ``length_s``."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     standstill.begun(100.0 + length_s)
@@ -47,7 +47,7 @@ def test_a_standstill_is_told_once_with_its_length() -> None:
 
 
 def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
-    """After a stall no command is fresh before the watchdog runs, even if another thread runs."""
+    """After a stall, no command is fresh before the watchdog's own thread has run."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert not standstill.outlived_by(wall_ns(100.0 + STANDSTILL_S), 100.0 + STANDSTILL_S)
@@ -56,7 +56,7 @@ def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
 
 
 def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
-    """Let the detector run until ``begin``, and again from ``end``."""
+    """Let the detector's thread run until ``begin``, stall, and run again from ``end``."""
     standstill.passed(begin, wall_ns(begin))
     standstill.begun(end)
     standstill.passed(end, wall_ns(end))
@@ -88,7 +88,7 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """A command sent shortly before a stall is not fresh, since it waited in a queue meanwhile."""
+    """A command sent shortly before a stall is not fresh, since it waited in a queue during it."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(99.9), 103.4)
@@ -97,7 +97,7 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
     """A command that seems to be sent right after a stall may have been sent during the stall.
 
-    The offset of the sender's clock is only as certain as the fastest message's transit time.
+    The driver knows the offset of the sender's clock only to within a message's transit time.
     """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
@@ -134,7 +134,7 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """A command from a sender with a wrong clock is refused right after a stall, but not later."""
+    """Soon after a stall, commands of a sender with a wrong clock are not fresh; later ones are."""
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)
     standstill.passed(106.0, wall_ns(106.0))
@@ -142,5 +142,8 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
 
 
 def test_whenever_the_guard_steps_in_the_driver_notices() -> None:
-    """If the driver did not notice, guard and driver would send contradictory commands."""
+    """A stall that makes the guard act is long enough for the driver to notice it.
+
+    Otherwise guard and driver would send contradictory commands.
+    """
     assert 3 * BEAT_S < STANDSTILL_S < LIMIT_S

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Delays of commands between sender and driver, with clocks that are off, drift and step."""
+"""Delays of commands from sender to driver, whose clocks are wrong, drift and step."""
 
 from dataclasses import dataclass, field
 
@@ -36,7 +36,7 @@ class Sender:
 
 @dataclass
 class Receiver:
-    """The driver's clock is ahead of the true time by ``ahead_s``; its steady clock is right."""
+    """The driver: its clock is ahead of the true time by ``ahead_s``; its steady clock is right."""
 
     ahead_s: float = 0.0
     transit: Transit = field(default_factory=Transit)
@@ -116,7 +116,7 @@ def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_fir
 
 @given(st.sampled_from([1, -1]), st.floats(1.0, 1e6), st.booleans())
 def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, shared: bool) -> None:
-    """No command is refused if NTP steps the driver's clock, with or without the sender's clock."""
+    """No command is refused when NTP steps the driver's clock, alone or with the sender's clock."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(1000):
         now_s += 0.1
@@ -132,7 +132,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
 ) -> None:
-    """A sender whose clock steps back is heard again soon, though its network seems to be slow."""
+    """If a sender's clock steps back, its commands seem late, but are soon accepted again."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for _ in range(100):
         now_s += 0.1
@@ -150,7 +150,7 @@ def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
 
 @given(st.floats(1.0, 1e6))
 def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
-    """A sender whose clock is set forward is still heard.
+    """If a sender's clock steps forward, its commands are still accepted.
 
     Its late commands are refused, since their age is judged by the new clock.
     """
@@ -187,7 +187,7 @@ def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> 
 def test_two_senders_with_clocks_of_their_own_are_both_heard(
     one_s: float, other_s: float, turns: list[int]
 ) -> None:
-    """Two senders are heard, even if one clock is hours ahead of the other."""
+    """The driver accepts commands of two senders whose clocks differ by hours."""
     receiver, senders, now_s = Receiver(), (Sender(one_s, sent=1000), Sender(other_s)), 100.0
     for sender in senders:
         receiver.hear(sender, now_s, 0.01)
@@ -197,7 +197,7 @@ def test_two_senders_with_clocks_of_their_own_are_both_heard(
 
 
 def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
-    """A late command is refused, even if a second sender shares the host and thus the clock."""
+    """A late command is refused, even if another sender on the same host sends in time."""
     receiver, old, new = Receiver(), Sender(sent=1000), Sender()
     for number in range(20):
         receiver.hear(old, 100.0 + 0.1 * number, 0.01)
@@ -207,7 +207,7 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
 
 
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
-    """Each command of ``ros2 topic pub --once`` is heard, also if the sender's clock is behind."""
+    """Commands of ``ros2 topic pub --once`` are accepted, even if the sender's clock is behind."""
     receiver = Receiver()
     for number in range(20):
         assert not refused(receiver.hear(Sender(), 100.0 + number, 0.01))
@@ -217,7 +217,7 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """The driver follows clocks that drift for ten hours, with some silences of an hour."""
+    """No command is refused while clocks drift for ten hours, with some silences of an hour."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -235,7 +235,10 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """A sender whose first message is 0.5 s late seems to have a clock that is 0.5 s off."""
+    """If a sender's first message is 0.5 s late, its clock seems to be 0.5 s behind.
+
+    The second of two estimates of the send time, by the sender's own clock, is right.
+    """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
     seems_ns, says_ns = receiver.hear(sender, 101.0, 0.7).sent_ns
@@ -244,9 +247,9 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """After ten messages of a sender, the send time has one estimate, by our clock.
+    """After ten messages of a sender, the driver has one estimate of the next send time.
 
-    An offset of the sender's clock has no effect on this estimate.
+    It is by the driver's own clock, so an offset of the sender's clock has no effect on it.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

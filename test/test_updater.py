@@ -48,7 +48,7 @@ class Updater:
 
 
 def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A missing diagnostic_updater is not reported, since the published message is the same."""
+    """Without diagnostic_updater the driver publishes the same message, so it gives no warning."""
     monkeypatch.setitem(sys.modules, "diagnostic_updater", None)
     assert _through_updater(SimpleNamespace(), "/dev/omnibot") is None
 

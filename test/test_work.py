@@ -88,13 +88,16 @@ def most_calls(
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 14), (DELTA, 9), (POSE, 9)])
 def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The bounded calls are those of the decoder in one read of one tick."""
+    """The decoder makes at most this number of calls for a read with the bytes of one tick."""
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 48), (DELTA, 159), (POSE, 281)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The bounded calls are those from a read's bytes to its events and the link's requests."""
+    """The session needs at most this number of calls per tick, from the bytes to its events.
+
+    The calls by which the link asks for output and for the next wake-up are included.
+    """
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
@@ -108,7 +111,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """The bounded calls are those from a read until the IMU reading can be published."""
+    """The session needs at most this number of calls from a read to an IMU reading to publish."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
@@ -122,7 +125,7 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
 
 
 def test_a_command_calls_no_more_than_it_did() -> None:
-    """The bounded calls are those from a Twist's bytes to the packets for a running board."""
+    """A command needs few calls, from the bytes of a Twist to the packets for a running board."""
     session, board, now = opened_session(), SimulatedBoard(BoardSettings(running=True)), 0.0
     for tick in range(SETTLED):
         now = tick * TICK_S
@@ -142,7 +145,7 @@ def test_a_command_calls_no_more_than_it_did() -> None:
 
 
 def test_a_serialised_tick_calls_no_more_than_it_did() -> None:
-    """The bounded calls are those that serialize an Imu, an Odometry and a JointState."""
+    """The serializer needs few calls for an Imu, and for an Odometry with its JointState."""
     settings = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     make, before = Serializer(settings), unturned(settings.wheels)
     imu = ImuEstimate(0.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))

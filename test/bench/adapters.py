@@ -2,7 +2,7 @@
 
 """How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
-The module knows the pace of the serial line, but nothing of frames. Times are in s.
+The module uses the baud rate of the serial line, but not the format of the frames. Times are in s.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ PACKET: Final = 62
 DRIFT: Final = 1.0002
 """Rate of the adapter's clock relative to the board's clock.
 
-The drift makes packets end at every phase of a tick within 8 s.
+Because of the drift, the packets of 8 s end at all phases of the board's tick.
 """
 
 Handed = tuple[float, bytes]
@@ -26,7 +26,7 @@ Adapter = Callable[[Ticks, Random], Iterator[Handed]]
 
 
 def whole(ticks: Ticks, _random: Random) -> Iterator[Handed]:
-    """Deliver all bytes of a tick when the tick begins, sooner than any real adapter does."""
+    """Deliver all bytes of a tick at its beginning. No real adapter delivers bytes so early."""
     yield from ticks
 
 

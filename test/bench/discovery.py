@@ -53,7 +53,7 @@ def processor_s(pids: list[int]) -> float:
 
 
 def measure(number: int, *, served: bool) -> str:
-    """Start ``number`` drivers, discover them, watch them at rest; return one row of the table."""
+    """Measure the traffic and processor time of ``number`` drivers; return one row of the table."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT),

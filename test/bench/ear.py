@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A subscriber in its own process: it records the time of each message until its input ends.
+"""A subscriber in its own process: it records the time of each message until stdin is closed.
 
 Arguments: namespaces. The program prints one JSON object with the lists ``heard`` and
 ``odometries``, which have an array per namespace. An item of ``heard`` is a pair: the steady

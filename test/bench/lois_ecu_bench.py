@@ -34,7 +34,7 @@ SETTLING_S: Final = 10.0
 class Stage:
     """Boards on pseudo-terminals at ``paths``.
 
-    ``heard``: for each board, the time and the bytes of every read of commands.
+    ``heard``: for each board, a list of its reads of commands, each with time and bytes.
     """
 
     def __init__(self, boards: int) -> None:

@@ -43,7 +43,7 @@ def relay(port: int, node: Node) -> None:
 
 
 def main() -> None:
-    """Relay until the line hangs up or the process is killed."""
+    """Relay data until the serial line is closed at its other end, or the process is killed."""
     path, namespace = sys.argv[1:]
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     rclpy.init()

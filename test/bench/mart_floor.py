@@ -59,7 +59,7 @@ class Relay:
 
 
 def main() -> None:
-    """Relay until the process is killed."""
+    """Relay data between the controller and ROS until the process is killed."""
     host, port, namespace = sys.argv[1:]
     rclpy.init()
     node = Node("floor", namespace=namespace, start_parameter_services=False, enable_rosout=False)

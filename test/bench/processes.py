@@ -15,7 +15,7 @@ PATIENCE_S = 5.0
 
 
 class Program:
-    """A program of this directory, or a module, that runs as a process while its context lasts."""
+    """A program of this directory, or a module; it runs as a process in a ``with`` block."""
 
     def __init__(self, *arguments: str, environment: dict[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
@@ -83,7 +83,7 @@ def driver(path: str, namespace: str, before: str = "", **environment: str) -> P
 
 
 def floor(what: str, path: str, namespace: str) -> Program:
-    """Start the smallest relay on this port; ``what``: its task."""
+    """Start the relay of ``floor.py`` on this port; ``what``: the task that it has."""
     return Program(str(HERE / "floor.py"), what, path, namespace)
 
 

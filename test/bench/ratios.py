@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Figures of the driver compared with those of a floor, measured in alternation."""
+"""Comparison of the driver with a floor: each figure is measured for both in turn."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """Values of one figure, of the driver (``ours``) and of the floor, measured in pairs.
+    """Values of one figure, measured in pairs: one of the driver (``ours``), one of the floor.
 
     ``goal``: largest allowed ratio of ours to the floor.
     """

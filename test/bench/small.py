@@ -2,8 +2,8 @@
 
 """Driver and floor on a small computer: each process group gets a share of one core.
 
-The share is a quota of Linux's cgroups. Its period is as short as the kernel permits, so that the
-computer seems slow and does not stutter. Only root can set up a cgroup.
+The share is a quota of Linux's cgroups. Its period is the shortest that the kernel permits. The
+processes therefore run slowly but evenly. Only root can set up a cgroup.
 """
 
 import math
@@ -81,7 +81,7 @@ class Group:
 
 
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
-    """Return rows of a table: what driver and floor achieve with each share of one core.
+    """Return rows of a table: the figures of driver and floor with each share of one core.
 
     ``seconds``: length of the measurement with each share. Where cgroups cannot be changed, the
     result is one sentence.

@@ -2,8 +2,9 @@
 
 """Processor time of the driver's reader by stage, measured with timers around the stages.
 
-This code runs in the driver's process before the driver starts. At the end it writes a JSON object
-to the file that SPLIT names: seconds per stage, and as ``passed`` how long the reader ran, in s.
+This code runs in the driver's process before the driver starts. At the end of the process it writes
+a JSON object to the file that SPLIT names: seconds per stage, and as ``passed`` how long the reader
+ran, in s.
 """
 
 import atexit

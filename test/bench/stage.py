@@ -4,7 +4,7 @@
 
 Within each tick of 10 ms the boards send one after the other, so that their readers are measured in
 alternation. All boards have the same kind of adapter. Every IMU frame has a number in its first
-word; a board has no other function.
+word. The boards do nothing else.
 """
 
 import heapq
@@ -64,8 +64,9 @@ def imu_ends() -> Iterator[int]:
 class Stage:
     """Boards on pseudo-terminals at ``paths``; times are of the steady clock, in s.
 
-    ``said[n]``: for board n, when the last byte of each tick's IMU frame was delivered, by tick.
-    ``heard[n]``: reads of the commands to board n.
+    ``said[n]``: for board n and each tick, the time at which the last byte of the IMU frame was
+    delivered. ``heard[n]``: the reads in which board n received commands, each with its time and
+    bytes.
     """
 
     def __init__(self, boards: int, adapter: Adapter = pieces) -> None:

@@ -39,7 +39,7 @@ Estimates = list[ImuEstimate | OdometryEstimate]
 
 
 class Relay:
-    """A relay whose methods are the steps: each publishes its result for the bytes of one read."""
+    """A relay with one method per step; each method publishes what it makes of a read's bytes."""
 
     def __init__(self, node: Node) -> None:
         values = boards.check_all({})
@@ -118,7 +118,7 @@ STEPS: Final[dict[str, tuple[str, Callable[[Relay, bytes], None], bool]]] = {
 
 
 def main() -> None:
-    """Relay until the line hangs up or the process is killed."""
+    """Relay data until the serial line is closed at its other end, or the process is killed."""
     step, path, namespace = sys.argv[1:]
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     rclpy.init()

@@ -35,7 +35,9 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Goals by adapter, as ratios to the floor: latency (median, 99th percentile), CPU, and cmd_vel."""
+"""Largest allowed ratios of driver to floor, by adapter; None: without limit. They are those of the
+median latency of measurements, its 99th percentile, processor time, and latency of cmd_vel.
+"""
 MPS2_PER_COUNT = 9.80665 / 16384
 
 
@@ -162,7 +164,7 @@ def commands(adapter: str, windows: int) -> Figure:
 
 
 def imports(times: int) -> Figure:
-    """Measure how long the driver's import takes, and the imports that any such node needs."""
+    """Measure the time to import the driver, and the packages that any such node needs."""
     floor_names = "rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_srvs.srv"
 
     def seconds(names: str) -> float:
@@ -248,7 +250,7 @@ def split(seconds: float) -> list[str]:
 def latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """Return for each message when its frame was delivered, and its latency in µs."""
+    """Return for each message the time of its frame's delivery, and the latency in µs."""
     found = []
     for at, value in heard:
         number = round(value / unit)

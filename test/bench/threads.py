@@ -60,5 +60,5 @@ def _counts(pid: int, named: dict[str, str], guard: int) -> Counts:
 
 
 def _faults(pid: int) -> int:
-    """Return how many page faults of a process needed no disk: field 10 of its ``stat``."""
+    """Return how many page faults of a process needed no disk access (field 10 of ``stat``)."""
     return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[7])

@@ -23,11 +23,11 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""Least pause of the simulated board, in s, that the driver may report as silence."""
+"""If the simulated board paused for at least this time in s, the driver may report silence."""
 TRANSIT: Final = 200
 """Number of frames that may be on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""Number of sent frames among which the next message must be found, or it counts as wrong."""
+"""A message is wrong if none of the next sent frames, up to this number, equals it."""
 
 
 class PiecesTerminal(Terminal):

@@ -201,10 +201,10 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """For each of ``numbers``, run all stops of a new driver while bytes to its board are lost.
+        """For each of ``numbers``, test stops of a new driver on a line that loses bytes.
 
-        ``number_of_life``: place of these stops in LIVES. Bytes are lost until the last stop is
-        judged.
+        ``number_of_life``: index in LIVES of the stops to test. The line to the board loses bytes
+        until the last stop has been judged.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

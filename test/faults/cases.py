@@ -28,9 +28,9 @@ NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
 """Time without a heartbeat after which the guard acts, in s."""
 DAMAGED_S: Final = 1.1
-"""Time in s, plus grace, in which a robot on a damaged line must rest after the last command."""
+"""Time in s, plus grace, after the last command, in which a robot on a damaged line must stop."""
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
-"""Pattern of log lines that are right for a driver whose board receives nothing."""
+"""Pattern of the log lines that a driver should print if its board receives nothing."""
 NEXT_ATTEMPT_S: Final = 2.0
 """Longest time until the driver tries again to open a lost port, in s."""
 SILENCE_S: Final = 1.5
@@ -95,7 +95,7 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """Damage bytes for ``seconds`` of driving, and afterwards until the robot must be at rest."""
+    """Damage bytes while the robot drives for ``seconds``, and until it must be at rest."""
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board

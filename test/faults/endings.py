@@ -2,8 +2,8 @@
 
 """Ways in which a driver ends while the robot drives: on request, by a defect, or by force.
 
-Each ending names the Python code that runs first in the driver's process. It leaves a rig without a
-driver.
+An ending may have Python code that runs in the driver's process before the driver. After an ending,
+the rig has no driver.
 """
 
 import os
@@ -55,9 +55,10 @@ os.close(terminal)
 class Ending:
     """A way to end the driver, and what must follow; the board must receive Stop last.
 
-    ``before``: Python code that runs first in the driver's process. ``allowed_s``: how long the
-    robot may drive on. ``late_s``: additional time in which the process may end. ``full``: whether
-    the port is full of old commands. ``read``: whether the driver ends at its next read.
+    ``before``: Python code that runs in the driver's process before the driver. ``allowed_s``: how
+    long the robot may still drive after the ending. ``late_s``: additional time in s that the
+    process may take to end. ``full``: whether the port is full of old commands when the driver
+    ends. ``read``: whether the driver ends only when it next reads data.
     """
 
     end: Callable[[Rig], object]
@@ -105,7 +106,7 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Publish on ``estop``, whose callback the ending has replaced by code that ends the driver."""
+    """Publish on ``estop``; the callback has been replaced by code that ends the driver."""
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))
 

@@ -25,7 +25,7 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 
 
 class Pair:
-    """Both Teensys as one board with the ticks of the rig.
+    """Both Teensys with the interface of a single board; its ticks are those of the rig.
 
     ``received``: motion commands at the drive board, without checksums and padding.
     """

@@ -19,12 +19,14 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms, which makes 1000 a second."""
 HELD: Final = 0.99
-"""Least share of the board's readings that must be published during the input and 2 s after it."""
+"""Least share of the board's readings that the driver must publish while the input lasts, and in
+the 2 s after it.
+"""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
 def odd_float(random: Random) -> float:
-    """Draw a random 64-bit float, or a usual or special value such as 0, 1e300 or NaN."""
+    """Draw any 64-bit float, or one of several common or special values such as 0 or NaN."""
     anything = struct.unpack("d", random.randbytes(8))[0]
     usual = (0.0, -0.0, 0.3, -0.3, 1e-300, 1e300, float("nan"), float("inf"), -float("inf"))
     return random.choice((*usual, anything))

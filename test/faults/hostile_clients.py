@@ -21,7 +21,7 @@ NONSENSE: Final = (float("nan"), float("inf"), -1.0, 1e12)
 
 
 def two_commanders(rig: Rig) -> None:
-    """Command body velocities and wheel rates in turn, then stop both commanders."""
+    """Let one commander send velocities and another send wheel rates; then end both."""
     publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
     rig.drive()
     for _ in range(40):

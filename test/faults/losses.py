@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes towards the board, from before a stop until its verdict.
+"""Stops on a line that loses bytes to the board from before a stop until the stop is judged.
 
 Processes and pseudo-terminal are real. Rates of failure cannot be measured here; they are measured
 in simulated time (test/integrity/outbound.py). The board of each driver has a different receiver.
@@ -80,4 +80,6 @@ LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
     {"timeout": times_out, "ctrl-C": is_interrupted},
     {"e-stop": is_estopped, "SIGKILL": is_killed},
 )
-"""For each driver, the stops that it goes through, by name; the last one ends the driver."""
+"""One dictionary per driver: the stops that the driver must perform, by name. The last stop ends
+the driver.
+"""

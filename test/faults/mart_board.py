@@ -28,7 +28,8 @@ TICKS: Final = 5
 LATE_S: Final = 0.3
 """Longest delay of a datagram in each direction, in s, equal to ``network_delay``."""
 LOST_STOP_S: Final = 1.2
-"""Delay of a stop in s if two datagrams in a row are lost and the third is as late as possible."""
+"""Delay of a stop, in s, if its first two datagrams are lost and the third is as late as possible.
+"""
 BLIND_S: Final = 2.0
 """Longest allowed time, in s, until a robot stops if its driver gets no replies.
 
@@ -53,7 +54,10 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Always empty: polls follow the last stop, so the last bytes are not judged here."""
+        """Always empty, because the driver still polls after its last stop.
+
+        The last bytes therefore cannot be compared with a stop.
+        """
         return b""
 
 

@@ -28,7 +28,7 @@ from omnibot_driver.simulator.common.serving import PtyBoard
 
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27
 DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
-"""A packet filter with one instruction: accept zero bytes."""
+"""A packet filter with a single instruction: discard every packet."""
 
 
 class Terminal(PtyBoard):
@@ -122,7 +122,7 @@ class Server(RunningBoard):
             self._peers[-1].shutdown(socket.SHUT_WR)
 
     def vanish(self) -> None:
-        """Cut the network: packets are dropped in both directions, and neither side is informed."""
+        """Cut the network: all packets are dropped, and neither side sees the connection close."""
         program = ctypes.create_string_buffer(DROP_ALL)
         rule = struct.pack("HP", 1, ctypes.addressof(program))
         self.deaf = self.mute = True

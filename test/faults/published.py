@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Published messages as keys that can be compared with what the board sent."""
+"""Keys: the values of published messages in the units of the board's frames."""
 
 import math
 import struct
@@ -33,9 +33,10 @@ def sent_imu_key(frame: bytes) -> Key | None:
 
 
 def odom_key(message: Odometry) -> Key | None:
-    """Return speed in 0.1 mm and yaw rate in 0.1 mrad, each per 40 ms; None if unmeasured.
+    """Return the message's speed and yaw rate in 0.1 mm and 0.1 mrad per 40 ms, or None.
 
-    Both are independent of the heading.
+    None means that the message marks the speed as unmeasured. Both numbers are independent of the
+    robot's heading.
     """
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE
@@ -50,7 +51,7 @@ def sent_odom_key(frame: bytes) -> Key | None:
 
 
 def not_sent(published: Iterable[Key | None], sent: Iterable[Key | None]) -> int:
-    """Return the number of published keys that were never sent, or not in this order."""
+    """Return how many published keys the board did not send, or sent in another order."""
     truth = [key for key in sent if key is not None]
     at = missing = 0
     for key in published:

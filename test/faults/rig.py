@@ -40,13 +40,13 @@ NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 """NEW_VARIANCE: variance of x just after an odometry reset, in m². GAP_MPS2: assumed acceleration
 in a gap of data, in m/s²."""
 WRONG_ONE_IN: Final = 500
-"""At most one message in this number may be wrong while one byte in 100 is lost."""
+"""If one byte in 100 is lost, at most one published message in this number may be wrong."""
 ENDS_WITHIN_S: Final = 2.0
 
 
 @dataclass(slots=True)
 class Findings:
-    """The complaints about a driver or robot (empty if all is well), and figures."""
+    """Complaints about a driver or robot (none if all is well), and measured figures."""
 
     complaints: list[str] = field(default_factory=list)
     stood_after_s: list[float] = field(default_factory=list)
@@ -67,9 +67,9 @@ class Findings:
 class Rig:
     """Context manager of a driver whose port is a symbolic link, as udev makes them.
 
-    ``kind``: the board, which gets these ``settings``. ``before``: Python that is run first in the
-    driver's process. ``grace_s``: how much later than allowed the robot may be at rest.
-    ``ends_within_s``: how long a driver may take to end.
+    ``kind``: the board, which gets these ``settings``. ``before``: Python code that runs in the
+    driver's process before the driver. ``grace_s``: additional time in which the robot may come to
+    rest. ``ends_within_s``: how long a driver may take to end.
     """
 
     def __init__(

@@ -16,8 +16,8 @@ class RigBoard:
     """A kind of board in the campaign.
 
     ``make``: makes a simulated board from settings, or with the usual settings. ``parameters``: the
-    driver's parameters for this board. ``ports``: the parameters that name the board's ports, by
-    the link to the terminal.
+    driver's parameters for this board. ``ports``: takes the path of the link to the terminal, and
+    returns the parameters that name the board's ports.
 
     ``old_command``: bytes of a motion command. ``stop``: the last bytes received when a driver
     ends. ``opening``: the first bytes on a new line. ``wheels``: number of values in wheel_cmd.
@@ -25,9 +25,9 @@ class RigBoard:
     refuse invalid values.
 
     ``off_within_s``: longest allowed time from a stop until the motors are off. ``old_bytes_s``:
-    time in which the board receives what a full port has kept. ``ends_later_s``: additional time
-    that the driver may take to end. ``deaf_s``: longest time in which the board may lose the
-    commands on a line, so that the driver must repeat them. ``silent_s``: longest usual pause
+    time that the board needs to receive all old commands from a full port. ``ends_later_s``:
+    additional time that the driver may take to end. ``deaf_s``: longest time for which the board
+    may ignore its input; the driver then has to repeat commands. ``silent_s``: longest usual pause
     between two transmissions of the board.
 
     ``imu``: whether the board has an IMU. ``jump_stddevs``: largest correction of predicted
@@ -35,11 +35,12 @@ class RigBoard:
 
     ``sent``: returns the frames of the board's last tick. ``not_sent``: returns by kind how many
     published messages were never sent, and their total. ``lossy``: returns settings of board number
-    n for a line that loses bytes. ``without``: faults and pieces of the campaign that do not apply.
+    n for a line that loses bytes. ``without``: names of faults and parts of the campaign that do
+    not apply to the board.
 
     ``line``, ``serve``, ``port``: replacements for a breakable line of bytes, for the line's
-    server, and for the driver's ``port``. ``cases``: returns all faults of a round from the round's
-    number; None for the faults of a serial line.
+    server, and for the driver's ``port``. ``cases``: takes the number of a round, and returns the
+    round's faults. None means the usual faults of a serial line.
     """
 
     name: str

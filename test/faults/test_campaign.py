@@ -51,7 +51,7 @@ def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """No case of this module leads to a false message or a jump of odometry."""
+    """No case of this module makes the driver publish a false message or a jump of odometry."""
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()
     assert rig.findings.published > 1000

@@ -13,7 +13,7 @@ from omnibot_board import BOARD
 def test_the_robot_stands_though_bytes_are_lost_on_the_way_to_it(
     number: int, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The robot stops on a line that loses bytes from before each stop until the stop is judged."""
+    """Each stop works on a line that loses bytes from before the stop until it is judged."""
     with losing_rig(tmp_path, BOARD, number, **lenience) as rig:
         lose(rig, number)
         for case in LIVES[number].values():

@@ -3,8 +3,8 @@
 """Faults in random order, on top of each other, under random commands.
 
 Every few steps the commander leaves. Then the robot must come to rest in time, the driver must
-return to its usual state, and the robot must obey a fresh command. The other faults of the line end
-when the commander leaves; losses towards the board last until the robot rests.
+return to its usual state, and the robot must obey a fresh command. Losses of bytes to the board
+last until the robot is at rest. All other faults of the line end when the commander leaves.
 """
 
 from collections.abc import Callable

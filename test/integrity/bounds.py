@@ -69,7 +69,9 @@ BOUNDS: dict[str, Bound] = dict(
         strict=True,
     )
 )
-"""Limits by fault; for added bytes, only with chunkings that deliver several frames at once."""
+"""Limits by fault. The limits for added bytes apply only to chunkings that deliver several frames
+at once.
+"""
 
 Scores = dict[tuple[str, str, str], Score]
 """Scores by the names of fault, chunking and scenario."""

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A busy computer: the line is undamaged, but the reader is scheduled late.
+"""A busy computer: the line is undamaged, but the process that reads is scheduled late.
 
-A read returns what is there when the reader is scheduled. Each chunker of this module takes the
-pieces that an adapter delivers, and returns the end and the time of each read. Times are in s.
+A read returns all data that has arrived when the process is scheduled. Each chunker of this module
+takes the pieces that an adapter delivers, and returns the end and the time of each read. Times are
+in s.
 """
 
 from bisect import bisect_right
@@ -21,9 +22,9 @@ JITTER_S = 60e-6
 READ_S = 20e-6
 """Duration of a read that does not wait for data, in s."""
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
-"""Share of wake-ups that wait for their turn beside busy loops, and the range of the delay in s."""
+"""Share of wake-ups that busy loops delay, and the range of the delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Share of wake-ups after which busy loops slow the process; range of the slow time, in s."""
+"""Share of wake-ups after which busy loops slow the process down, and for how long, in s."""
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """Ranges of the delay of a slowed wake-up, in s: SHARE_S of a reader, SLOW_S of an adapter."""
 HOGGED_PIECE = 4
@@ -43,7 +44,7 @@ def delay_s(random: Random, now: float = 0.0) -> float:
 
 
 class Turns:
-    """Wake-ups of a process beside busy loops.
+    """Delays of the wake-ups of a process while busy loops run.
 
     ``late_s``: range of their delay in s while the process is slowed.
     """

@@ -2,7 +2,7 @@
 
 """The line's effect on a byte stream: bytes are lost or added, and delivered in chunks.
 
-The module knows nothing of frames.
+The module does not use the format of frames.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ Fault = Callable[[int, Random], Origins]
 
 
 def none(length: int, random: Random) -> Origins:
-    """Return the origins of an undamaged stream that starts at any byte of its first second."""
+    """Damage nothing, but let the stream start at a random byte of its first second."""
     return list(range(random.randrange(1700), length))
 
 
@@ -75,7 +75,7 @@ FAULTS: dict[str, Fault] = {
 
 @dataclass(slots=True)
 class Received:
-    """The received bytes, their arrival times in s, and the true stream to compare with."""
+    """The received bytes, their arrival times in s, and the true stream that was sent."""
 
     data: bytes
     times_s: list[float]

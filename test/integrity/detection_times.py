@@ -40,7 +40,10 @@ def robot(**settings: object) -> Callable[[float], Bench]:
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """Grip an obeying robot; return the time in s from its first deviation until Stop is sent."""
+    """Force another motion on an obeying robot.
+
+    Return the time in s from the robot's first deviation until the driver sends Stop.
+    """
     if any(command):
         for _ in range(15):
             by_velocity(bench, command)
@@ -62,7 +65,7 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Print a row: the shortest and the longest time over all phases of the displacements."""
+    """Measure the time for each phase of the displacements; print the shortest and the longest."""
     shown = []
     for period_s in PERIODS_S:
         times = []

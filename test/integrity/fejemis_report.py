@@ -4,8 +4,8 @@
 
 A simulated pair of boards, which shares no code with the driver, is driven in curves by one
 session. The bytes of both boards are then played to other sessions, undamaged and damaged. A value
-is wrong if the undamaged lines do not have it. Odometry continues after lost values, so it is
-judged by its distance from the odometry of the undamaged lines.
+is wrong if the session with undamaged lines did not publish it. Odometry after a lost value differs
+from the truth. It is therefore judged by its distance from the odometry with undamaged lines.
 """
 
 from bisect import bisect_left
@@ -128,7 +128,7 @@ def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
 
 
 def value_of(event: Event) -> str | None:
-    """Return the value without its timestamp, or None if the event is not judged by its value."""
+    """Return the value as text without its timestamp; None for events that are judged otherwise."""
     if isinstance(event, ImuEstimate):
         return f"imu {event.specific_force} {event.angular_velocity}"
     if isinstance(event, Extra) and isinstance(event.value, OrientedImuReading):
@@ -141,7 +141,7 @@ def value_of(event: Event) -> str | None:
 def score(truth: list[Event], found: list[Event]) -> Score:
     """Compare published values with the true ones.
 
-    If a value is published more often than the truth has it, the surplus is wrong.
+    If a value is published more often than in the truth, the additional ones count as wrong.
     """
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))

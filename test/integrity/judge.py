@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The judge: which decoded frames were really sent, and which intact ones are missing."""
+"""The judge: it finds decoded frames that were never sent, and intact frames that are missing."""
 
 from bisect import bisect_left
 from collections.abc import Callable
@@ -13,14 +13,14 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Distance of a match, in intact frames, beyond which the match needs a confirmation.
+"""A match that skips more than this number of intact frames needs a confirmation.
 
-A decoded frame is searched for among the frames sent next. A match at a greater distance counts
-only if the next decoded frame has a match shortly behind it: a false frame may equal a true frame
-that is sent later.
+The judge searches for a decoded frame among the frames sent next. A match that skips more frames
+counts only if the next decoded frame has a match shortly behind it: a false frame may equal a true
+frame that is sent later.
 """
 REACH_BYTES = 600
-"""How far back a decoded frame is searched for, in bytes before the current read."""
+"""The judge searches for a decoded frame from this number of bytes before the current read on."""
 
 
 @dataclass(slots=True)

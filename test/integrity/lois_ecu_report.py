@@ -2,9 +2,9 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board, which shares no code with the driver, drives in curves. The truth is what the
-decoder makes of the undamaged line. A report is right if the truth has an equal report after the
-previous right one, and wrong otherwise.
+The simulated board, which shares no code with the driver, drives in curves. The truth is the list
+of reports that the decoder returns for the undamaged line. A report from a damaged line is right if
+the truth has an equal one after the previous right report; otherwise it is wrong.
 """
 
 from collections import Counter
@@ -74,7 +74,7 @@ def decode(stream: Stream) -> tuple[list[Report], int]:
 
 
 def score(truth: list[Report], lines: int, stream: Stream) -> Score:
-    """Count in order: a report is right if the truth has it after the previous right one."""
+    """Count the reports, each right if the truth has an equal one after the previous right one."""
     found, lines_out = decode(stream)
     result = Score(lines=lines, lines_out=lines_out, sent=len(truth), out=len(found))
     left = Counter(map(repr, truth))

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How honest the odometry of a LOIS ECU is: errors and NEES of many simulated drives.
+"""Errors of the odometry of a LOIS ECU, and NEES, in many simulated drives.
 
 ``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. ``--nominal``:
-wheels have the right size. ``--gains boot``: the gains with which the board starts. The constants
-of the odometry were chosen on seeds below 4000, so judge them by other seeds.
+the wheels have the size that the driver assumes. ``--gains boot``: the wheel controllers keep the
+gains that the board has after its start. The constants of the odometry were chosen on seeds below
+4000, so judge them by other seeds.
 """
 
 import argparse

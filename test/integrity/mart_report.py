@@ -3,8 +3,9 @@
 """Integrity of the values published for a MART controller on a bad network (``make integrity``).
 
 A complete session runs with the simulated controller, which shares no code with the driver, in
-simulated time. A pose is wrong if its error is so large that, by its covariance, only one honest
-pose in 270,000 has such an error. A voltage or a range is wrong if it differs from the truth.
+simulated time. A pose counts as wrong if its error is too large for its covariance: if the
+covariances are right, only one pose in 270,000 has such an error. A voltage or a range is wrong if
+it differs from the truth.
 """
 
 import math
@@ -48,9 +49,9 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""Squared error over covariance above which a pose is wrong.
+"""Largest squared error of a pose, normalized by its covariance; above it, the pose is wrong.
 
-Of honest poses, 1 in 270,000 is above it by chance.
+If covariances are right, 1 pose in 270,000 exceeds it by chance.
 """
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
@@ -81,7 +82,7 @@ class Score:
 
 
 def drive(name: str, seconds: float, seed: int) -> Score:
-    """Drive random motions with rests, in which sonars and battery are polled; return the score."""
+    """Drive random motions; poll sonars and battery in the rests between them; return the score."""
     random, score = Random(f"{name} {seed}"), Score()
     bench = MartBench(
         FIRMWARES[seed % 3],

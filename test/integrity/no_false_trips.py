@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Hours of simulated driving with robots that obey: how often does the motion monitor trip?
+"""How often does the motion monitor stop robots that obey, in hours of simulated driving?
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
 

@@ -2,9 +2,10 @@
 
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-The real session plays every scene over a damaged line to every receiver; the faults last until the
-verdict. ``--share``: run only this share of the trials, and write nothing. ``--examples``: show the
-bytes that led to an error. The exit code is 1 when a bound is missed on any receiver.
+The real session plays every scene over a damaged line to every receiver. The faults last until the
+stop of the scene is judged. ``--share``: run only this share of the trials, and write nothing.
+``--examples``: show the bytes that led to an error. The exit code is 1 when a bound is missed on
+any receiver.
 """
 
 import argparse
@@ -45,7 +46,7 @@ class Bound:
     overdue: bool = True
 
     def missed(self, score: Score) -> list[str]:
-        """Return the names of the figures that are beyond their limits."""
+        """Return the names of the figures that exceed these limits."""
         found = {
             "stray motion": score.strayed,
             "false letters": score.false_letters,

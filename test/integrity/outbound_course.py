@@ -20,10 +20,11 @@ from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 
 @dataclass(frozen=True, slots=True)
 class Understood:
-    """What a receiver understands of an undamaged course of writes.
+    """What a receiver understands of the writes of a course if no byte is damaged.
 
-    held: the bytes that the receiver holds after each write. alike_until: for each write, the next
-    write of another kind (motion, or none), or the next that is not understood exactly as sent.
+    held: the bytes that the receiver holds after each write. alike_until: for each write, the index
+    of the next write that differs: one is a motion and the other is not, or the receiver does not
+    understand it exactly as sent.
     """
 
     held: list[bytes]

@@ -32,11 +32,12 @@ _LONGEST: Final = ("stray_s", "longest_s")
 class Score:
     """Counts and times that can be added; times in s.
 
-    strayed: number of trials with stray motion. stray_s: its longest duration. overdue, for_good:
-    number of trials in which the robot was driven when it had to be at rest, and at the end.
-    driving_s, frames: time for which the driver drove, and number of control frames sent meanwhile.
-    uncommanded_s, uncommanded, long, longest_s: total time of uncommanded set points, their number,
-    the number of those longer than LONG_S, and the longest.
+    strayed: number of trials with stray motion. stray_s: longest duration of stray motion. overdue:
+    number of trials in which the robot was driven at the time when it had to be at rest. for_good:
+    number of trials in which it was driven at the end. driving_s, frames: time for which the driver
+    drove, and number of control frames sent meanwhile. uncommanded_s, uncommanded, long, longest_s:
+    total time of uncommanded set points, their number, the number of those longer than LONG_S, and
+    the longest.
     """
 
     trials: int = 0
@@ -162,7 +163,7 @@ class Judge:
             self._stray_from_s = None
 
     def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
-        """End the scene; return whether the robot drives, or drove when it had to be at rest."""
+        """End the scene; return whether the robot still drives at the due time or at the end."""
         self.no_setpoint(at_s)
         if self.driving:
             self.score.driving_s += at_s - self._driving_from_s

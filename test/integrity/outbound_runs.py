@@ -24,12 +24,13 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Number of trials per receiver and loss.
 
-At 1 byte in 100 lost, each scene of ``HURRIES`` has this number.
+The scenes that end a drive share this number. At 1 byte in 100 lost, each scene of ``HURRIES`` has
+the whole number.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
 DRIVEN: Final = 150
-"""Number of trials of each script that only drives, so that no stop is judged."""
+"""Number of trials of each script whose scene only drives, without a stop to be judged."""
 OTHER_TRIALS: Final = 20
 """Number of trials of each script with a fault for which the report has no limits."""
 ESTOPS: Final = ("e-stop", "goal", "exit")

@@ -2,8 +2,8 @@
 
 """Scripts of the outbound trials: drives, and every way in which a drive ends.
 
-A scene is made from a seed. Speeds are random within the limits, and often such that a byte of the
-frame equals a letter or a header.
+A scene is made from a seed. Speeds are random within the limits. They are often chosen so that a
+byte of the frame equals a letter or a header byte.
 """
 
 import math

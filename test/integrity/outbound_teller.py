@@ -46,7 +46,7 @@ class Teller:
         self._reboot()
 
     def moves_as(self, mode: int, words: Triple) -> None:
-        """Set the twist of the moving robot to what this motion frame commands."""
+        """Store the twist that this motion frame commands; the robot has it while it moves."""
         a, b, c = words
         if self._goals:
             way = math.atan2(1e-3 * b - self._y, 1e-3 * a - self._x) - self._yaw

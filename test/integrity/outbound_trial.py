@@ -71,7 +71,7 @@ class Example:
 
 
 class Trial:
-    """A trial whose undamaged beginning is played once; each ``run`` continues from there.
+    """A trial: its beginning without faults is played once, and each ``run`` continues from there.
 
     ``memo`` may be shared by trials of one kind of receiver.
     """

@@ -14,7 +14,8 @@ Words = tuple[int, int, int]
 class Items:
     """Control frames (offset of the last byte, mode, words), and letters by offset.
 
-    moves, stops: whether one of the frames is motion, and whether frames exist but none is motion.
+    moves: whether one of the frames is motion. stops: whether there are frames and none of them is
+    motion.
     """
 
     frames: tuple[tuple[int, int, Words], ...] = ()

@@ -2,7 +2,7 @@
 
 """Common parts of the integrity reports: damage to bytes in pieces, and sums of scores.
 
-The module knows nothing of frames, and uses scores only by ``+=``.
+The module does not use the format of frames; scores need only the operator ``+=``.
 """
 
 import os

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots that obey, on bad floors and among people: does the motion monitor stop them?
+"""Simulated robots that obey, on bad floors and among people, to test the motion monitor.
+
+The monitor should stop none of them.
 
 Each robot has its own motors, controllers, scales and line, 5 % slip and a slope. A robot's
 commander changes its way of commanding every few seconds; people hold, carry and push the robot.
@@ -40,7 +42,10 @@ BEGUN_S: Final = 1000.0
 
 @dataclass(slots=True)
 class Outcome:
-    """Result of a drive. ``said``: the monitor's messages; ``happened``: what people did."""
+    """Result of a drive.
+
+    ``said``: how often the driver gave each message. ``happened``: how often people did each thing.
+    """
 
     seconds: float = 0.0
     trips: list[str] = field(default_factory=list)
@@ -119,7 +124,7 @@ class RoughDrive(Bench):
         self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
-        """Send the driver's writes to the board after the line's delay, and evaluate notices."""
+        """Count the session's notices; deliver its writes to the board after the line's delay."""
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)

@@ -49,7 +49,7 @@ def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
 
 
 def test_the_judge_finds_what_the_plain_parser_makes_up() -> None:
-    """The plain parser makes many false frames; a judge that missed them would be useless."""
+    """The judge finds the many false frames that the plain parser returns."""
     truth = generate(SCENARIOS["gyro stuck at (-6, -5, -4)"], 1, 20.0)
     received = receive(truth, FAULTS["1 byte in 1,000 lost"], Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())

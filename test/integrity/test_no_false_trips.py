@@ -18,7 +18,7 @@ def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """In a rough drive, a robot with wheels twice as fast as commanded trips the monitor."""
+    """In a rough drive, the monitor stops a robot whose wheels turn twice as fast as commanded."""
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)
     assert drive.go(30.0).trips

@@ -45,7 +45,7 @@ def on_all_receivers(course: Course, line: Line) -> Score:
 
 
 def shown(score: Score) -> str:
-    """Return a score as text, with the bytes that led to its errors."""
+    """Return a text with the score's counts, and with the bytes that led to its errors."""
     return "\n".join([str(score), *map(str, score.examples)])
 
 
@@ -60,7 +60,7 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """Each receiver plays one script and keeps the limits, as far as a short run can show."""
+    """With one script per scene, every receiver keeps the limits that a short run can check."""
     scores, _ = one(0.05, (scene, 0), LOSSES)
     for fault in LOSSES:
         score = Score()

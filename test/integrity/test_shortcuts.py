@@ -139,7 +139,7 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most reads must take the shortcut for single IMU frames; else tests of it prove nothing."""
+    """Most reads must use the shortcut for single IMU frames; otherwise its tests prove nothing."""
     fed = []
     feed = FrameDecoder.feed
 
@@ -156,7 +156,7 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Less than 10 % of the IMU frames are weighed one by one; the quick loop takes the others."""
+    """The quick loop handles at least 90 % of the IMU frames; the others are weighed one by one."""
     weighed = []
     weigh = decoder.Expectation.weigh
 
@@ -172,7 +172,7 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The quick loop accepts a jump, its aftershocks and the jump back without weighing frames."""
+    """The quick loop handles a jump of the readings, odd readings after it, and the jump back."""
     rest = ImuFrame((120, -80, -16384), (1, 2, 3))
     shock = [ImuFrame((9000, -80, -16384), (1, 2, 3)), ImuFrame((120, 7000, -16384), (1, 9000, 3))]
     sent = [rest, *shock, rest, rest, rest]
@@ -188,7 +188,7 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The knowledge after any number of frames is found by weighing at most 6 frames again."""
+    """The decoder can restore its state after any frame by weighing at most 6 frames again."""
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]

@@ -2,9 +2,9 @@
 
 """Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
 
-The generator is typed from the manual's layouts with ``struct`` and shares nothing with the driver.
-Sensor noise is that of an MPU6050 with its filter on: about 46 counts of the accelerometer, 6.5 of
-the gyro.
+The generator packs frames with ``struct`` by the layouts of the manual, and uses no code of the
+driver. Sensor noise is that of an MPU6050 with its filter on: about 46 counts of the accelerometer,
+6.5 of the gyro.
 """
 
 import math
@@ -34,7 +34,7 @@ class Truth:
 
 @dataclass(slots=True)
 class Setpoint:
-    """The velocity of a robot, which approaches random targets; zero for a robot at rest."""
+    """The velocity of a robot: it approaches random targets, or is always zero."""
 
     random: Random
     driving: bool

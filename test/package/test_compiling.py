@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``OMNIBOT_DRIVER_COMPILE=1``: whatever fails, a complete package of plain Python is installed.
+"""If compiling fails (``OMNIBOT_DRIVER_COMPILE=1``), the package is installed as plain Python.
 
 A substitute for mypyc makes one small C module, since mypyc itself takes a minute; ``make
 compiled`` runs mypyc.

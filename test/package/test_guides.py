@@ -25,7 +25,7 @@ SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 
 
 def text_of(node: ast.AST) -> str:
-    """Return a node's string, with gaps for inserted values; empty for a node of another kind."""
+    """Return the string of a string node, with gaps for inserted values; "" for any other node."""
     if isinstance(node, ast.JoinedStr):
         parts = [part.value if isinstance(part, ast.Constant) else GAP for part in node.values]
         return "".join(map(str, parts))
@@ -67,7 +67,7 @@ STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
-    """Each part of a quoted message, between gaps and colons, is in the code, word for word."""
+    """The code contains each part of a quoted message; gaps and colons separate the parts."""
     parts = [part.strip() for part in GAPS.split(sentence)]
     assert any(len(part) > 8 for part in parts)
     for part in parts:
@@ -75,9 +75,10 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 
 def test_what_the_driver_tells_is_explained() -> None:
-    """Each message has a sentence in the guide.
+    """The guide explains each message of the driver.
 
-    The sentence contains the message's beginning, or each part of the sentence is in the message.
+    It does so in a sentence that contains the beginning of the message, or whose parts are all in
+    the message.
     """
 
     def is_explained(template: str) -> bool:
@@ -119,7 +120,7 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
-    """The form at the guide's end has all steps of the guide, and the driver's parameters."""
+    """The form at the end of the guide lists all steps, and only parameters of the driver."""
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))
     form = re.findall(r"^\| (.+) \| (\d) \| (.+) \| \|$", text, re.MULTILINE)
@@ -129,7 +130,7 @@ def test_every_assumption_has_its_step_and_what_mends_it() -> None:
 
 
 def test_the_wheels_turn_as_the_guide_says() -> None:
-    """Counter-clockwise, seen from outside, is the manual's positive rate."""
+    """A wheel that turns counter-clockwise, seen from outside, has a positive rate."""
     kinematics = OmniKinematics(wheel_radius_m=0.029, base_radius_m=0.143)
     expected = {
         "linear: {x": kinematics.wheel_rates(BodyTwist(1.0, 0.0, 0.0)),

@@ -265,7 +265,10 @@ def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]
 
 @needs_launch
 def test_an_empty_board_is_described_as_the_default_one(launch: Callable[..., Started]) -> None:
-    """A launch file that includes the driver's file leaves its empty argument behind."""
+    """An empty ``board`` is the default board.
+
+    A launch file that includes the driver's file may leave this argument empty.
+    """
     path, *_ = launch("description.launch.py", "board:=")["xacro"]["arguments"]
     assert Path(path).resolve() == ROOT / "urdf/omnibot.urdf.xacro"
 

@@ -144,7 +144,7 @@ def test_manifest_and_setup_agree(setup_arguments: dict[str, Any]) -> None:
 
 
 def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any]) -> None:
-    """Extras contain only what the package can work without."""
+    """The extras of pip contain only packages without which the driver still works."""
     assert setup_arguments["extras_require"] == {**EXTRAS, "test": ["pytest"]}
 
 

@@ -54,7 +54,7 @@ def test_each_adapter_gets_the_same_name_and_rights() -> None:
 
 
 def test_only_one_adapter_is_taken_for_the_board() -> None:
-    """Only one rule makes the link; with two rules a lidar could become /dev/omnibot."""
+    """Only one rule makes the link /dev/omnibot. A second rule could give this name to a lidar."""
     assert len([rule for rule in ACTIVE if "SYMLINK" in rule]) == 1
 
 

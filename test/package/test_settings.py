@@ -43,7 +43,7 @@ def parameters(name: str, node: str) -> dict[str, Any]:
 
 
 def driver_names() -> set[str]:
-    """Return the driver's topics and services, relative to its namespace, as its code has them."""
+    """Return the names of topics and services in the driver's code, relative to its namespace."""
     calls = [
         node
         for source in (ROOT / NODE).glob("*.py")
@@ -122,7 +122,7 @@ def test_nav2_keeps_to_the_drivers_limits() -> None:
 
 
 def test_nav2_knows_that_the_robot_moves_sideways() -> None:
-    """Localization, control and thresholds of Nav2 allow sideways motion."""
+    """Nav2's localization, controller and velocity thresholds are set for sideways motion."""
     file = load("nav2_omnibot.yaml")
     controller = file["controller_server"]["ros__parameters"]
     assert controller["FollowPath"]["motion_model"] == "Omni"
@@ -160,7 +160,7 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 
 
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
-    """The mux's sources are not the driver's topics, and have the driver's timeout."""
+    """The mux reads from topics that the driver does not use, with the driver's command timeout."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()
     assert {source["timeout"] for source in sources} == {TIMEOUT}

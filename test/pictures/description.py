@@ -17,7 +17,9 @@ Array = NDArray[np.float64]
 
 DESCRIPTION = Path(__file__).parents[2] / "urdf" / "omnibot.urdf.xacro"
 WIDTH, HEIGHT, BAND, FINER = 800, 560, 20, 2
-"""WIDTH, HEIGHT: size in pixels; BAND: rows computed at once; FINER: rays along a pixel's side."""
+"""WIDTH, HEIGHT: size in pixels; BAND: number of rows computed at once; FINER: number of rays per
+pixel in each direction.
+"""
 EYE_M, LOOK_M, HALF_VIEW_RAD = np.array([0.62, 0.30, 0.42]), np.array([0.0, 0.0, 0.088]), 0.2138
 FLOOR_M, FADE_M = 0.2, 0.35
 LAMPS, LAMP_SIZE = 6, 0.06
@@ -114,7 +116,7 @@ def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArr
 
 @dataclass
 class Link:
-    """A group of solids near each other."""
+    """A group of solids near each other, and a sphere around the group."""
 
     solids: list[Solid]
 
@@ -126,7 +128,7 @@ class Link:
 
 
 def meet(links: list[Link], origins: Array, directions: Array) -> Iterator[tuple[Solid, Hits]]:
-    """Yield each solid with its intersections with the rays."""
+    """Yield each solid, with the places where the rays enter and leave it."""
     for link in links:
         rays = close(link.centre, link.reach, origins, directions)
         for solid in link.solids:

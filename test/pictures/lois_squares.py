@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Squares of 5 m driven by a simulated robot with a LOIS ECU: the true way and that of ``odom``.
+"""Picture of squares of 5 m, driven by a simulated LOIS ECU: true path and path of ``odom``.
 
 Both firmwares drive in both directions, with wheels of the right size and the gains of the ECU's
 own host. The errors are printed as rows of a table.

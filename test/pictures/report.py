@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of the report: a drive around the demo's square, with an e-stop, recorded to a bag."""
+"""Pictures of the report on a recorded drive around the demo's square, with an e-stop."""
 
 import math
 import os

@@ -56,7 +56,7 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 
 
 def test_the_boards_are_the_packages_beside_what_they_share() -> None:
-    """A package with a new board is found without being added to a list."""
+    """The simulator finds the package of a new board without a list of boards."""
     folder = Path(simulators.__file__).parent
     packages = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert {*boards(), "common"} == packages
@@ -78,7 +78,10 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
 
 
 def test_a_board_on_the_network_prints_its_address() -> None:
-    """A board on the network has options for network faults, and rejects ``--link``, ``--flip``."""
+    """A board on the network has options for network faults.
+
+    The simulator rejects ``--link`` and ``--flip`` for it.
+    """
     with toy("toy_udp", "--lose", "0.1", "--duplicate", "0.1", "--delay", "0.2") as process:
         address = line(process)
         assert re.fullmatch(r"udp://127\.0\.0\.1:\d+", address)

@@ -17,7 +17,7 @@ CHANNELS = (Channel("drive"), Channel("front", "front_port"))
 
 
 class ToyLines:
-    """A board with two serial lines; ``seed`` is stored for the tests and has no effect."""
+    """A board with two serial lines; ``seed`` is stored, but has no effect."""
 
     channels, tick_s = CHANNELS, 0.02
 

@@ -32,7 +32,7 @@ READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
-"""Events after half of a stream, and for how long the host then reads nothing, in s."""
+"""Events in the middle of a stream; for each, how long the host then reads nothing, in s."""
 RESTART = "the board restarts"
 BOOT_S = 0.7123
 
@@ -58,7 +58,7 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     "FTDI, timer restarted by data": ftdi_restarted,
 }
 BUSY = dict(READERS)
-"""Readers that have delays of their own, so that no delay is added to them."""
+"""Readers whose chunking already includes delays, so the test adds none."""
 
 
 @dataclass(slots=True)
@@ -70,7 +70,7 @@ class Stamped:
     samples: list[tuple[int, float, float]] = field(default_factory=list)
 
     def errors(self, since_s: float = SETTLED_S) -> list[float]:
-        """Return stamp minus sampling time in s, from ``since_s`` after the start or a restart."""
+        """Return stamp minus sampling time in s, except for ``since_s`` after start and restart."""
         return [at - self.sampled_s[tick] for tick, at, _ in self._settled(since_s)]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
@@ -93,7 +93,7 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Return half the width of the narrowest interval that contains this part of the errors."""
+    """Return half the width of the narrowest interval that contains ``part`` of the errors."""
     ordered = sorted(errors)
     ends = zip(ordered, ordered[math.ceil(part * len(ordered)) - 1 :], strict=False)
     return min(high - low for low, high in ends) / 2

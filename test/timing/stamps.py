@@ -2,8 +2,8 @@
 
 """The timing report: writes the worst figures of each cell into docs/internals/time.md.
 
-Arguments: ``--seconds`` of each stream, and ``--seeds``, among which the skews are divided;
-``--readers`` runs only the busy readers.
+Arguments: ``--seconds`` of each stream, and ``--seeds``, the number of streams in each cell, which
+have the skews of ``SKEWS`` in turn; ``--readers`` runs only the busy readers.
 """
 
 import argparse
@@ -23,7 +23,7 @@ LOSSES = (0.0, 1e-3, 1e-2)
 SCENARIOS = {"nominal": "driving", "IMU only": "IMU only, noisy gyro"}
 BLOCKS = "4096-byte blocks"
 BLOCKS_SETTLED_S = 6.0
-"""Time until the clock is settled with large blocks, in s: two blocks."""
+"""Time until the driver's clock has settled with large blocks, in s: the time of two blocks."""
 LIMITS_S = (0.2e-3, 0.5e-3)
 
 Cell = tuple[str, float, str, str]

@@ -34,7 +34,7 @@ def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
 def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either(
     line: str, scenario: str, skew: float, seed: int
 ) -> None:
-    """With one byte in 100 lost, stamps stay right where an earlier version was wrong."""
+    """With one byte in 100 lost, stamps are right on streams on which an old version failed."""
     stamped = stamp(line, scenario, 1e-2, skew, seed, 30.0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -42,7 +42,7 @@ def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either
 
 @pytest.mark.parametrize("event", ["the board restarts", "stall of 0.3 s", "stall of 2 s"])
 def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) -> None:
-    """The constant offset of the stamps is the same before and after a restart or a stall."""
+    """After a restart or a stall, stamps have the same constant offset as before, within 0.5 ms."""
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, skew, seed, 20.0, event)
         assert stamped.unevenness() < 0.2e-3
@@ -50,9 +50,11 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) 
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """Without skew, an FTDI's timer keeps its phase, which is known to within 2 ms less 13 bytes.
+    """Without skew, all stamps are late by the duration of a frame, to within 0.5 ms.
 
-    The check begins after the first 2 s, on streams of which two in five are never cut.
+    An FTDI's timer then keeps its phase relative to the ticks, and may never cut a frame in two.
+    The driver then knows the phase only to within 2 ms minus the duration of 13 bytes. The check
+    leaves out the first 2 s of each stream.
     """
     for seed in range(10):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, 0.0, seed, 4.0)
@@ -64,7 +66,7 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str) -> None:
     """Stamps of a late reader are as accurate as on an undisturbed line.
 
-    Readers that read in parts are left out, because a few of their stamps are a tick off.
+    The test omits readers that read in parts, because a few of their stamps are wrong by a tick.
     """
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(reader, scenario, 0.0, skew, seed, 15.0)

@@ -2,7 +2,8 @@
 
 """The profile and core of a toy board: two serial lines of text, two wheels, without IMU.
 
-``drive`` takes ``v LEFT RIGHT`` in mm/s; ``sense`` sends ``d WAY TURN`` in mm and mrad every 0.4 s.
+The line ``drive`` takes commands ``v LEFT RIGHT`` in mm/s. The line ``sense`` sends ``d WAY TURN``
+in mm and mrad every 0.4 s.
 """
 
 import re

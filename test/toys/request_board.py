@@ -32,7 +32,7 @@ AT = re.compile(rb"at (-?\d+) (-?\d+)")
 
 
 class Moves:
-    """The toy's actuator: one move at a time, each after the reply to the request before."""
+    """The toy's actuator: it sends one move at a time, after the reply to the previous request."""
 
     rate_hz = 20.0
     commanded: BodyTwist | None = BodyTwist(0.0, 0.0, 0.0)

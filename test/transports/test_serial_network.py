@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ports on a network: used like a serial port, and given up when the peer is gone."""
+"""Serial ports on a network: usable like local ones, and closed when the peer is gone."""
 
 import contextlib
 import ctypes
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
-    """Return a port that is connected to this server, and the far end."""
+    """Return a port that is connected to this server, and the server's socket for it."""
     port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     return port, server.accept()[0]
 
@@ -34,7 +34,7 @@ def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
 def test_a_peer_that_vanished_without_a_word_is_given_up(
     monkeypatch: pytest.MonkeyPatch, said: bytes
 ) -> None:
-    """A peer that vanished is given up, although a half-open connection refuses nothing."""
+    """The port notices that its peer has vanished, although writes raise no error at first."""
     options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
     monkeypatch.setattr("omnibot_driver.transports.serial_port.PEER_OPTIONS", options)
     with socket.create_server(("127.0.0.1", 0)) as server:

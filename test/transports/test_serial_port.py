@@ -68,7 +68,7 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
 
 
 def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Terminal) -> None:
-    """The kernel cuts a program's name after 15 bytes, perhaps within a letter of two bytes."""
+    """The kernel keeps 15 bytes of the owner's name, which may end within a two-byte letter."""
     own = Path("/proc/self/comm")
     before = own.read_bytes()
     port = SerialPort(terminal.path, 115200)
@@ -82,7 +82,7 @@ def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Te
 
 
 def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
-    """Closing a port switches its hang-up off: if DTR fell, a board wired to it would restart."""
+    """Closing a port does not lower DTR; a board that is wired to DTR would restart."""
     near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
     attributes = termios.tcgetattr(near)
     attributes[2] |= termios.HUPCL
@@ -121,7 +121,7 @@ TIOCGEXCL = 0x80045440
 
 
 def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
-    """After a failed write, old data in the kernel is discarded, so that the newest comes first."""
+    """After a failed write, the port discards old data in the kernel, so new data comes first."""
     port = SerialPort(terminal.path, 115200)
     terminal.fill()
     with pytest.raises(LinkError, match="while writing"):
@@ -131,7 +131,7 @@ def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) 
 
 
 def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
-    """A long write is completed: the kernel takes the rest while the other end is read."""
+    """A write that the kernel accepts only in parts is completed while the other end reads."""
     port = SerialPort(terminal.path, 115200)
     message = b"".join(b"%05d" % number for number in range(8000))
     reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))

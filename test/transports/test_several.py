@@ -146,7 +146,7 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
 def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reader may be busy, so the write itself must notice the full line."""
+    """A write itself declares a line missing if it is full for too long; the reader may be busy."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -158,7 +158,7 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a guard held the line open, its lock would prevent a new opening."""
+    """A full line is not given to a guard, since its lock would prevent a new opening."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -219,7 +219,7 @@ def test_where_none_can_be_opened_none_is_kept() -> None:
 
 
 def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
-    """If two lines have the same port, one of them is missing, since a port is exclusive."""
+    """If two lines have the same port, the second is missing, since a port is exclusive."""
     with contextlib.closing(Several([partial(SerialPort, ends.paths[0], 115200)] * 2)) as lines:
         assert "in use" in lines.missing[1]
 

@@ -78,7 +78,7 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """A channel keeps as many bytes as a terminal does: the oldest ones; newer ones are dropped."""
+    """A channel keeps as many unread bytes as a terminal, and drops the bytes that come later."""
     served = InProcessBoard(toy_lines.ToyLines())
     taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]
     assert taken == [1000, 1000, 1000, 1000, UNREAD_LIMIT - 4000, 0]
@@ -97,7 +97,7 @@ def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
 
 
 def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> None:
-    """Bytes of one channel are not joined with those of another that came in between."""
+    """A read returns bytes of a single channel; reads are in the order in which the board sent."""
     transport = stack.enter_context(closing(SimulatedTransport("sim://", TOY)))
     transport.write([(toy_lines.FRONT, b"angle 30\n"), (toy_lines.DRIVE, b"go 0.5 0\n")])
     assert b"30" in read(transport, 200, toy_lines.FRONT)
@@ -124,7 +124,7 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The death of the board's thread is a defect with its cause, not a lost cable.
+    """If the board's thread fails, the error is a defect with its cause, not a lost cable.
 
     The board can still be closed.
     """

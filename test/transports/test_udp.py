@@ -136,7 +136,7 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
     ],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
-    """The error shows the form of a URL; port 65535 is refused, because no port is one higher."""
+    """The error shows the form of a URL. Port 65535 is refused, as the next port does not exist."""
     with pytest.raises(LinkError, match=r"give udp://HOST:PORT"):
         UdpPorts(url, 2)
 

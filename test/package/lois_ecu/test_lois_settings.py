@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of other packages for the LOIS ECU have its topics and limits, no sideways motion."""
+"""Settings of other packages for the LOIS ECU: its topics, its limits, and no sideways motion."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_heading() -> None:
-    """The filter does not fuse the wheels' pose; the heading is relative to its first value."""
+    """The filter fuses the heading relative to its first value, and not the wheels' pose."""
     ekf = load("ekf_lois_ecu.yaml")["/**"]["ros__parameters"]
     fused = {
         sensor: {s for s, used in zip(STATES, ekf[f"{sensor}_config"], strict=True) if used}

@@ -29,7 +29,7 @@ def test_a_line_without_faults_changes_nothing() -> None:
 def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
     cuts: list[int], seed: int
 ) -> None:
-    """The fate of a byte is the same in chunks of any size, even within a burst of losses."""
+    """The same bytes are lost or changed in chunks of any size, even within a burst of losses."""
     faults, data = LineFaults(lose=0.01, burst=0.005, flip=0.01), SENT[:2000]
     line = FaultyLine(faults, seed)
     parts = [

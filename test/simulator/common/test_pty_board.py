@@ -44,7 +44,7 @@ class Ticker:
 
 
 def all_of(port: int) -> Iterator[bytes]:
-    """Yield all bytes that a terminal holds, because one read may return fewer."""
+    """Yield all bytes that a terminal holds, in pieces, as one read may not return all."""
     with suppress(BlockingIOError):
         while data := os.read(port, 8192):
             yield data
@@ -102,7 +102,7 @@ class Clock:
 def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Ticks take 3 ms, and every 50th takes 25 ms; the 999th tick is still at 9.99 s."""
+    """Although every 50th tick takes 25 ms to compute, the 999th tick begins at 9.99 s."""
     clock = Clock(monkeypatch)
     board = clock.board(lambda tick: 0.025 if tick % 50 == 0 else 0.003)
     with PtyBoard(board) as pty:
@@ -125,7 +125,10 @@ def test_waiting_for_what_does_not_come_ends_with_false() -> None:
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """An exception in the thread of a board is the cause of the RuntimeError that is raised."""
+    """If a board's thread fails, a wait for the board raises RuntimeError; so does closing it.
+
+    The cause of the RuntimeError is the exception of the thread.
+    """
 
     class BrokenBoard(Ticker):
         def advance(self) -> list[Packet]:

@@ -14,7 +14,7 @@ LATE_S = 0.7
 
 
 class Motor:
-    """A board that is driven until it receives a stop; ``driven`` counts its ticks until then."""
+    """A board that is driven until it receives a stop; ``driven``: number of ticks until then."""
 
     channels, tick_s = (Channel(),), 0.01
 
@@ -37,7 +37,7 @@ class Motor:
 
 
 class LateBoard(RunningBoard[Motor]):
-    """A board whose thread stands still for ``LATE_S``, in which time a stop arrives."""
+    """A board whose thread does not run for ``LATE_S``; a stop arrives in this time."""
 
     def __init__(self) -> None:
         super().__init__(Motor())
@@ -59,7 +59,7 @@ class LateBoard(RunningBoard[Motor]):
 def test_what_came_while_the_thread_was_late_precedes_the_ticks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A stop that arrives while the thread is late acts before the late ticks.
+    """If a stop arrives while the thread does not run, it acts before the ticks that are due.
 
     A real board would not drive on while its computer is busy.
     """

@@ -67,7 +67,7 @@ def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
 
 
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
-    """Refused are too many links, a link whose path exists, and a link for a UDP socket."""
+    """Too many links are refused, and so are a link whose path exists and one for a UDP socket."""
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
         open_carriers(ToyLines.channels, three)
@@ -140,7 +140,7 @@ def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
 
 
 def test_the_facts_add_what_became_of_the_lines() -> None:
-    """The facts of a board are followed by the numbers of dropped bytes and of faults."""
+    """A served board adds counts of dropped data and of the lines' faults to the board's facts."""
     with ServedBoard(ToyServer()) as served, served.lock:
         assert served.facts == {
             "x_m": 0.0,

@@ -12,7 +12,7 @@ from omnibot_driver.simulator.common.wired import WiredBoard
 
 
 def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
-    """A command in two pieces is complete, even if another channel receives data in between."""
+    """A board obeys a command that comes in two pieces, with data of another channel in between."""
     wired = WiredBoard(ToyLines())
     wired.receive(b"go 0.", 0.0, DRIVE)
     wired.receive(b"angle 30\n", 0.0, FRONT)
@@ -22,7 +22,7 @@ def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
 
 
 def test_each_channel_has_its_own_faults() -> None:
-    """The line of the first channel loses all bytes, that of the second channel none."""
+    """The line of the front wheel loses all bytes; the line of the drive loses none."""
     cut = FaultyLine(LineFaults(lose=1.0))
     wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
     packets = [packet for _ in range(20) for packet in wired.advance()]
@@ -60,7 +60,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """A late datagram arrives by the caller's clock, which in this test begins at 1000 s."""
+    """A datagram's delay of 1 s is by the caller's clock, which in this test begins at 1000 s."""
     at: list[float] = []
 
     class Watch(ToyServer):

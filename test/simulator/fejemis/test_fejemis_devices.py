@@ -42,7 +42,10 @@ def test_the_band_and_single_leds() -> None:
 
 
 def test_distances_to_a_wall() -> None:
-    """Without a wall, sensors report 8.19 m, no sonar echo, and the end of the infrared range."""
+    """All sensors measure a wall at 0.5 m.
+
+    Without a wall they report the ends of their ranges; the sonar reports 0.
+    """
     rig = Rig(front_m=0.5).booted()
     assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]
     assert rig.ask(FRONT, "iri")[0].split()[:3] == ["irc", "0.500", "0.500"]
@@ -63,7 +66,7 @@ def test_the_sonar_measures_when_it_is_triggered() -> None:
 
 
 def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
-    """The mean reading of the gyro becomes its offset, which is wrong for a robot that turns."""
+    """``gyroc`` stores the mean reading of the gyro as its offset, even while the robot turns."""
     rig = Rig().booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -76,7 +79,7 @@ def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
 
 
 def test_the_accelerometer_is_calibrated_as_level() -> None:
-    """``acccal2`` assumes that the board is level; ``acccal`` sets offsets and scales."""
+    """``acccal2`` calibrates for a level board; ``acccal`` sets the given offsets and scales."""
     rig = Rig(accel_noise_mps2=0.0).booted()
     rig.say(DRIVE, "acccal2")
     rig.run(1.2)
@@ -99,7 +102,7 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """``eer`` and ``setid 0`` load a configuration without gyro offset: the bias turns the yaw."""
+    """After ``eer`` and ``setid 0`` the gyro has no offset, so the yaw drifts with its bias."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -111,7 +114,7 @@ def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_load
 
 
 def test_the_answer_to_confs_has_the_steering_first() -> None:
-    """Both halves are set with ``confs B F`` but reply with ``confs F B``."""
+    """Both halves take ``confs TRACK STEERING`` but reply with ``confs STEERING TRACK``."""
     rig = Rig().booted()
     for port in (DRIVE, FRONT):
         rig.say(port, "confs 0.5 0.6")
@@ -151,7 +154,10 @@ def test_id_zero_erases_the_configuration() -> None:
 
 
 def test_gains_of_the_steering_count() -> None:
-    """``cssteer`` sets the gains in the order of ``cpsteer``; a lower gain steers more slowly."""
+    """``cssteer`` sets gains in the order in which ``cpsteer`` reports them.
+
+    With a lower gain, the steering is slower.
+    """
     times = []
     for gain in (43, 10):
         rig = Rig().booted()

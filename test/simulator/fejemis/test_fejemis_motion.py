@@ -31,7 +31,7 @@ def steered_degrees(v: float, w: float) -> float:
 def test_the_body_moves_by_the_equations_of_the_manual(
     v: float, w: float, speed: float, turn: float
 ) -> None:
-    """The speed and turn rate are calculated by hand; an ``rc`` line names other values."""
+    """Speed and turn rate are as calculated by hand; they differ from an ``rc`` line's v and w."""
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)
     assert (right - left) / B == pytest.approx(turn, abs=1e-4)
@@ -63,7 +63,7 @@ def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
 
 
 def test_without_the_angle_drive_goes_straight() -> None:
-    """The drive half gets the angle of the front wheel only from the host, which relays it."""
+    """If the host does not relay the front angle, the drive half assumes a straight front wheel."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.5 30")
     rig.run(1.0)

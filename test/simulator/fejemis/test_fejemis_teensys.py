@@ -15,7 +15,7 @@ MODULE = "omnibot_driver.simulator.fejemis"
 
 
 def angle_line(rig: Rig) -> tuple[float, int, int]:
-    """Return the angle in degrees, the error flags, and the diagnosis without the frame counter."""
+    """Return the angle line: degrees, error flags, and diagnosis without the frame counter."""
     _, degrees, errors, bits = rig.ask(FRONT, "fwli")[0].split()
     return float(degrees), int(errors, 16), int(bits, 16) & 0x7FF
 
@@ -79,7 +79,7 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
     boot_s: float, *, says_start: bool
 ) -> None:
-    """The time in the lines is zero at the beginning of the boot."""
+    """The time in the lines of a half counts from the beginning of its boot."""
     rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
     began = rig.now
     rig.board.befall("drive", "restart")
@@ -195,7 +195,7 @@ def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
     ],
 )
 def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> None:
-    """Each error bit of the sensor's diagnosis is the one in the manual's list."""
+    """Each fault of the sensor sets the bit of the diagnosis that the manual lists for it."""
     rig = Rig().booted()
     rig.board.befall("front", what)
     assert angle_line(rig)[1:] == (0, diagnosis)
@@ -204,7 +204,10 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """A frozen sensor looks healthy, and the steering runs to its end stop."""
+    """A frozen angle sensor reports no error, so the steering runs to its end stop.
+
+    An absent sensor and one in error can be seen in the angle line.
+    """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")
     rig.run(1.0)
@@ -222,7 +225,7 @@ def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
 
 
 def test_the_offset_of_the_sensor_is_configured() -> None:
-    """``fwoffset`` sets the zero of the angle; its second number reverses the sign."""
+    """``fwoffset`` sets the zero of the angle; if its second number is 1, the sign is reversed."""
     rig = Rig(sensor_zero_deg=7.0, angle_noise_deg=0.0).booted()
     assert angle_line(rig)[0] == 0.0
     rig.say(FRONT, "fwoffset 0 1")

@@ -126,7 +126,10 @@ KEYS = {
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
-    """The key of each value is that of the help text; infrared sensors reply with another key."""
+    """A request for each value, and a subscription, use its key in the help text.
+
+    Replies begin with the same key, except that of the infrared sensors.
+    """
     rig = Rig().booted()
     rig.say(port, "leave")
     rig.run(0.01)
@@ -186,7 +189,7 @@ def test_lines_end_with_or_without_a_carriage_return() -> None:
 
 
 def test_variants_of_messages() -> None:
-    """Some firmware sends a time before the wheel speeds, a tilt after the pose, or g as unit."""
+    """Some firmware adds a time to the wheel speeds and a tilt to the pose, or measures in g."""
     usual = Rig(accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
     assert len(usual.ask(DRIVE, "veli")[0].split()) == 3
     assert len(usual.ask(DRIVE, "posei")[0].split()) == 5
@@ -199,7 +202,7 @@ def test_variants_of_messages() -> None:
 
 
 def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
-    """In single precision, the board's time has steps of about 0.5 ms after two hours."""
+    """If the board keeps time in single precision, it has steps of about 0.5 ms after two hours."""
     firmware = Firmware(sums=False, single_precision=True)
     rig = Rig(firmware=firmware, uptime_s=8000.0)
     times = []
@@ -230,9 +233,9 @@ def test_bytes_to_the_boards_can_be_lost() -> None:
 
 
 def test_three_lost_characters_leave_a_valid_command() -> None:
-    """Modulo 99, the character ``c`` is 0, and so are ``2`` and ``1`` together.
+    """A command that loses ``c``, ``2`` and ``1`` has the same checksum, so it is still valid.
 
-    A line that lost these three characters has the same checksum.
+    The checksum is a sum modulo 99, to which ``c`` adds 0, and ``2`` and ``1`` together add 0.
     """
     rig = Rig(firmware=SUMS).booted()
     whole, cut = "rc 2 0.250 11.459", "rc  0.250 1.459"

@@ -40,7 +40,7 @@ class Rig:
         return found
 
     def say(self, *commands: Command) -> None:
-        """Send each command until the board obeys it, because the board may miss a line."""
+        """Send each command repeatedly until the board obeys it, because it may miss a line."""
         for command in commands:
             data = encode_command(command, with_sum=self.board._reader.checks)
             for _ in range(50):

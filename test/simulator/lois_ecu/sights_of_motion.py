@@ -115,7 +115,7 @@ def slow_timer(quirks: Quirks) -> bool:
 
 
 def limits_rpm(quirks: Quirks) -> bool:
-    """A target of 58 RPM gives a speed below 55 RPM."""
+    """With a target of 58 RPM, the wheel turns at less than 55 RPM."""
     rig = Rig(quirks).booted()
     rig.drive(58, 58, 30.0)
     speeds = []

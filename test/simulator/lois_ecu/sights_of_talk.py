@@ -44,7 +44,7 @@ def with_sum(text: bytes) -> bytes:
 
 
 def extra_settings(quirks: Quirks) -> bool:
-    """With Kp = 0, feed-forward alone turns the wheels."""
+    """The feed-forward setting exists: with Kp = 0, it alone turns the wheel."""
     rig = Rig(replace(quirks, low_pass_starts_at_zero=False))
     rig.run(2.1)
     for setting in (Setting.LEFT_KP, Setting.RIGHT_KP):
@@ -60,7 +60,7 @@ def appends_odometry(quirks: Quirks) -> bool:
 
 
 def clock_in_ms(quirks: Quirks) -> bool:
-    """The decoder recognises timestamps in ms instead of ns."""
+    """The driver's decoder finds that the board's timestamps are in ms, not in ns."""
     rig = Rig(quirks)
     rig.run(6.0)
     return rig.decoder.clock_unit == "ms"
@@ -78,7 +78,7 @@ def clock_stops_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_sending(quirks: Quirks) -> bool:
-    """More than 5 of 300 single lines are lost."""
+    """The board loses more than 5 of 300 lines that are sent once."""
     rig = Rig(quirks)
     rig.run(2.1)
     for number in range(300):
@@ -90,7 +90,7 @@ def deaf_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_counting(quirks: Quirks) -> bool:
-    """At full speed, more than 10 % of single lines are lost."""
+    """At full speed, the board loses more than 10 % of lines that are sent once."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(100, 100))
@@ -103,7 +103,7 @@ def deaf_while_counting(quirks: Quirks) -> bool:
 
 
 def button_waits_while_sending(quirks: Quirks) -> bool:
-    """The button does not cut the power during a record; 100 samples take 0.12 s to send."""
+    """The button does not cut the power while the board sends a record, here for 0.12 s."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(50, 50), RecordTorque(100, 100))
@@ -209,7 +209,7 @@ def _record(rig: Rig, kind: RecordKind, count: int, seconds: float) -> Record | 
 
 
 def records_in_100_us(quirks: Quirks) -> bool:
-    """At 20 RPM, ticks are 50 ms apart, which 16 bits can hold only in a unit above 100 ns."""
+    """Records have times in units of 100 µs: at 20 RPM, ticks are about 500 units apart."""
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 5.0)
     record = _record(rig, RecordKind.RPM, 20, 4.0)
@@ -219,7 +219,7 @@ def records_in_100_us(quirks: Quirks) -> bool:
 
 
 def torque_comes_as_rpm(quirks: Quirks) -> bool:
-    """The reply to the request 0x17 (torque) has command number 0x04."""
+    """The board replies to the request 0x17 (torque) with the command number 0x04 (RPM)."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(encode_command(RecordTorque(5, 5)))
@@ -229,14 +229,14 @@ def torque_comes_as_rpm(quirks: Quirks) -> bool:
 
 
 def record_waits_for_one_more(quirks: Quirks) -> bool:
-    """A record of 3 headings is still incomplete after 3 samples."""
+    """The board does not send a record of 3 headings after the third sample."""
     rig = Rig(quirks, compass_period_s=1.0)
     rig.run(2.5)
     return _record(rig, RecordKind.HEADING, 3, 3.1) is None
 
 
 def large_records_never_end(quirks: Quirks) -> bool:
-    """A record of 1025 torque samples is not complete after its time of 93 s or 205 s."""
+    """The board never sends a record of 1025 torque samples, not even after 93 s or 205 s."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(with_sum(b":1704010401"))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""For each deviation of the public firmware from the manual, a test of the driver is named."""
+"""A table that names a test of the driver for each deviation of the firmware from the manual."""
 
 import ast
 from dataclasses import fields

@@ -54,7 +54,7 @@ def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
 
 
 def test_periods_stretch_with_the_load() -> None:
-    """In the public firmware a period of 400 ms takes 422 ms."""
+    """The public firmware sends a message with a period of 400 ms only every 422 ms."""
     rig = Rig()
     rig.run(3.0)
     assert len(ticks_in(rig.run(42.2))) in range(98, 103)
@@ -91,9 +91,9 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
-    """A release of the button does not move the robot.
+    """A press of the button stops the robot, and a release does not move it.
 
-    A new set point does, even while the button is pressed.
+    A new set point moves the robot, even while the button is pressed.
     """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 4.0)

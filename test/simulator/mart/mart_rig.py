@@ -46,7 +46,7 @@ class Rig:
         return [reply.data.decode("latin-1") for reply in found]
 
     def wait(self, limit_s: float = 20.0) -> str | None:
-        """Return the next reply, or None after ``limit_s``; ``took_s`` is then its delay in s."""
+        """Return the next reply, or None after ``limit_s``; store its delay in ``took_s``."""
         began_s, until_s = self.now, self.now + limit_s
         while self.now < until_s:
             found = self.run(max(0.0, min(self.server.wake_at, until_s) - self.now))

@@ -12,7 +12,7 @@ from omnibot_driver.simulator.mart import FIRMWARE
 
 @pytest.mark.parametrize(("text", "sign"), [("TF 12", 1), ("TB 12", -1)])
 def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) -> None:
-    """The reply is "ok 12" although 15.8 inches were driven: the distance is computed from time."""
+    """The reply is "ok 12" after 15.8 inches, as the server computes the distance from time."""
     rig = Rig()
     assert rig.ask(text) == "ok 12"
     assert sign * rig.x_in == pytest.approx(15.8, abs=0.2)
@@ -46,7 +46,10 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """SDR limits the distance of an unlimited move, counted from the start of the move."""
+    """SDR sets the distance, counted from the start, at which an unlimited move ends.
+
+    It has no effect on a move with a distance.
+    """
     rig = Rig()
     rig.say("TF 0")
     rig.run(1.0)
@@ -118,7 +121,7 @@ def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
 
 
 def test_tf_dock_stops_at_the_dock() -> None:
-    """The reply to TF DOCK has the computed distance, not the driven one."""
+    """TF DOCK stops at the dock; its reply has a distance computed from time, not measured."""
     rig = Rig(dock_m=20 * INCH_M)
     assert rig.ask("DOCKED") == "ok false"
     answer = rig.ask("TF DOCK 60", 60.0)

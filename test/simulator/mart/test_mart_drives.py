@@ -29,7 +29,7 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
     """If RM fails although the robot moves, only a write to the motors ends the motion.
 
-    The server does not know of the motion.
+    For the server no motion is in progress, so SRM fails and SL has no effect.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
@@ -101,7 +101,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """If a motor is stuck, the first RM fails without a reason, a later RM with that of F."""
+    """If a motor is stuck, the first RM fails without a reason; an RM after F gives a reason."""
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)
@@ -140,7 +140,10 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """CS and RMCS: the first number is for the right motor, and positive is forward, even in B."""
+    """The numbers of CS and RMCS are for the right and left motor; positive is more forward.
+
+    This is also true during B, which drives backward.
+    """
     rig = Rig()
     rig.drive(start)
     before = rig.server.chassis.copy()
@@ -195,7 +198,7 @@ def test_rmcs_0_0_just_reads_the_angle() -> None:
 
 @pytest.mark.parametrize("turn", ["RMCS 4 -4", "RMCS -4 4"])
 def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
-    """RMRA returns the angle since RM, positive to the left, right within the gyro's noise."""
+    """RMRA returns the angle turned since RM, positive to the left, with only the gyro's noise."""
     rig = Rig(gyro_bias_dps=0.0)
     rig.drive("L")
     rig.ask("SM")
@@ -303,7 +306,7 @@ def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
 def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
     volts: float, inequality: float
 ) -> None:
-    """The speed of a unit depends on voltage and motors, as the board's speed regulator is off."""
+    """A register value gives a speed that depends on voltage and motor: the regulator is off."""
     rig = Rig(volts=volts, motor_inequality=inequality)
     rig.drive("RM 40")
     chassis = rig.server.chassis

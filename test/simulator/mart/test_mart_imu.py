@@ -126,7 +126,7 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 
 
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
-    """An IMU that failed is not used again before RST IMU or SB, even if it responds."""
+    """After the IMU has failed, the server uses it again only after a successful RST IMU or SB."""
     for cure in ("RST IMU", "SB"):
         rig = Rig()
         rig.server.imu.alive = False

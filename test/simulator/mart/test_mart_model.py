@@ -73,7 +73,7 @@ def test_the_size_of_the_steps_does_not_matter() -> None:
 
 
 def test_it_runs_faster_than_a_hundredth_of_real_time_even_while_it_drives() -> None:
-    """A drive of 100 s needs less than 1 s of processor time; an idle computer needs 0.1 s."""
+    """A simulated drive of 100 s needs less than 1 s of processor time, usually about 0.1 s."""
     rig = Rig()
     rig.drive("RM 30")
     began = time.process_time()

@@ -79,7 +79,7 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """After a stop of 0.57 s, the next RM fails at once, and the one after it does not."""
+    """If a stop took 0.57 s, the next RM fails at once; the RM after that succeeds."""
     rig = Rig(quirks)
     rig.drive("RM 66")
     assert rig.ask("SRM") == "ok"

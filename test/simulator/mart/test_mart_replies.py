@@ -121,7 +121,7 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 
 
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
-    """At rest, CS is refused before its numbers are read, so a missing number does no harm."""
+    """At rest, the server refuses CS without reading its numbers; a missing one does no harm."""
     assert Rig().ask("CS 5") == "fail"
 
 

@@ -177,7 +177,8 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
     """In the first moments of a controlled move, SL is ignored.
 
-    During the measurement of the bias that follows, SL ends the move, but late and as a failure.
+    The server then measures the bias of the gyro. An SL in this time ends the move late, and the
+    move is answered as failed.
     """
     rig = Rig()
     rig.say("TF 24")

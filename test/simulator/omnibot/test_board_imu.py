@@ -68,7 +68,10 @@ def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
 
 
 def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
-    """The integrated acceleration is the speed gained, with the same sign on x, reversed on y."""
+    """The integral of the measured acceleration is the speed that the robot has gained.
+
+    Its sign is reversed on y, because the sensor is mounted upside down.
+    """
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
     values = readings(board, 1.0)
@@ -82,7 +85,10 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
 def test_a_curve_is_felt_as_centripetal_acceleration(
     x: int, y: int, felt_mps2: tuple[float, float]
 ) -> None:
-    """At 0.5 m/s and 1 rad/s the IMU shows 0.5 m/s² to the left of the motion; y is reversed."""
+    """At 0.5 m/s and 1 rad/s the IMU measures 0.5 m/s² to the left of the motion.
+
+    On y the sign is reversed, because the sensor is mounted upside down.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(x, y, 500))
     run(board, 2.0)

@@ -57,7 +57,7 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """If three bytes have come during the boot, the first S after it is obeyed."""
+    """If the board gets three bytes during the boot, it obeys the first S after the boot."""
     board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
     board.receive(bytes(3))
     run(board, 0.3)
@@ -88,7 +88,10 @@ def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
 
 
 def test_r_reboots_the_board_but_not_the_robot() -> None:
-    """After R, odometry, SEQ and the wake-up begin again; the true pose of the robot stays."""
+    """R sets odometry and SEQ of the board to zero; the board must then be woken again.
+
+    The true pose of the robot does not change.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
@@ -117,7 +120,7 @@ def test_a_power_cycle_does_what_r_does() -> None:
 
 
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
-    """A paused board reads letters within a motion frame: 0x52 resets it, and 0x50 starts it."""
+    """A paused board takes bytes of a motion frame for letters: 0x52 resets it, 0x50 starts it."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
     assert mode_of(board) is BoardMode.BOOTING
@@ -129,7 +132,10 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """The wake-up takes the header, so the rest of the frame is read as letters, even a reset."""
+    """A board that is not yet woken loses the first three bytes of a motion frame.
+
+    It reads the rest of the frame as letters, here as a reset.
+    """
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
     assert [command.kind for command in board.commands] == ["reset"]
@@ -200,7 +206,7 @@ def test_what_was_received_and_obeyed_is_on_record() -> None:
 
 @pytest.mark.slow
 def test_the_record_of_received_bytes_is_bounded() -> None:
-    """Of the bytes received, the log keeps the newest, about a million at most."""
+    """The log keeps at most about a million of the received bytes: the newest ones."""
     board = SimulatedBoard(RUNNING)
     for _ in range(30):
         board.receive(bytes(100_000))

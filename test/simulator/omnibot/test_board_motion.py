@@ -101,7 +101,7 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
     """Only a reset releases a latched emergency stop: no command, pause or start does.
 
-    Motion commands that are refused are not logged.
+    The board does not log motion commands that it refuses.
     """
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))
@@ -126,7 +126,8 @@ def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
 ) -> None:
     """With the switch on position, a command is a pose in the board's earth frame, in mm and mrad.
 
-    The robot stops at this pose; full turns count.
+    The robot stops at this pose; if its yaw exceeds a full turn, the robot makes that full turn,
+    too.
     """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))

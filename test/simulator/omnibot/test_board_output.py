@@ -88,7 +88,7 @@ def test_both_sequences_count_by_themselves_and_wrap() -> None:
 
 
 def test_a_sequence_goes_on_after_a_pause() -> None:
-    """Only a reboot sets SEQ to zero; motion during a pause is in the next delta."""
+    """A pause does not change SEQ; the first delta after the pause has the motion during it."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
@@ -146,7 +146,7 @@ def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
 
 
 def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
-    """The board's odometry assumes nominal wheels; slip and scale errors move only the truth."""
+    """With slip and scale errors, the board's odometry differs from the true pose."""
     board = SimulatedBoard(
         BoardSettings(running=True, slip=0.05, wheel_radius_scale=(1.0, 1.01, 1.0))
     )

@@ -44,7 +44,10 @@ def last(board: SimulatedBoard, header: bytes, count: int) -> tuple[int, ...]:
 def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_know(
     command: bytes, signs: tuple[int, int, int], axis: int
 ) -> None:
-    """A reversed axis reverses commands and odometry, so the board's own pose is as expected."""
+    """On a reversed axis, the robot moves in the direction opposite to the command.
+
+    The board's odometry is reversed too, so its own pose agrees with the command.
+    """
     straight, reversed_ = driven(command), driven(command, axis_signs=signs)
     truth = (reversed_.truth.x_m, reversed_.truth.y_m, reversed_.truth.yaw_rad)
     assert truth[axis] < -0.05
@@ -55,7 +58,7 @@ def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_kn
 
 
 def test_wheel_counts_are_those_of_the_wheels() -> None:
-    """By hand: if wheel B moves at 8 / 70 m/s, it has 39 counts in 40 ms, and the others none."""
+    """If wheel B moves at 8 / 70 m/s, a delta has 39 counts for it, and none for the others."""
     a, b, c = last(driven(WHEEL_B, 2.0, frame="wheel_counts"), DELTA, 3)
     assert (a, c) == (0, 0)
     assert b == pytest.approx(8 / 70 * 0.04 * 1560 / (2 * pi * 0.029), abs=1.5)
@@ -70,7 +73,7 @@ def test_each_motor_has_its_own_constants() -> None:
 
 
 def test_a_motors_delay_holds_its_effort_back() -> None:
-    """With a delay of three ticks, a motor rests for three ticks, then moves as one without."""
+    """A motor with a delay moves like one without, but three ticks later."""
     prompt, late = Motor(), Motor(MotorConstants(delay_ticks=3))
     turned = [prompt.advance(500.0) for _ in range(10)]
     assert [late.advance(500.0) for _ in range(10)] == [0.0, 0.0, 0.0, *turned[:7]]
@@ -96,7 +99,10 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """By REP-103, a nose that is up is a negative pitch, a left side that is up a positive roll."""
+    """The accelerometer of a held robot shows the roll and pitch of robot and sensor.
+
+    By REP-103, pitch is negative if the front is up; roll is positive if the left side is up.
+    """
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)
     board.step()

@@ -115,7 +115,7 @@ def test_letters_within_a_control_frame_act_where_frames_are_not_obeyed(kind: Re
 
 
 def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
-    """In FF S, the FF is a stray byte and S a start; the naive receiver loses the S with the FF."""
+    """After a stray FF, receivers obey the letter S; only the naive receiver loses it."""
     assert understood("FF 53") == [START]
     assert understood("FF 53", kind=WINDOW) == [START]
     assert understood("FF 53", kind=NAIVE) == []
@@ -123,7 +123,7 @@ def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
 
 
 def test_the_window_takes_no_letter_soon_after_a_header() -> None:
-    """The window receiver obeys a letter only when FF FE has left its window of nine bytes."""
+    """The window receiver ignores letters while FF FE is among the last nine bytes."""
     assert understood("FF FE 02 00 00 00 53 00 00 53", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0x0053, 0)),
         START,
@@ -134,26 +134,26 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """A stop that lost a byte takes the FF of the next frame: wheel C turns at 255 LSB."""
+    """The FF of the next frame completes a stop that lost a byte: wheel C turns at 255 LSB."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole) == [ControlFrame(0x02, (0, 0, 255))]
     assert understood(short, whole, pause_s=3600.0) == [ControlFrame(0x02, (0, 0, 255))]
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
-    """After a stop that lost a byte, a P, which should pause the robot, becomes a wheel speed."""
+    """If a stop lost a byte, the letter P after it becomes a speed of wheel C, not a pause."""
     assert understood("FF FE 02 00 00 00 00 00", "50") == [ControlFrame(0x02, (0, 0, 80))]
 
 
 def test_an_idle_gap_ends_half_a_frame() -> None:
-    """After an idle gap, the next frame is found, and a letter acts."""
+    """After an idle gap the receiver forgets half a frame, and finds the next frame or letter."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole, kind=IDLE_GAP) == [STOP]
     assert understood(short, "50", kind=IDLE_GAP) == [PAUSE]
 
 
 def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
-    """After a pause of less than 5 ms the receiver continues to count, as bytes may be late."""
+    """A pause of less than 5 ms does not end a frame, because bytes may be late."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     false = [ControlFrame(0x02, (0, 0, 255))]
     assert understood(short, whole, kind=IDLE_GAP, pause_s=0.0048) == false
@@ -220,7 +220,10 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """The wake-up takes three bytes; two bytes during the boot count for it, or do not."""
+    """The wake-up takes three bytes.
+
+    It depends on the receiver whether the bytes received during the boot, here two, count.
+    """
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()

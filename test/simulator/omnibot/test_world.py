@@ -27,7 +27,7 @@ def test_the_odometry_matrix_inverts_the_velocity_equations(
 
 
 def test_the_velocity_equations_are_those_of_the_manual() -> None:
-    """In motions along x, along y and in a turn, each wheel has the sign of the manual."""
+    """For motion along x or y, or a turn, each wheel turns in the direction given by the manual."""
     c30 = cos(pi / 6)
     assert rims_from_body(1, 0, 0, L) == pytest.approx((-c30, c30, 0))
     assert rims_from_body(0, 1, 0, L) == pytest.approx((-0.5, -0.5, 1))
@@ -41,7 +41,7 @@ def test_a_pose_moves_at_the_mean_heading_of_the_step() -> None:
 
 
 def drive(settings: BoardSettings, ticks: int = 300) -> World:
-    """Return a world whose wheels all turned forward: the robot turned clockwise on the spot."""
+    """Return a world after all wheels have turned forward: the robot turned clockwise in place."""
     world = World(settings)
     for _ in range(ticks):
         world.advance((1000.0, 1000.0, 1000.0))
@@ -49,7 +49,7 @@ def drive(settings: BoardSettings, ticks: int = 300) -> World:
 
 
 def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
-    """A scale of the wheel radius multiplies the true motion and does not change the encoders."""
+    """With wheels 2 % larger, the robot turns 2 % further at the same encoder counts."""
     plain, large = drive(BoardSettings()), drive(BoardSettings(wheel_radius_scale=(1.02,) * 3))
     assert large.encoders == plain.encoders
     assert large.truth.yaw_rad == pytest.approx(1.02 * plain.truth.yaw_rad)
@@ -63,7 +63,10 @@ def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """Over many turns of the wheels, the mean slip is that of the settings; the seed varies it."""
+    """With a mean slip of 10 %, the robot turns by 90 % of the angle that the encoders give.
+
+    The exact value depends on the seed.
+    """
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)
     second = drive(BoardSettings(slip=0.1, seed=2), 3000)
