@@ -103,7 +103,8 @@ class LoisOdometry:
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """For each wheel: whether it is assumed to be at rest, although it must turn backward."""
+        """For each wheel: whether it is assumed to be at rest, although it is commanded to turn
+        backward."""
         left, right = self._motion.wheels
         return left.rests, right.rests
 

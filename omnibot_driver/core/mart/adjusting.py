@@ -88,7 +88,7 @@ class Adjusting(Moves):
         self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
 
     def _learn_standing(self) -> None:
-        """Learn that the motors do not turn with the units of the present motion.
+        """Record that the present motor units are too small to turn the motors.
 
         If the robot has already moved in this motion, it is blocked now, and nothing is learned.
         """

@@ -37,7 +37,7 @@ BLIND_MPS: Final = 0.3
 ACCELERATION_RADPS2: Final = 3.0
 """Standard deviation of the turn acceleration since the last count, in rad/s²."""
 FRESH_S: Final = 0.2
-"""If the last heading is not older than this, in s, it shows the present turn rate."""
+"""Age of the last heading, in s, up to which the measured turn rate is regarded as current."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 """Standard deviations in m and rad of what the robot moves unmeasured after a lost connection."""
 ANY_RAD: Final = 1.8

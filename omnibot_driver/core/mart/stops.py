@@ -266,7 +266,7 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _learn_standing(self) -> None:
-        """Learn that the motors do not turn with the units of the present motion."""
+        """Record that the present motor units are too small to turn the motors."""
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:

@@ -27,7 +27,9 @@ three displacements in a row, or two long ones, are needed to exceed a limit.
 
 
 class FollowingError:
-    """The sum of a robot's motion outside its envelope: the velocities that set-points allow.
+    """Sums up how far a robot moves outside its envelope.
+
+    The envelope is the set of velocities that the set-points allow.
 
     ``slack_mps``, ``slack_radps``: speeds outside the envelope that are tolerated; ``outside``:
     whether the last displacement was outside the envelope by more than these speeds.

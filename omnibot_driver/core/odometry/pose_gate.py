@@ -19,7 +19,7 @@ BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations in m and rad above which a pose must be
 confirmed by the next one.
 
-The deviation that open gaps explain is allowed in addition.
+The limits are extended by the possible motion of the robot in open gaps.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5

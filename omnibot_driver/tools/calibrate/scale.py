@@ -42,8 +42,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     for _seconds, (x, y, yaw) in steps:
         if max(abs(x), abs(y)) > linear or abs(yaw) > turning:
             raise ToolError(
-                "the smallest command of the board is faster than allowed: raise --speed or"
-                " --turning, and max_linear_speed or max_angular_speed"
+                "the slowest speed that the board can be given exceeds the limits: raise --speed"
+                " or --turning, and max_linear_speed or max_angular_speed"
             )
     way_m = linear * step_s
     console.confirm(

@@ -65,8 +65,8 @@ class Marks:
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
     """Return the marks that explain the times of these records, or None if no pattern repeats.
 
-    ``rows``: for each record, the relative difference of each time from that with evenly spaced
-    marks, NaN if not known; ``marks``: number of marks.
+    ``rows``: for each record, the relative difference of each time between two ticks from the time
+    that evenly spaced marks would give, or NaN if unknown; ``marks``: number of marks.
     """
     spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
     limit = min(LARGEST, OUTLIER * spread)

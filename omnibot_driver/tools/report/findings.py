@@ -34,10 +34,10 @@ def headline(findings: Iterable[Finding]) -> str:
     levels = [finding.level for finding in findings]
     bad, warn = levels.count(Level.BAD), levels.count(Level.WARN)
     if bad:
-        also = f", {warn} to be looked at" if warn else ""
+        also = f", {warn} to check" if warn else ""
         return f"Not healthy: {bad} {'things are' if bad > 1 else 'thing is'} wrong{also}."
     if warn:
-        return f"Usable: {warn} {'things are' if warn > 1 else 'thing is'} to be looked at."
+        return f"Usable: {warn} {'things' if warn > 1 else 'thing'} to check."
     return "Healthy."
 
 
