@@ -18,7 +18,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""A parameter that a driver has only if its board records encoder ticks and accepts gains."""
+"""Name of a parameter that exists only if the board records encoder ticks and accepts gains."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -32,10 +32,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller that it can model"),
 }
-"""For each subcommand, names of parameters, and a text.
+"""For each subcommand, names of parameters, and what the driver's board must have.
 
-The driver must have at least one of these parameters. If it has none, the text tells the user what
-the driver's board lacks.
+The driver must have at least one of these parameters. If it has none, the board lacks what the
+subcommand needs, and the tool names this in its error message.
 """
 
 

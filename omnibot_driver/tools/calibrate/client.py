@@ -120,7 +120,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Set the parameters that may change while the driver runs, and ignore the others."""
+        """Set those of ``values`` that may change while the driver runs; ignore the others."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }

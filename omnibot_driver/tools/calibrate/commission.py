@@ -266,7 +266,7 @@ class Walk:
     def _until_possible(self, find: Callable[[], T]) -> T:
         """Call ``find`` until it succeeds, at most ``TRIES`` times; return its result.
 
-        ``find`` raises Contradiction if an answer or a measurement is not possible. Raises
+        ``find`` raises Contradiction if an answer or a measurement cannot be right. Raises
         ToolError if the last try fails, too.
         """
         for _ in range(TRIES):

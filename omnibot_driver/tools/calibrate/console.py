@@ -90,7 +90,10 @@ class Console:
 
     @contextmanager
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Show the progress of a task; the caller reports the completed fraction, from 0 to 1."""
+        """Show the progress of a task while the context lasts.
+
+        The context provides a function. The caller passes it the completed fraction, from 0 to 1.
+        """
         if not self.rich.is_terminal:
             self.say(f"{what} ...")
             yield lambda _part: None

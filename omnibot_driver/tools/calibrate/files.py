@@ -19,9 +19,11 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
-    """Return ``given``, else the driver's calibration file, else ``DEFAULT`` in the current folder.
+    """Return the path of the file to which the tool saves the result.
 
-    Raises ToolError if the file cannot be written, or is not a calibration file.
+    It is the first of these that is not empty: ``given`` (by the user), ``drivers`` (the driver's
+    calibration file), ``DEFAULT`` (in the current folder). Raises ToolError if the file cannot be
+    written, or is not a calibration file.
     """
     try:
         path = calibration.locate(given or drivers or DEFAULT)

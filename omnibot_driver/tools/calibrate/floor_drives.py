@@ -101,7 +101,11 @@ def driven(
 
 
 def turned_past_mark(console: Console) -> float:
-    """Ask how far the front points past its mark; return the angle in rad, positive to the left."""
+    """Ask by what angle the robot has turned past the mark on the floor.
+
+    The mark shows where the robot's front should point. Return the angle in rad, positive to the
+    left.
+    """
     return math.radians(
         console.number(
             "By how much did the robot turn past the mark of its front (left +, right -)",

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Handle Ctrl-C, a lost SSH session and kill: note the signal; then `check` raises Interrupted.
+"""Handle the signals of Ctrl-C, of a lost SSH session and of kill.
+
+The program notes a signal; the next call of `check` raises Interrupted.
 
 A signal does not raise an exception at once, because an exception inside ROS could leave the
 executor in an undefined state. A signal raises Interrupted at once only while the program waits

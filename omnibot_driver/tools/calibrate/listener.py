@@ -59,7 +59,10 @@ class Listener(Client):
             )
 
     def diagnosed(self, key: str) -> str:
-        """Return the value of ``key`` in the driver's next diagnostics, or an empty text."""
+        """Return the value of ``key`` in the driver's next diagnostics.
+
+        If the driver does not report it in time, return an empty text.
+        """
         values: dict[str, str] = {}
 
         def hear(message: DiagnosticArray) -> None:

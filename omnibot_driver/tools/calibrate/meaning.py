@@ -18,10 +18,10 @@ from omnibot_driver.tools.needs import ToolError
 ControlMethod = Literal["velocity", "position"]
 
 STANDS_PART: Final = 0.1
-"""The robot is regarded as standing still below this fraction of the commanded speed."""
+"""Fraction of the commanded speed up to which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""The robot is regarded as stopping below this fraction of its earlier speed."""
+"""The robot is regarded as stopping if its later speed is at most this fraction of the earlier."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 """DOUBLED: range of speed ratios that mean a doubled speed. UNCHANGED: largest ratio that means an
 equal speed.
@@ -34,7 +34,7 @@ PURE_TURN: Final = 0.5
 The ratio is 0 if the odometry deltas are interpreted correctly, else 2 or more.
 """
 ALIKE: Final = 0.35
-"""Largest difference of equal angles, as a fraction of the angle by which the robot turned."""
+"""Difference below which two angles are regarded as equal, as a fraction of the robot's turn."""
 
 
 LEAST_M: Final = 1e-3
@@ -89,8 +89,9 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod |
 
     ``slow``: the motion with the command for ``slow_mps``; ``fast``: the motion with twice that
     command. In velocity control the speed is constant, and doubles with the command. In positional
-    control the command is a position a few millimetres from the origin of the board's frame: the
-    robot drives there and stops, or is still driving there, with both commands at the same speed.
+    control the command is a position a few millimetres from the origin of the board's frame. The
+    robot has reached this position and stopped, or it is still driving there. While it drives, its
+    speed is the same with both commands.
     Returns None if the motion fits neither control method, for example because a busy computer
     delayed the commands.
     """

@@ -28,9 +28,12 @@ A, B, C for ``wheel_cmd``; None ends the motion.
 LOOK_S: Final = 1.0
 """Time, in s, over which the tool compares commanded and measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""Value of ``LOOK_S`` for boards that measure so rarely that odometry is partly a prediction."""
+"""Time, in s, that replaces ``LOOK_S`` if the board measures motion only rarely.
+
+The odometry is then partly a prediction, so a longer time is needed.
+"""
 OBEYED_PART: Final = 0.2
-"""The robot is regarded as not moving if it moves less than this fraction of its command."""
+"""Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 """For each topic, the linear and the angular speed below which a command is not checked.
@@ -92,9 +95,9 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """Return the command on a ramp from ``now`` to ``wanted``.
+        """Return the next command on a ramp from the command ``now`` to the command ``wanted``.
 
-        ``seconds``: time since the command ``now``.
+        ``seconds``: time since ``now`` was sent. It limits the change, by the accelerations.
         """
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)

@@ -33,7 +33,10 @@ SQUARE_RAD: Final = math.radians(35)
 """Largest accepted deviation, in rad, of the angle between the two tilts from a right angle."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""Largest angle, in rad, between a mounting and the right-angled one that the tool uses instead."""
+"""Largest angle, in rad, by which the tool turns a mounting to make it right-angled.
+
+In a right-angled mounting each axis of the IMU is parallel to an axis of the body.
+"""
 HAND_RAD: Final = math.radians(2)
 """Least assumed standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
@@ -168,7 +171,7 @@ def _level_part(level: Array, tilted: Array) -> Array:
 
 
 def _right_angles() -> list[Array]:
-    """Return the 24 rotations that turn every axis onto an axis, in either direction."""
+    """Return the 24 rotations after which each axis is parallel to one of the original axes."""
     found = []
     for places in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):

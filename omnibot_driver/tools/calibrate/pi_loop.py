@@ -4,9 +4,9 @@
 
 The controller is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to the duty in
 percent, discretised by the trapezoidal rule. Its coefficients are computed for the control period
-``NOMINAL_S``, even if the real control period differs. The measured speed is that of the encoder's
-last tick, in whole RPM. The calculation is vectorised over gains. Must not know how plant and gains
-were found.
+``NOMINAL_S``, even if the real control period differs. The controller computes the measured speed,
+in whole RPM, from the time between the encoder's last two ticks. The calculation is vectorised over
+gains. Must not know how plant and gains were found.
 """
 
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Ratio of the time constant that is written to the board to the one that takes effect.
+        """Ratio of the written to the effective time constant of the board's controller.
 
         The ratio differs from 1 because the board's control period is not the nominal one.
         """

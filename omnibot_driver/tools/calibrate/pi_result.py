@@ -84,7 +84,10 @@ class WheelTuned:
 def result_of(
     wheels: Sequence[WheelTuned], goals: Goals, parameters: Mapping[str, float]
 ) -> Result:
-    """Return the result; ``parameters``: the values now set in the driver, for the file."""
+    """Return the result, to show and to save.
+
+    ``parameters``: the values that the tool has set in the driver, to save in the file.
+    """
     return Result(
         findings=[row for wheel in wheels for row in _rows(wheel, goals)],
         parameters=dict(parameters),

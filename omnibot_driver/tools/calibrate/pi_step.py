@@ -89,7 +89,10 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class _Bench:
-    """The robot while its wheels are recorded; ``show`` receives the number of finished records."""
+    """Sets parameters of the robot and records its wheels.
+
+    ``show`` is called after each record, with the number of records made so far.
+    """
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
         self.robot, self._show, self._responses, self._done = robot, show, responses, 0
@@ -168,9 +171,10 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:
-    """Measure how long the encoders' two levels last; set their corrections in the driver.
+    """Find the corrections for the two levels of each encoder's signal, and set them.
 
-    During the measurement both corrections are 1, because a record contains corrected times.
+    With its corrections, an encoder's two levels have the same mean duration. During the
+    measurement all corrections are 1, because the board records corrected times.
     """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})
@@ -181,9 +185,10 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant; its gain and its dead zone follow from the speeds at two duties.
+    """Return the plant: its time constants from the fit, its gain and dead zone from two speeds.
 
-    ``found``: the fit to starts at full duty; ``free``: the measurement at half duty.
+    ``found``: the fit to starts at full duty, with the final speed; ``free``: the measurement at
+    half duty, with the other speed.
     """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:

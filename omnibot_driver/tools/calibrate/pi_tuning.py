@@ -168,7 +168,8 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
     """Return the dead time, in s, that explains the recorded steps of these wheels best.
 
-    The result is at least ``LEAST_DEAD_S``: if the assumed dead time is too short, steps overshoot.
+    The result is at least ``LEAST_DEAD_S``, because gains that are tuned for too short a dead time
+    make the speed overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)

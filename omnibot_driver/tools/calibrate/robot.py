@@ -3,7 +3,7 @@
 """The robot as a calibration uses it: receive its data, and move it.
 
 Must not know what is calibrated. Every motion goes through `drive` or `record`. Both end with stop
-commands, whatever happens. If this process dies, the driver stops the robot after
+commands, even after an error. If this process ends unexpectedly, the driver stops the robot after
 ``cmd_vel_timeout``.
 """
 
@@ -35,9 +35,9 @@ PERIOD_S: Final = 0.02
 """Period of the commands, in s."""
 STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
-"""Time from the request of a record to the first command, in s.
+"""Time, in s, that the tool waits after it has requested a record, before it moves the robot.
 
-During this time the driver repeats the request, because lines can be lost.
+During this time the driver repeats the request to the board, because lines can be lost.
 """
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3

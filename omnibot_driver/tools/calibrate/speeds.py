@@ -2,10 +2,10 @@
 
 """Plan commands, measure the speeds that result, and fit the scale. Pure calculation.
 
-The board takes whole counts, so only whole counts are commanded. A measured speed is compared with
-the commanded counts, so the command has no rounding error. A speed is measured as the slope of the
-odometry's pose, in which rounding errors do not accumulate. The odometry's twist is not used: it
-comes from a single displacement, whose rounding error does not average out.
+A *count* is the unit of the board's commands. The board accepts only whole counts, so the tool
+commands only whole counts, and a command has no rounding error. A speed is measured as the slope of
+the odometry's pose, in which rounding errors do not accumulate. The odometry's twist is not used:
+it comes from a single displacement, whose rounding error does not average out.
 """
 
 from collections.abc import Sequence
@@ -157,10 +157,10 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return how far each pose lies along the robot's axis ``axis``.
+    """Return the coordinate of each pose along one of the robot's axes.
 
-    For x and y (0, 1), the axis has the direction that it has at the mean heading. For the yaw (2),
-    the result is the yaw itself.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. For x and y, the direction of the axis is computed from
+    the mean heading of all poses. For yaw, the coordinate is the yaw itself.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -191,7 +191,11 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
 
 @dataclass(frozen=True, slots=True)
 class WheelFound:
-    """The fits of one wheel: its steps, the number of rejected steps, and the models."""
+    """The results of one wheel: the steps used, the number of rejected steps, and three fits.
+
+    ``first``, ``second``: fits of models of first and of second order; ``motor_fit``: fit of a
+    motor in the manual's control loop.
+    """
 
     name: str
     steps: list[Step]

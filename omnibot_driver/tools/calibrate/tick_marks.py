@@ -4,7 +4,8 @@
 
 The marks on the encoder's disc are not exactly evenly spaced. Their effect on the times between
 ticks repeats with each turn. Each record begins at an unknown mark. The input is the relative
-difference of each time from the time with evenly spaced marks. Must not know how the wheel moved.
+difference of each time between two ticks from the time that evenly spaced marks would give. Must
+not know how the wheel moved.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,10 @@ LARGEST: Final = 0.5
 A larger error shows that the board missed an edge.
 """
 OUTLIER: Final = 4.5
-"""An edge is regarded as late if the error of its time exceeds this many standard deviations."""
+"""Largest relative error of a time between ticks, in standard deviations of all errors.
+
+Times with a larger error are not used.
+"""
 EXPLAINED: Final = 0.4
 """Least fraction of the variance that fitted marks must explain to be accepted.
 
@@ -48,16 +52,16 @@ class Marks:
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the index in ``steps`` of the step with which a record begins.
+        """Return the index in ``steps`` of the distance that belongs to a record's first time.
 
         ``off``: relative errors of the record's times between ticks.
         """
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors that the marks cause in ``count`` successive times.
+        """Return the relative errors that the marks cause in ``count`` times between ticks.
 
-        ``first``: index in ``steps`` of the step that belongs to the first time.
+        ``first``: index in ``steps`` of the distance that belongs to the first of these times.
         """
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
@@ -88,9 +92,9 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the index in ``steps`` of the step with which ``row`` begins.
+    """Return the index in ``steps`` of the distance that belongs to the first time of ``row``.
 
-    From this step on, ``row`` and ``steps`` agree best.
+    It is the index from which on ``row`` and ``steps`` agree best.
     """
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)

@@ -20,15 +20,15 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest fraction of a record's times that may be missing."""
 UNLIKE: Final = 1.5
-"""Largest accepted ratio of a time to the median time.
+"""Largest accepted ratio of a time between ticks to the median, or of the median to such a time.
 
-If the ratio is larger, the board missed an edge, or noticed it late.
+A larger ratio shows that the board missed an edge, or noticed it late.
 """
 SMOOTHED: Final = 4
-"""Number of ticks over which a speed is averaged.
+"""Number of times between ticks from which one speed is computed.
 
-A displaced mark changes the sum of several times by no more than a single time, so the relative
-error of the sum is smaller.
+A displaced mark changes the sum of these times by no more than it changes a single time. The
+relative error of the sum is therefore smaller.
 """
 
 
@@ -74,8 +74,8 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the corrections of an encoder's two levels, for a wheel that turns at constant duty.
 
     The board must make the record while both corrections are 1. The two levels alternate; the level
-    with the shorter mean time is the short level. After a missed edge the levels are assigned
-    again. Raises ToolError if the ticks are not regular.
+    with the shorter mean time is the short level. After a missed edge the function decides anew
+    which level is the short one. Raises ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

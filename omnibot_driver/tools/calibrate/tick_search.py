@@ -40,18 +40,21 @@ LATEST_S: Final = 2.0
 MOST_OFF: Final = 0.4
 """Largest allowed error of a mark's position, in ticks."""
 LAGS: Final = 60
-"""Number of ticks over which the residuals are correlated because the load changes."""
-MISSED: Final = 0.42
-"""A mark was missed if the relative errors of a time and the next time add up to more than this.
+"""Largest number of ticks between two residuals whose correlation is considered.
 
-If a mark was only noticed late, one time is too long, and the next is too short by the
-same amount. (The board's clock loses up to 6 ms at a missed mark, so the time is not twice as long
-as usual.)
+Even such distant residuals are correlated, because the load changes slowly.
+"""
+MISSED: Final = 0.42
+"""Sum of the relative errors of two successive times between ticks above which a mark was missed.
+
+If the board only noticed a mark late, the sum is near 0: one time is too long, and the next is too
+short by the same amount. (The board's clock loses up to 6 ms at a missed mark, so the time is not
+twice as long as usual.)
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start that cannot contain a missed mark, because the wheel is slow."""
 OUTLIER: Final = 5.0
-"""A time is an outlier if its error exceeds this many standard deviations."""
+"""Error of a time between ticks, in standard deviations, above which the time is not used."""
 FEWEST_RECORDS: Final = 6
 """Least number of records that are needed to estimate errors from the scatter between records."""
 
@@ -126,10 +129,10 @@ class Search:
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return the relative difference of each time between ticks from that with even marks.
+        """Return, for each record, the relative errors of its times between ticks.
 
-        The result has a row for each record. If the board missed a mark, the row has NaN for the
-        distances before and after this mark.
+        An error is the difference from the time that evenly spaced marks would give. If the board
+        missed a mark, the errors of the distances before and after this mark are NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -169,7 +172,7 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """From now on, whiten all residuals by the correlation that they have at these values.
+        """Measure the correlation of the residuals at these values, and remove it from now on.
 
         If the positions of the marks are not known, the marks cause the correlation; otherwise the
         changing load causes it.

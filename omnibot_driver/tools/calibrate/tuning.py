@@ -9,7 +9,8 @@ value with the present gains, and both have the same weight. The limits are:
 - Ms, the peak of the sensitivity, is at most 1.6. This limit tolerates an error of a factor 2.6 in
   gain, or of 36° in phase.
 - The overshoot after a step of the command is at most 5 %.
-- One encoder count changes the effort by no more than the effort for a speed of one count per tick.
+- K_VP and K_VI are each at most the effort that a speed of one count per tick needs, so that an
+  error of one encoder count has little effect.
 """
 
 from collections.abc import Sequence

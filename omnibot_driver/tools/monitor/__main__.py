@@ -115,8 +115,11 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
 
 
 def _find(feed: "Feed", timeout_s: float) -> None:
-    """Wait until the driver publishes its state. Raises ToolError, which names the drivers
-    found."""
+    """Wait until the driver publishes its state.
+
+    Raises ToolError if no state was received after ``timeout_s``. If other drivers are running, the
+    message names them.
+    """
     if _comes_about(lambda: bool(feed.view().state), timeout_s):
         return
     there = feed.drivers()
@@ -141,7 +144,11 @@ def _find(feed: "Feed", timeout_s: float) -> None:
 
 
 def _gather(feed: "Feed", timeout_s: float) -> View:
-    """Wait for all topics of the present state, and for a full window of rates; return the view."""
+    """Wait until messages are complete and rates are measured; return the view.
+
+    Messages are complete if one was received on each topic that the driver publishes in its present
+    state. The monitor waits up to ``timeout_s`` for them, and measures rates over ``WINDOW_S``.
+    """
     began_s = time.monotonic()
     _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)
     _comes_about(lambda: time.monotonic() - began_s > WINDOW_S, WINDOW_S)

@@ -138,8 +138,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        ``suspend`` ends the thread that reads keys. Without ``suspend``, a second such thread
-        would run beside the first.
+        ``suspend`` ends the thread that reads keys, before Textual starts a new one. Otherwise
+        two threads would read keys.
         """
         with self.suspend():
             pass

@@ -49,7 +49,7 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 INSIST_EVERY_S: Final = 0.2
 PARAMETERS: Final = ("port", "max_linear_speed", "max_angular_speed")
 IMU_PARAMETER: Final = "imu_frame"
-"""A parameter that a driver has only if its board has an IMU."""
+"""Name of a parameter that exists only if the driver's board has an IMU."""
 
 
 class Feed:

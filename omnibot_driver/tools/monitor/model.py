@@ -32,10 +32,10 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""Largest speed, in m/s, that is regarded as motion of the robot.
+"""Largest speed, in m/s, at which a change of the pose is regarded as motion of the robot.
 
-Between two poses the robot can move ``JUMP_M`` plus the distance at this speed. A pose further away
-shows a reset of the odometry, and begins a new path.
+In addition, each pose may differ from the previous one by ``JUMP_M``. A larger change shows that
+the odometry was reset; the monitor then begins a new path.
 """
 
 
@@ -88,7 +88,10 @@ class View:
         return ""
 
     def missing(self, diagnostics: bool) -> list[str]:
-        """Return the topics that the driver should publish in its state, but that are silent."""
+        """Return the topics that the driver should publish in its present state, but does not.
+
+        ``diagnostics``: whether the driver should publish /diagnostics.
+        """
         wanted = {
             "state": bool(self.state),
             "estop_active": self.estop is not None,

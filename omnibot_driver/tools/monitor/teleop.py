@@ -19,7 +19,7 @@ Most keyboards begin to repeat a held key after 0.25 s to 0.6 s.
 REPEAT_S: Final = 0.3
 """Time for which a repeated key moves the robot, in s; several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
-"""Time without a call of ``command``, in s, that shows that the program was suspended.
+"""Time without a call of ``command``, in s, after which the program is regarded as suspended.
 
 After a suspension, older keys are discarded.
 """
@@ -48,7 +48,7 @@ MOTIONS: Final = {
 class DeadMan:
     """Turns pressed keys into commands; ``command`` must be called regularly.
 
-    Keys may come from another thread. This is safe, because a key press replaces one reference.
+    Another thread may call ``press``: it stores key and time together, in one assignment.
     """
 
     def __init__(self) -> None:

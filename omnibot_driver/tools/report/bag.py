@@ -29,7 +29,11 @@ Progress = Callable[[int, int], None]
 
 
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
-    """Return the log of one robot in a bag. Raises ToolError if there is nothing to read."""
+    """Return the log of one robot in a bag.
+
+    Raises ToolError if the bag has no readable message of the robot, or if it has several robots
+    and ``namespace`` is None.
+    """
     with ExitStack() as stack:
         readers, troubles = _open(path, stack)
         connections = [connection for reader in readers for connection in reader.connections]

@@ -16,7 +16,11 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time without /diagnostics, in s, after which the driver is regarded as ended."""
+"""Time, in s, after which a disconnected driver is regarded as ended.
+
+The time begins with the disconnection. A driver that still publishes /diagnostics afterwards has
+not ended.
+"""
 
 
 def judge(log: Log) -> Iterator[Finding]:
@@ -72,7 +76,7 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Whether the driver still published diagnostics ``SILENT_S`` after this state began."""
+    """Whether diagnostics still showed this state more than ``SILENT_S`` after it began."""
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
         for status in log.diagnostics
@@ -129,7 +133,10 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 
 
 def _told_elsewhere(status: Status) -> bool:
-    """Return whether another finding covers this status, such as the e-stop or a pause."""
+    """Return whether another finding already reports this status.
+
+    Examples are the status of a latched e-stop, and that of a paused board.
+    """
     if status.name.endswith("Commands"):
         return "e-stop" in status.message
     return status.name.endswith("E-stop") or (

@@ -15,12 +15,15 @@ from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask,
 LAGS_S: Final = np.arange(0.0, 0.62, 0.02)
 TOLERANCE: Final = 0.1
 TOLD: Final = 0.05
-"""Commanded speed of a wheel's rim, in m/s, below which friction may hold the robot."""
+"""Speed of a wheel's rim, in m/s, above which the robot is regarded as commanded or as moving.
+
+At lower commanded speeds, friction may hold the robot.
+"""
 STANDS: Final = 0.2
-"""Ratio of measured to commanded speed below which the robot does not follow."""
+"""Ratio of measured to commanded speed below which the robot is regarded as not moving."""
 SUSTAINED_S: Final = 1.0
 AFTER_STOP_S: Final = 1.5
-"""Time after a stop, in s, within which the robot must come to rest."""
+"""Time after an e-stop or the last command, in s, within which the robot must come to rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +59,10 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """Return the parameter names of the linear and the angular scale that correct wrong speeds.
+    """Return the names of the parameters that the user must change if speeds are wrong.
 
-    For two wheels they are the scales of the odometry, otherwise those of the commands.
+    The first name is that of the linear scale, the second that of the angular scale. For two wheels
+    they are the scales of the odometry, otherwise those of the commands.
     """
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
@@ -111,7 +115,10 @@ class Answer:
 
 
 def answer(pair: Pair, usable: Mask) -> Answer | None:
-    """Return the response, with the lag that fits best; None if no command was active."""
+    """Return the robot's response to its commands, or None if no command was active.
+
+    The delay of the response is the one that fits best. ``usable``: the measurements to use.
+    """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
     best_s, least = 0.0, np.inf

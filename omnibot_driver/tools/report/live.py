@@ -73,7 +73,10 @@ def _discover(
     namespace: str | None,
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
-    """Return the robot, its topics, the types by topic, and whether it is the only robot."""
+    """Find the robot; return its namespace, its topics, all types, and whether it is the only one.
+
+    The types are the message types of all topics, by the topic's name.
+    """
     began_s = time.monotonic()
     while True:
         executor.spin_once(timeout_sec=0.1)

@@ -15,13 +15,15 @@ Mask = NDArray[np.bool_]
 COMMAND_TIMEOUT_S: Final = 0.5
 """The driver's default of ``cmd_vel_timeout``, in s; an older command has no effect."""
 SETTLING_S: Final = 0.2
-"""Time around a change of state, in s, in which a stream may begin or end."""
+"""Time before and after a change of state, in s, in which a gap in a stream is normal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """The messages of one topic in the order of arrival: two columns of times, and rows of
-    values."""
+    """The messages of one topic in the order of arrival, one row for each message.
+
+    ``arrived_s``: times of arrival; ``stamp_s``: timestamps; ``values``: the values.
+    """
 
     arrived_s: Array
     stamp_s: Array
@@ -121,7 +123,10 @@ class Log:
         return inside
 
     def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
-        """Whether a change of state explains a gap from ``begin_s`` to ``end_s``."""
+        """Whether the driver's state explains a gap in a stream from ``begin_s`` to ``end_s``.
+
+        ``running``: states in which the driver publishes the stream.
+        """
         begin_s, end_s = begin_s - SETTLING_S, end_s + SETTLING_S
         touched = [span for span in self.states if span.begin_s < end_s and span.end_s > begin_s]
         return len(touched) > 1 or any(span.what not in running for span in touched)

@@ -166,8 +166,9 @@ def spectra(log: Log) -> Figure:
 
 
 def timing(log: Log) -> Figure:
-    """Draw the intervals between timestamps, and the arrival delays above the smallest delay.
+    """Draw the intervals between timestamps, and the delays of arrival.
 
+    The median is subtracted from the intervals, and the smallest delay from the delays.
     Both are drawn over time and as histograms.
     """
     figure = new_figure(5.6)

@@ -176,7 +176,10 @@ class Recorder:
     def _spans(
         self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
     ) -> tuple[Span, ...]:
-        """Return the values as spans; successive equal values are joined."""
+        """Return the spans of time in which the values received on a topic stayed the same.
+
+        ``name``: a function that returns the text of a value, for its span.
+        """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:
             at_s, what = (arrived_ns - start_ns) / 1e9, name(value)

@@ -28,7 +28,10 @@ EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Time, in s, within which timestamps that jumped ahead must be right again."""
+"""Longest time, in s, in which short steps may compensate a jump of the timestamps.
+
+If the timestamps are not right again after this time, messages are missing.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +76,7 @@ ODOMETRY: Final = Stream(
 )
 """The stream of the odometry.
 
-The rates are those of an OmniBot; they apply if the log has none from the driver.
+The rate of an OmniBot is used if the driver's diagnostics in the log contain no rate.
 """
 
 
@@ -148,9 +151,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each wide step, the end of the range of steps that may compensate it.
+    """Return, for each wide step, the end of the row of steps that may compensate it.
 
-    The range ends before the next wide step, and has at most ``most`` steps.
+    A row begins with a wide step. It ends before the next wide step, and has at most ``most``
+    steps. ``wide``: indices of the wide steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

@@ -33,10 +33,11 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return a namespace, and whether the topic fits, for each role that the topic's name allows.
+    """Return the roles that a topic's name allows, each with two values.
 
-    The topic fits if the role uses the message type ``kind``. A topic in the namespace of a
-    driver's node fits only if the node is in ``drivers``.
+    The first value is the namespace of the robot. The second is whether the topic fits the role:
+    the role must use the message type ``kind``. For topics below the name of a driver's node, such
+    as ``state``, ``drivers`` must contain this node.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -50,7 +51,11 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 
 
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
-    """Return the wanted robot, or the only one. Raises ToolError that lists the robots found."""
+    """Return the namespace and the topics of one robot.
+
+    ``wanted``: the robot's namespace; if it is None, there must be only one robot. ``where``: where
+    the robots were found, for the message. Raises ToolError if the robot cannot be chosen.
+    """
     names = ", ".join(robots)
     if not robots:
         raise ToolError(

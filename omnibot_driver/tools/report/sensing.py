@@ -21,7 +21,7 @@ from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 SLIGHT_ERROR: Final = 0.03
 """Relative error of measured gravity up to which the accelerometer is judged good."""
 REST_S: Final = 0.5
-"""Time before and after any motion, in s, in which readings do not count as at rest."""
+"""Time before and after any motion, in s, in which the robot is not regarded as at rest."""
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
@@ -204,8 +204,8 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
     """Return the ratio of turns by gyro to turns by odometry, and the whole angle turned, in rad.
 
-    The whole angle is the sum of the sizes of all turns by odometry. Only steps in which both gyro
-    and odometry were received count.
+    The whole angle is the sum of the sizes of all turns by odometry. Both values are computed from
+    those steps of the odometry that are not gaps, and during which gyro readings were received.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

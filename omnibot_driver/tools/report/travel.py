@@ -23,7 +23,10 @@ than this in one step, because fastest_linear_speed limits its corrections.
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Longest step, in s, in which a pose is compared with the twist; a longer step is a gap."""
+"""Length of a step, in s, from which on the step is a gap.
+
+A gap is not a leap, unless it ends at zero: the twist does not show the motion in a gap.
+"""
 
 
 def moving(odom: Series) -> Mask:
@@ -35,9 +38,10 @@ def moving(odom: Series) -> Mask:
 class Steps:
     """The steps from each message of odom to the next.
 
-    ``way_m`` and ``turned_rad`` are 0 for leaps. In a leap the pose differs from the
-    pose that the twist leads to, by ``off_m`` and ``off_rad``. ``reset``: whether the
-    step is a leap to zero.
+    ``way_m``, ``turned_rad``: distance and turn, both 0 for a leap. ``off_m``, ``off_rad``:
+    difference between the pose and the pose that the twist leads to. ``leap``: whether this
+    difference is too large; after a gap, only a leap to zero counts. ``reset``: whether the step is
+    a leap to zero.
     """
 
     way_m: Array
