@@ -28,7 +28,7 @@ class OmniKinematics:
 
     @property
     def rims(self) -> "OmniKinematics":
-        """These kinematics with wheels of 1 m radius: rates in rad/s are then rim speeds in m/s."""
+        """The same geometry with wheels of 1 m radius: wheel rates are then rim speeds in m/s."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

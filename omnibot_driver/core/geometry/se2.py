@@ -12,7 +12,7 @@ Signs = tuple[int, int, int]
 
 @value(frozen=True, slots=True)
 class Pose:
-    """Position in m and unwrapped yaw in rad; also a displacement, or a tangent (twist x time)."""
+    """A pose, displacement or tangent (twist x time): x and y in m, unwrapped yaw in rad."""
 
     x_m: float = 0.0
     y_m: float = 0.0
@@ -56,7 +56,7 @@ class Pose:
         )
 
     def way_to(self, other: "Pose") -> "Pose":
-        """Return the displacement to ``other`` in this pose's own axes, by the shorter rotation."""
+        """Return the displacement to ``other`` in this pose's own axes, with a yaw of -pi to pi."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         dx_m, dy_m = other.x_m - self.x_m, other.y_m - self.y_m
         return Pose(
@@ -66,7 +66,7 @@ class Pose:
         )
 
     def over(self, duration_s: float) -> BodyTwist:
-        """Return the constant twist that, times ``duration_s``, is this tangent."""
+        """Return the constant twist that produces this tangent (twist x time) in ``duration_s``."""
         return BodyTwist(self.x_m / duration_s, self.y_m / duration_s, self.yaw_rad / duration_s)
 
 

@@ -18,7 +18,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 @dataclass(frozen=True, slots=True)
 class SteeredKinematics:
-    """Two wheels as in ``DifferentialKinematics``, and a steered wheel ``wheelbase_m`` ahead."""
+    """Two driven wheels on one axle, and a steered wheel ``wheelbase_m`` ahead of the axle."""
 
     wheel_radius_m: float
     track_m: float
@@ -29,7 +29,7 @@ class SteeredKinematics:
 
     @property
     def rims(self) -> "SteeredKinematics":
-        """These kinematics with wheels of 1 m radius: rates in rad/s are then rim speeds in m/s."""
+        """The same geometry with wheels of 1 m radius: wheel rates are then rim speeds in m/s."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

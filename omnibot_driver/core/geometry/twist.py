@@ -9,7 +9,7 @@ from omnibot_driver.core.values import value
 
 @value(frozen=True, slots=True)
 class BodyTwist:
-    """Velocity of the body in its own frame: m/s forward, m/s to the left, rad/s to the left."""
+    """Velocity of the body in its own axes: forward and left in m/s, yaw rate in rad/s."""
 
     vx_mps: float
     vy_mps: float

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Correction of the IMU's biases, and the sensor's figures as measured at standstill."""
+"""Correction of the IMU's biases, and figures of the IMU that are measured at standstill."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from omnibot_driver.core.values import value
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuCorrection:
-    """Biases in rad/s and m/s²; ``auto_gyro_bias``: whether standstills refine the gyro's bias."""
+    """Biases in rad/s and m/s²; ``auto_gyro_bias``: whether to refine the gyro's bias at rest."""
 
     gyro_bias: Vector3 = (0.0, 0.0, 0.0)
     accel_bias: Vector3 = (0.0, 0.0, 0.0)
@@ -63,7 +63,7 @@ class BiasCorrector:
 
     @property
     def figures(self) -> ImuFigures:
-        """Figures for the person who maintains the sensor."""
+        """The gyro's bias and noise, the measured gravity, and advice on the settings."""
         return ImuFigures(
             bias_radps=self.calibration.bias,
             gravity_mps2=self.calibration.gravity_mps2,

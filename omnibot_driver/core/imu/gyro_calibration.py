@@ -42,7 +42,8 @@ LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """Largest accepted bias: the initial zero-rate output in the MPU-6050 product specification,
 section 6.1."""
 REFINEMENT: Final = 0.05
-"""Fraction of the bias error that one block of ``BLOCK_S`` corrects; in 14 s, half is corrected."""
+"""Fraction of the bias error that is corrected after each ``BLOCK_S`` at rest; half of the error is
+corrected in 14 s."""
 
 
 class Look:
@@ -82,7 +83,7 @@ class Look:
 
     @property
     def motion(self) -> str:
-        """The evidence of motion, as text; empty without evidence."""
+        """Sentence part that says how the readings show motion; empty if they show rest."""
         shaken_radps, shaken_mps2 = max(deviation(self.rates)), max(deviation(self.forces))
         bias_radps = max(map(abs, mean(self.rates)))
         if self.rolled:
@@ -99,8 +100,9 @@ class Look:
 class GyroCalibration:
     """Calibration of the gyro; ``bias``: the gyro's mean reading at rest, in rad/s.
 
-    ``refine``: whether standstills refine the bias. ``answers``: a RequestDone for every
-    measurement that came to an end.
+    ``refine``: whether each ``BLOCK_S`` at rest corrects the bias a little; the wheels must have
+    confirmed the rest. ``answers``: one RequestDone for each measurement that has succeeded or
+    failed.
     """
 
     def __init__(self, bias: Vector3, *, refine: bool) -> None:
@@ -127,12 +129,12 @@ class GyroCalibration:
         self._token, self.wake_at = token, now + ANSWER_WITHIN_S
 
     def give_up(self, reason: str) -> None:
-        """Fail a running measurement; ``reason``: the cause and a remedy."""
+        """End a running measurement as failed; ``reason``: the cause and a remedy."""
         if self.wake_at < math.inf:
             self._answer(False, f"gyro bias unchanged: {reason}")
 
     def tick(self, now: float) -> None:
-        """Fail a running measurement that is overdue."""
+        """End a running measurement as failed if its deadline has passed."""
         if now >= self.wake_at:
             self.give_up(
                 "two seconds of IMU readings without a gap are needed, and did not come; check"
@@ -140,7 +142,7 @@ class GyroCalibration:
             )
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """Add an IMU reading in SI units: ``rate`` includes the gyro's bias, ``force`` no bias."""
+        """Add a reading in SI units: ``rate`` with the gyro's bias, ``force`` without its bias."""
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()

@@ -43,7 +43,7 @@ def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuScale:
-    """The sensor's two ranges: keys of ACCEL_COUNTS_PER_G and of GYRO_COUNTS_PER_DPS."""
+    """Conversion for two given ranges: keys of ACCEL_COUNTS_PER_G and GYRO_COUNTS_PER_DPS."""
 
     accel_range_g: int = 2
     gyro_range_dps: int = 250

@@ -147,7 +147,7 @@ class LoisEcuBoard(Board):
 
     @property
     def _odometry_due_at(self) -> float:
-        """Time of the next odometry; infinity while the board does not report motion."""
+        """Time when the next odometry is due; infinity while the board does not report motion."""
         silent = self._sensor_speaks or self.mode is not Mode.NOMINAL
         return math.inf if silent else self._odometry_at
 

@@ -14,11 +14,11 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""If this many groups of ticks came without appended odometry, a group of odometry with its own
+"""Number of groups of ticks without appended odometry after which a group of odometry with its own
 command byte (0x20) proves that the board behaves as the manual says."""
 UNCOUNTED_M: Final = 0.06
-"""If wheels roll backward by this distance in m and no count is negative, the driver concludes that
-ticks do not count backward."""
+"""Distance in m that wheels roll backward without a negative count, after which the driver
+concludes that ticks do not count backward."""
 
 
 class BoardKind:

@@ -31,8 +31,8 @@ UNKNOWN_S: Final = 0.012
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Groups that arrive within this time in s are assumed to be read together, after a pause of the
-reader. Only the last of these groups is stored, because its delay is the smallest."""
+"""Longest time in s between two groups that are assumed to be read together, after a pause of the
+reader. Only the last of such groups is stored, because its delay is the smallest."""
 Point = tuple[float, float]
 """Arrival time in s, and how far the board's clock is behind the arrival time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}

@@ -42,11 +42,11 @@ ALONG_VARIANCE: Final = 0.15
 in 0x20 (odometry), and ``ALONG_VARIANCE`` of the distance in 0x20."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""If a residual exceeds this number of ticks, the filter assumes that the wheel's speed has
-changed, although its set-point has not."""
+"""Residual of a count, in ticks, above which the filter assumes that the wheel's speed has changed,
+although its set-point has not."""
 SAME_TICKS: Final = 0.6
-"""If a count is unchanged, and its residual is below this number of ticks, the filter does not use
-the count as a measurement."""
+"""Residual in ticks from which the filter uses an unchanged count as a measurement. Below this
+residual, a count without a new tick shows nothing."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP``, ``LEAP_M``: limits of the residual of a heading, in standard deviations and in m. A
@@ -56,9 +56,9 @@ DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""Additional standard deviation in m of a wheel's distance after 1 m without ticks: usually
-``BLIND_M``, but ``SWINGING_M`` while the speed oscillates, because the board then reports the speed
-too seldom."""
+"""``BLIND_M``, ``SWINGING_M``: additional standard deviation in m of a wheel's distance after 1 m
+without ticks. ``SWINGING_M`` is used while the speed oscillates, because the board then reports the
+speed too seldom."""
 SWERVED_M: Final = 0.05
 """Additional standard deviation in m of the position after 1 m at an oscillating speed, even if the
 distances of the wheels are known."""
@@ -81,7 +81,7 @@ class Comparison:
     # Ticks
 
     def begin_counts(self) -> None:
-        """Set two counts to zero: the added ticks, and the ticks that the filter expects."""
+        """Set both sums of each wheel's ticks to zero: the reported sum and the expected one."""
         self._counted_m = [0.0, 0.0]
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
@@ -118,7 +118,7 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Set the added changes of 0x20 (odometry), and those that the filter expects, to zero."""
+        """Set the sums of 0x20's changes (odometry) to zero: the reported and the expected ones."""
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
         self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)

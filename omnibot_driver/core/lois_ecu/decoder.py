@@ -59,7 +59,7 @@ class LoisDecoder:
 
     @property
     def statistics(self) -> DecoderStatistics:
-        """Counters; before the first data, the counters of an earlier decoder may be assigned."""
+        """Counters; to continue those of an earlier decoder, assign them before the first data."""
         return self._statistics
 
     @statistics.setter

@@ -52,8 +52,9 @@ QUIET_S: Final = 0.05
 lines of a group 1.2 ms apart, and a reader usually delivers them within ``QUIET_S``."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest allowed pause within a group: the smaller of ``LATE_S`` in s and ``LATE_PART`` times the
-time from the marker of the previous group to the marker of this group, but at least ``QUIET_S``."""
+"""Longest allowed pause within a group, as a fraction of the time from the previous group's marker
+to this group's marker. The pause is also limited to ``LATE_S``, but at least ``QUIET_S`` is
+allowed."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),

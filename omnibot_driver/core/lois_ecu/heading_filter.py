@@ -78,7 +78,7 @@ class HeadingFilter:
 
 
 def _expected(before: tuple[float, float], yaw_rad: float) -> float:
-    """Return the heading that the odometry implies, -180..180 degrees."""
+    """Return the heading, -180..180 degrees, that follows from ``before`` and the yaw since."""
     return _difference(before[0] - math.degrees(yaw_rad - before[1]), 0.0)
 
 

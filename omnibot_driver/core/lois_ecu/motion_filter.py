@@ -73,10 +73,12 @@ class MotionFilter:
     ``signed``: whether ticks always count in both directions. ``holds``: whether the board keeps
     the last measured speed of a wheel at rest.
 
-    ``tuned``: whether the controllers have gains that the user set. If a wheel is halted soon after
-    a change of its set-point, it did not roll at the speed of the model, and perhaps rolled in the
-    other direction. The filter then assumes that the error of the wheel's distance is the change of
-    speed times ``UNSETTLED_S[tuned]``.
+    ``tuned``: whether the controllers have gains that the user set.
+
+    A wheel that is halted soon after a change of its set-point did not roll at the speed of the
+    model, and perhaps rolled in the other direction. The filter then adds an error to the wheel's
+    distance. The standard deviation of this error is the change of speed times
+    ``UNSETTLED_S[tuned]``.
     """
 
     def __init__(self) -> None:
@@ -112,7 +114,7 @@ class MotionFilter:
         return ROUNDED * self.rpm_mps
 
     def shown_mps(self, wheel: int) -> float:
-        """Return the speed in m/s that the firmware should have measured last, with its sign."""
+        """Return the signed speed in m/s that the firmware is expected to have measured last."""
         held = self.filter.mean[PER_WHEEL * wheel + HELD] - self.rounded_mps(wheel)
         return self.wheels[wheel].course.measured_sign * max(held, 0.0)
 
@@ -177,8 +179,8 @@ class MotionFilter:
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
         """Add an error to a wheel's distance, and to all states that depend on that distance.
 
-        ``stddev_m``: standard deviation of the error. ``counted``: whether the error arose before
-        the board stopped counting the wheel's ticks.
+        ``stddev_m``: standard deviation of the error. ``counted``: whether the board counted the
+        wheel's ticks when the error arose, even if it does not count them now.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)

@@ -37,8 +37,8 @@ LATE_S: Final = 0.012
 """Assumed standard deviation of an arrival time in s, while no better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""The pose is predicted for at most ``UNHEARD_S`` s after the last report, or ``UNHEARD_GROUPS``
-tick periods if that is longer. A longer silence can mean that the board is off."""
+"""Number of tick periods after the last report for which the pose is predicted, or ``UNHEARD_S`` s
+if that is longer. A longer silence can mean that the board is off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 

@@ -63,7 +63,8 @@ AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
 times are used in turn, because after a fixed time the board might always be sending another group,
 and would then receive nothing."""
 CONFIRMED_WITHIN: Final = 0.35
-"""Fraction by which the period of the ticks may differ from the requested period."""
+"""Fraction of the requested period. The ticks confirm the settings if their period differs from the
+requested one by at most this fraction."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two requests for an unknown date."""
 MOST_ROUNDS: Final = 40
@@ -102,7 +103,7 @@ class SettingsWriter:
 
     @property
     def done(self) -> bool:
-        """Whether all queued commands have been sent, in all of their rounds."""
+        """Whether each queued command has been sent as many times as required."""
         return not self._queue and not self._others and not self._rounds_left
 
     @property

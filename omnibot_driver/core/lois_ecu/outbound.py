@@ -36,14 +36,14 @@ MOST_RPM: Final = 50
 """Largest allowed set-point in RPM; the firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""After a Stop, RPM 0/0 is sent before each of the first ``CLEARED_TIMES`` set-points, because
-lines may be lost."""
+"""Number of set-points after a Stop before each of which RPM 0/0 is sent. One RPM 0/0 would be
+enough, but lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
-    """Return the pair as integers of at most ``most``, and whether the pair was scaled down.
+    """Return the pair, rounded and limited to ±``most``, and whether it had to be limited.
 
-    If a value exceeds ``most``, both values are scaled by one factor.
+    If a value exceeds the limit, both values are multiplied by the same factor.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0

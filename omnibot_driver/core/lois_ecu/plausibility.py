@@ -29,11 +29,11 @@ SLOWEST_CLOCK: Final = 0.5
 """Lowest plausible rate of the board's clock, as a fraction of real time; the clock stops while the
 board sends."""
 SURE_AFTER: Final = 2
-"""The clock's unit is accepted when, after the first pair of ticks that shows the unit, this many
-more pairs in a row show the same unit."""
+"""Number of further pairs of ticks in a row that must show the same unit of the clock as a first
+pair, before the driver accepts this unit."""
 LEARNT_FROM_S: Final = 0.15
-"""The clock's unit is learnt from two groups of ticks only if the second one arrives more than this
-time in s after the first one. Arrival times are too inexact for shorter times."""
+"""Shortest time in s between two groups of ticks that show the clock's unit. For shorter times,
+arrival times are too inexact."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -82,7 +82,7 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what was learnt about the board's counters; subclasses may override this."""
+        """Forget what the subclass has learnt about the board's counters; by default, nothing."""
 
 
 class TicksGate(Gate[Ticks]):
@@ -142,7 +142,7 @@ def _unit_of(before: Ticks, after: Ticks, duration_s: float) -> ClockUnit | None
 
 
 def odometry_gate() -> Gate[BoardOdometry]:
-    """Return a gate that checks the pose of the board's odometry; velocities may be anything."""
+    """Return a gate that checks the pose of the board's odometry, but not its velocities."""
     return Gate(_odometry_follows)
 
 

@@ -19,8 +19,8 @@ ODOMETRY_AGE_S: Final = 0.0135
 """Assumed age in s of odometry when its last line arrives: a line of 14 characters takes 1.2 ms,
 and the values are from the time at which the first line began."""
 DOUBT: Final = 3.0
-"""If a residual exceeds this number of standard deviations, the filter assumes that its estimate is
-wrong, because noise is rarely that large."""
+"""Residual, in standard deviations, above which the filter assumes that its own estimate is wrong,
+because noise is rarely that large."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used: at a lower speed the wheel may have been at rest
 between the last two ticks."""
@@ -38,15 +38,16 @@ STRAY_PART: Final = 0.1
 gains that the user set: ``STRAY_RPM``, plus the fraction ``STRAY_PART`` of the expected speed. A
 single speed that differs by more comes from a delayed tick, or from the tick after it."""
 COASTED_TICKS: Final = 1.0
-"""A wheel that comes to rest rolls this number of ticks less far than its last reported speed
-suggests."""
+"""Number of ticks that are subtracted from the distance of a wheel that has come to rest, in
+addition to the distance since its reported speed last changed. The wheel rolls less far than its
+last reported speed suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
-"""The filter assumes that an unexpected change of speed has lasted for this fraction of the time
-between two reports."""
+"""Fraction of the time between two reports for which an unexpected change of speed is assumed to
+have lasted."""
 UNSEEN_PART: Final = 0.6
-"""While the reports show no tick of a wheel, the filter assumes that the integral of the wheel's
-controller is at most this fraction of ``WINDUP_M``."""
+"""Largest assumed integral of a wheel's controller, as a fraction of ``WINDUP_M``, while the
+reports show no tick of the wheel."""
 
 
 class ReportedSpeed:
@@ -123,7 +124,7 @@ class ReportedSpeed:
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
     def _jumps(self, told_rpm: float, duration_s: float) -> bool:
-        """Return whether a speed is implausible after the last one, or at a constant set-point."""
+        """Return whether a speed differs too much from the last one, or from a constant speed."""
         motion, wheel = self._motion, self._wheel
         change_rpm = abs(told_rpm - abs(self._told) / motion.rpm_mps)
         if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:

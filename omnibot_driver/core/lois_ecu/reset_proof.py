@@ -14,9 +14,10 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 FEW_TICKS: Final = 20
 """Largest assumed number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""A number of ticks that no wheel can roll between a reset and the next counts."""
+"""Smallest number of ticks that no wheel can roll between a reset and the next counts. A fall of
+the counts by this number proves the reset."""
 STEADY_TICKS: Final = 3
-"""Lowest count of a wheel at rest from which backlash cannot turn the wheel back to zero."""
+"""Smallest count of a resting wheel that backlash of the gears cannot change to zero."""
 UNPROVED_S: Final = 2.5
 """Longest time in s to wait for a proof, because there may never be one; meanwhile the reset is
 repeated."""
@@ -35,7 +36,7 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """Record that the reset is repeated, and use the present counts if they prove more.
+        """Record that the reset is repeated; replace ``before`` if the present counts prove more.
 
         Counts of wheels at rest prove more than counts of rolling wheels. If the wheels still roll,
         the present counts prove no more than the first counts.

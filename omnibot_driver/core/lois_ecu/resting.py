@@ -23,7 +23,7 @@ FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""While speeds are not reported, the clock of this module runs at this fraction of real time."""
+"""Rate of this module's clock, as a fraction of real time, while the board reports no speeds."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)

@@ -34,12 +34,12 @@ TOO_FAST_RPM: Final = 3
 speed beyond both limits is the last speed of a wheel at rest, because a wheel that rolls backward
 exceeds its set-point by at most 10 % and one RPM."""
 UNLIKE: Final = 1.15
-"""While both wheels roll backward, the ratio of speed to set-point of one wheel is assumed to be at
-most this factor times the ratio of the other wheel."""
+"""Factor by which two wheels that roll backward may differ. The ratio of speed to set-point of one
+wheel is assumed to be at most this factor times that of the other wheel."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
-"""A wheel is regarded as stalled only if at least this number of groups show that it does not move.
-On a bad line few groups arrive, so the time ``STALLED_S`` alone is not enough."""
+"""Smallest number of groups without a sign of motion after which a wheel is regarded as stalled. On
+a bad line few groups arrive, so the time ``STALLED_S`` alone is not enough."""
 
 
 class StallWatch:

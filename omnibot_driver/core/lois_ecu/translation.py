@@ -40,11 +40,12 @@ UNKNOWN_FROM_YEAR: Final = 38
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""If the counts fall towards zero by more than ``RESTARTED_TICKS``, plus ``RESTARTED_TICKS_PER_S``
-for each s between two groups, the board has restarted: wheels do not roll back that fast."""
+"""``RESTARTED_TICKS``, ``RESTARTED_TICKS_PER_S``: largest number of ticks by which wheels can roll
+back between two groups, as a constant plus a number for each s. If the counts fall towards zero by
+more, the board has restarted."""
 CONTRADICTED_S: Final = 1.0
-"""If the board's clock does not confirm the time since the last ticks, the wheels are assumed to
-have rolled back for at most this time in s. (The decoder has then forgotten the clock's unit.)"""
+"""Longest time in s for which the wheels are assumed to have rolled back, if the board's clock does
+not confirm the time since the last ticks. (The decoder has then forgotten the clock's unit.)"""
 
 
 class Translation:

@@ -59,7 +59,10 @@ Terms = list[tuple[int, float]]
 
 @dataclass(slots=True)
 class Step:
-    """One step of the filter over ``dt`` s: the ``new`` means, rows of the transition, and noises.
+    """One step of the filter over ``dt`` s.
+
+    ``new``: means of the states after the step. ``rows``: changed rows of the transition matrix.
+    ``noises``: errors to add, each with its effect on the states and its variance.
 
     ``unsure_mps``: for each wheel, the standard deviation of the measured speed that its controller
     uses.
@@ -83,7 +86,8 @@ class Wheel:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m up to which the wheel has certainly rolled."""
+        """Distance in m that the wheel had rolled when it last certainly turned, or began to follow
+        a command. Motion that was estimated since then may have to be subtracted."""
         self.begin_again()
 
     def begin_again(self) -> None:
@@ -126,7 +130,7 @@ class Wheel:
         return self.restless_mps < STEADY_PART * abs(self.course.target_mps)
 
     def counts(self, speed_mps: float, *, signed: bool) -> float:
-        """Return the change of the count, in m, for each m rolled forward."""
+        """Return the effect of forward motion on the count: 1 if it rises, -1 if it falls, or 0."""
         if signed:
             return 1.0
         if not self.course.counting:

@@ -37,29 +37,32 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""Least ratio of a spike to the largest recent step."""
+"""Ratio of a change to the largest recent step. A change can be a spike only above this ratio."""
 CALMING: Final = 0.95
-"""Each reading multiplies the largest recent step by this factor; 20 readings leave a third of
-it."""
+"""Factor by which the stored largest recent step shrinks with each reading. After 20 readings, a
+third of it is left."""
 STILL: Final = 0.08
-"""A leap of an acceleration can be a spike only if every other value of the sensor changes by at
-most this fraction of the leap. After any spike, each value differs from its value before the spike
-by at most this fraction of the leap.
-"""
+"""Fraction of a leap of an IMU value, which is used for two conditions. A leap of an acceleration
+can be a spike only if every other value of the IMU changes by less. The leap was a spike only if
+the next reading returns: each value then differs from its value before the leap by at most this
+fraction of the leap."""
 END_OF_SCALE: Final = 0.99996
-"""Value just below the largest positive word, as a fraction of full scale."""
+"""Fraction of full scale from which a value is regarded as the end of the scale. It is just below
+that of the largest positive word."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a leaping displacement, and the poses after it."""
 BACK: Final = 0.25
-"""Largest change of the speed that may remain after a spike, as a fraction of the spike's leap."""
+"""Fraction of a leap of a displacement: the leap was a spike only if the next displacement differs
+from the one before the leap by at most this fraction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    ``force_step_mps2``: change of specific force between two readings that is never a spike.
-    ``full_scale_mps2``: full scale of the accelerometer; infinite if its readings are not integers.
+    ``force_step_mps2``: a change of specific force between two readings up to this value is never
+    regarded as a spike. ``full_scale_mps2``: full scale of the accelerometer; infinite if its
+    readings are not integers.
     """
 
     fastest_mps: float = 2.0
@@ -102,7 +105,7 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Return the readings that need not wait any more; each kind is in order of arrival."""
+        """Add a reading; return the readings that need not wait any more, each kind in order."""
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):
@@ -132,7 +135,7 @@ class OutlierFilter:
         return released
 
     def admit_imu(self, reading: ImuReading, stamp_s: float) -> list[tuple[ImuReading, float]]:
-        """Return the IMU readings that need not wait any more, as ``admit`` does for all kinds."""
+        """Add an IMU reading; return the IMU readings that need not wait any more."""
         force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
@@ -205,7 +208,7 @@ class OutlierFilter:
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """Add the rejected displacements to ``reading.lost``; return the new reading."""
+        """Return the reading with the number of rejected displacements added to its ``lost``."""
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,
@@ -220,9 +223,9 @@ class OutlierFilter:
 class _Spikes:
     """Finds spikes in a series of readings, each of which is a list of values.
 
-    Each value is divided by the change that is always allowed. ``left``: fraction of a leap that
-    may remain after a spike. ``knocked``: number of values at the start of the list that a knock of
-    the robot may change for a single reading.
+    The caller has divided each value by the change that is always allowed. ``left``: a leap was a
+    spike only if at most this fraction of it remains in the next reading. ``knocked``: number of
+    values at the start of the list that a knock of the robot may change for a single reading.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -272,9 +275,10 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether a step is as large as a bit. Recent variation gives the tolerance.
+        """Return whether a flipped bit can cause the step; recent variation is the tolerance.
 
-        A value at the end of the scale was moved by a knock, not by the topmost bit.
+        ``value``: magnitude after the step. At the end of the scale the result is False, because a
+        knock of the robot can cause such a value.
         """
         if topmost == inf:  # the readings are not integers
             return False

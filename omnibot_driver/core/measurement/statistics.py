@@ -23,8 +23,9 @@ class StreamStatistics:
 
     All values only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    ``imu_period_s``: period of IMU readings in s if one clock of the board paces both IMU readings
-    and displacements, so that a lost displacement means lost IMU readings; otherwise None.
+    ``imu_period_s``: period of the IMU readings in s if one clock of the board paces IMU readings
+    and displacements, otherwise None. If it is given, lost IMU readings can be counted by means of
+    the displacements.
     """
 
     imu_period_s: float | None = None
@@ -37,11 +38,12 @@ class StreamStatistics:
     gaps: int = 0
     """Number of times that one or more displacements in a row were lost."""
     last_gap: int = 0
-    """Number of displacements in a row that were lost the last time."""
+    """Number of displacements that were lost in the last gap."""
     reads: int = 0
     """Number of reads whose last reading was an IMU sample or a displacement."""
     delay_s: float = 0.0
-    """Sum of the newest sample's age at each of the ``reads``, in s; an age is never negative."""
+    """Sum of delays in s: for each of the ``reads``, the age of its newest sample. An age is never
+    negative."""
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0
@@ -50,7 +52,8 @@ class StreamStatistics:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
-    """``imu`` plus ``lost_imu`` at the last displacement; None without such a displacement."""
+    """Number of IMU readings that the board had sent at the last displacement: the sum of ``imu``
+    and ``lost_imu`` then. None if unknown."""
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
@@ -81,7 +84,7 @@ class StreamStatistics:
                 self._sent_imu = None
 
     def _miss_imus(self, reading: DisplacementReading) -> None:
-        """Count the IMU readings that displacements show to be lost; count each only once."""
+        """Count lost IMU readings: those that are missing between two displacements."""
         if self.imu_period_s is None:
             return
         if reading.duration_s is None or reading.restarted:

@@ -3,9 +3,9 @@
 """The envelope: the velocities that a robot may have under its recent set-points.
 
 A robot follows its set-points late and smoothly, so its velocity is in the convex hull of the
-recent set-points and rest. Rest is included because a robot may always be slower than commanded.
-Around that hull is a margin for scales, wheels and noise. The module is pure geometry, in the
-board's own axes, and does not know time.
+recent set-points and rest. Rest is included because a robot may always be slower than commanded. A
+margin around the hull allows for inexact scales, unequal wheels and noise. The module is pure
+geometry, in the board's own axes, and does not know time.
 """
 
 import math
@@ -16,7 +16,8 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 
 STRETCH: Final = 1.2
-"""Allowed ratio of speed to set-point: scales are set by hand, and controllers overshoot."""
+"""Largest allowed ratio of speed to set-point. It is above 1 because users measure the scales by
+hand, and controllers overshoot."""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """``NOISE_MPS``, ``NOISE_RADPS``: noise in m/s and rad/s that is always allowed.
@@ -36,13 +37,16 @@ Overshoot is allowed only if the robot leaves a set-point other than rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""``SKEW_RADPS_PER_MPS``, ``SKEW_MPS_PER_RADPS``: allowed yaw rate per speed, and allowed speed per
-yaw rate, for wheels that differ by some per cent."""
+"""``SKEW_RADPS_PER_MPS``, ``SKEW_MPS_PER_RADPS``: yaw rate that is allowed for each m/s of
+commanded speed, and speed that is allowed for each rad/s of commanded yaw rate. The reason is that
+wheels differ by some per cent."""
 CHANGING_RADPS_PER_MPS: Final = 0.4
-"""Allowed yaw rate per change of speed, for wheels that accelerate differently."""
+"""Yaw rate that is allowed for each m/s by which the set-point changes, because wheels accelerate
+differently."""
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
-"""Factor that makes a yaw rate comparable to a velocity."""
+"""Factor that converts a yaw rate in rad/s to a speed in m/s, so that the noises of both are
+equal."""
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
@@ -53,9 +57,9 @@ small."""
 def outside(
     motion: BodyTwist, explained: Sequence[Velocity], *, heading_known: bool
 ) -> tuple[float, float]:
-    """Return the linear and angular speed outside the envelope in m/s and rad/s; inside, 0 or less.
+    """Return by how much the motion exceeds the envelope, in m/s and rad/s; 0 or less if inside.
 
-    ``explained``: velocities that recent set-points can cause; that of the current one is first. If
+    ``explained``: velocities that recent set-points can cause, the current set-point's first. If
     the heading is unknown, only the magnitude of the linear velocity is checked.
     """
     current_x, current_y, _ = explained[0]
@@ -113,7 +117,10 @@ def dot(one: BodyTwist, other: BodyTwist) -> float:
 
 
 def _outside_hull(motion: BodyTwist, explained: Sequence[Velocity]) -> float:
-    """Return the distance in m/s from the hull of rest and stretched set-points; inside, <= 0."""
+    """Return how far a velocity is outside the hull of rest and the stretched set-points.
+
+    The result is in m/s, and 0 or less inside the hull. Set-points are stretched by ``STRETCH``.
+    """
     furthest_mps = -math.inf
     for x, y in _DIRECTIONS:
         reached_mps = max([x * vx + y * vy for vx, vy, _ in explained])

@@ -2,9 +2,9 @@
 
 """The following error: how far a robot moves outside its envelope without interruption.
 
-A single displacement never exceeds a limit, because its data may be damaged. A short jerk ends
-before its displacements add up to a limit. This module knows velocities in the board's own axes,
-and times; it does not know which fault an error shows.
+A single displacement is never enough to exceed a limit, because its data may be damaged. A short
+jerk ends before the sum of its displacements exceeds a limit. This module knows velocities in the
+board's own axes, and times; it does not know which fault an error shows.
 """
 
 from typing import Final
@@ -15,15 +15,15 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s: if a robot is slower than all its set-points of the last 0.16 s, something is assumed
-to hold it."""
+"""Time in s over which a robot's speed is compared with its set-points. If the robot is slower than
+all set-points of this time, something is assumed to hold it."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""``LARGEST_PART``, ``LARGEST_PART_OF_A_LONG_ONE``: a short displacement, and a long one, adds at
-most this fraction of the limit (``UNEXPLAINED_M`` or ``UNEXPLAINED_RAD``) to the error. So at least
-three displacements in a row, or two long ones, are needed to exceed a limit.
-"""
+"""``LARGEST_PART``, ``LARGEST_PART_OF_A_LONG_ONE``: largest fraction of a limit that one short
+displacement, or one long displacement, can add to the error. The limits are ``UNEXPLAINED_M`` and
+``UNEXPLAINED_RAD``. So at least three displacements in a row, or two long ones, are needed to
+exceed a limit."""
 
 
 class FollowingError:

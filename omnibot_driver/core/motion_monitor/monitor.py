@@ -22,18 +22,19 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s: once all set-points have been rest for this long, the robot counts as not driven."""
+"""Time in s for which all set-points must have been rest before the robot counts as not driven."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-"""``PLAIN_MPS``, ``PLAIN_RADPS``: if the commanded speed in m/s or rad/s is higher, the
-displacements must show motion."""
+"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speeds in m/s and rad/s above which the displacements
+must show motion. If they show none for ``BLOCKED_S``, the robot is regarded as blocked."""
 MOVING_MPS: Final = 0.02
 MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time in s: a robot at rest for this long has obeyed a stop; later motion has another cause."""
+"""Time at rest in s after which a robot has certainly obeyed a stop. The stopped command is not the
+cause of later motion."""
 STOPS_S: Final = 5.0
 """Time in s for which the command policy repeats Stop if the robot keeps moving."""
 
@@ -115,11 +116,11 @@ class MotionMonitor:
             self._has_stood = False
 
     def release(self) -> None:
-        """Record a release of the e-stop, after which the board may still hold its own e-stop."""
+        """Record that the e-stop was released; the board may still hold an e-stop of its own."""
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Return whether this fault was not reported since the robot obeyed last."""
+        """Note ``fault``; return whether it is new since the robot last moved as commanded."""
         told, self._told = self._told, self._told | {fault}
         return fault not in told
 

@@ -18,7 +18,8 @@ CommandedTwist = BodyTwist | None
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]
-"""The values of a BodyTwist; a plain tuple, because many are made and a tuple is made quickly."""
+"""The values of a BodyTwist as a plain tuple. The monitor creates many of them, and a tuple is
+created quickly."""
 
 HELD_S: Final = 0.3
 """Time in s for which a robot may keep the full velocity of a replaced set-point.

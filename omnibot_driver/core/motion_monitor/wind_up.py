@@ -51,16 +51,17 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m that was lost in a single long displacement, not yet added to ``way_m``.
+        """Distance in m by which the robot fell behind in one long displacement. It is added to
+        ``way_m`` only if the robot is held in the next displacement too.
 
         0: the distance has been added. None: the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract motion outside the envelope; return whether the wind-up explains the motion.
+        """Subtract motion outside the envelope from ``way_m``; return whether that explains it.
 
-        A wind-up explains any motion shorter than ``way_m``. ``way_mps``, ``turn_radps``: speeds
-        outside the envelope, for ``seconds``.
+        The wind-up explains motion that is shorter than ``way_m``, in any direction. ``way_mps``,
+        ``turn_radps``: speeds outside the envelope, which lasted for ``seconds``.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds

@@ -57,7 +57,7 @@ class CorrectionSmoother:
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Move ``pose`` by the correction that is due in ``seconds``, within the room."""
+        """Correct ``pose`` by the part that is due after ``seconds``, as far as the room allows."""
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0
         self._settling_s = max(0.0, self._settling_s - seconds)
@@ -71,5 +71,5 @@ class CorrectionSmoother:
 
 
 def _part(wanted: float, room: float) -> float:
-    """Return which fraction of the wanted correction the room allows, from 0 to 1."""
+    """Return the fraction, 0 to 1, of the wanted correction that is not larger than the room."""
     return min(1.0, max(0.0, room) / wanted) if wanted else 1.0

@@ -75,7 +75,7 @@ class Covariance:
     def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
         """Return the covariance after adding independent errors, each as (variance, x, y, yaw).
 
-        Each error lies along the vector (x, y, yaw); its variance is in units of that vector.
+        Each error is the vector (x, y, yaw), multiplied by a random number with this variance.
         """
         xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
         for variance, x, y, yaw in errors:
@@ -194,7 +194,7 @@ class Uncertainty:
 
 @cache
 def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
-    """Return, for each wheel, the body's motion if that wheel alone rolls by one metre."""
+    """Return, for each wheel, the motion of the body when only this wheel rolls, by one metre."""
     count = len(wheels.joints)
     rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
     return tuple(

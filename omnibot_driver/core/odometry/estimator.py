@@ -24,17 +24,19 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
-"""If no pose arrives within this time, in s of the board's clock, heading 0 is assumed."""
+"""Longest time, in s of the board's clock, to wait for a pose that gives the heading. Then heading
+0, or that of an unconfirmed pose, is assumed."""
 LONG_GAP_S: Final = 1.0
-"""If displacements of more than this duration, in s, were lost, the next displacements wait for a
-pose that shows the lost motion."""
+"""Duration of lost displacements, in s, above which the next displacements wait for a pose that
+shows the lost motion."""
 POSE_DUE_S: Final = 0.24
-"""The next pose arrives within this time, in s of the board's clock, unless it is lost."""
+"""Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
+then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""A heading counts as known if open gaps add at most this standard deviation to it, in rad."""
+"""Standard deviation in rad, due to open gaps, from which a heading counts as unknown."""
 UNKNOWN_S: Final = 0.5
-"""Time, in s, in which a robot is assumed to roll to a halt. In a gap of unknown length, motion of
-this duration may be unreported."""
+"""Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
+in this time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +128,7 @@ class Odometry:
         return due
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
-        """Return the estimates that a displacement completes: none while it waits for a pose."""
+        """Add a displacement; return its estimates, or none while it waits for a pose."""
         estimates = []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
@@ -221,7 +223,7 @@ class Odometry:
         return estimates
 
     def _resume(self, told: Pose) -> list[OdometryEstimate]:
-        """Use a pose to recover the motion that was lost before the waiting displacements."""
+        """Compute the motion that was lost before the waiting displacements, by means of a pose."""
         assert self._board is not None
         seconds = self._backlog.unstamped_s(self._last_stamp_s)
         way = log_of(self._board.way_to(self._backlog.before(told)))

@@ -66,10 +66,10 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """Return the part of ``unheard_s``, in s, that fits between the stamps around the gap.
+        """Return the smaller of ``unheard_s`` and the time in s between the stamps around the gap.
 
-        This is at most the time from ``last_stamp_s`` to the stamp of the first displacement, minus
-        the duration of that displacement.
+        The time between the stamps runs from ``last_stamp_s`` to the beginning of the first waiting
+        displacement (its stamp minus its duration).
         """
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:
@@ -80,7 +80,7 @@ class PendingDisplacements:
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
     def before(self, board: Pose) -> Pose:
-        """Return the pose from which the waiting displacements lead to ``board``."""
+        """Return the pose before the waiting displacements, given the pose ``board`` after them."""
         start = Pose(
             yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)
         )

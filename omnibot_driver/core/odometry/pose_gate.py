@@ -95,7 +95,7 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """Return whether rounding and motion in open gaps can make a pose deviate by ``way``.
+    """Return whether ``way``, a pose's deviation, can come from rounding or from open gaps.
 
     ``gap``: covariance of the motion in open gaps.
     """

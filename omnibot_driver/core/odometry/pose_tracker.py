@@ -69,8 +69,8 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent that took ``seconds``.
 
-        ``stamped_s``: time in s that is left between the stamps for this motion. The published pose
-        moves no farther than the robot can move in this time.
+        ``stamped_s``: time in s between the stamps that the motion can fill. If it is shorter than
+        ``seconds``, the published pose moves only as far as the robot can move in ``stamped_s``.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
@@ -81,11 +81,11 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add the motion in a gap, now that it is known, without spreading it over time."""
+        """Add the lost motion of a gap, which a pose has shown, at once instead of gradually."""
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:
-        """Correct the pose by ``tangent``, over some time; remove the uncertainty of all gaps."""
+        """Correct the pose by ``tangent`` gradually; remove the uncertainty of all gaps."""
         if self.uncertainty.gap != NOTHING:  # otherwise it corrects only rounding
             self.rolled += _times(tangent, self._size)
         self.follower.correct(roll(_times(tangent, self._signed_size)))

@@ -29,10 +29,12 @@ A skew that lasts for a shorter time may be due to a busy computer, so it is not
 """
 
 BUSY_SHARE: Final = 0.1
-"""Share of time that the reader waits for the processor, above which the computer is too busy."""
+"""Largest share of time, 0 to 1, for which the reader may wait for the processor. Above it, the
+computer is reported as too busy."""
 
 PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
-"""Label of the rate at which odometry is published, as opposed to the rate of its readings."""
+"""Label of the rate at which the driver publishes odometry. "Odometry rate (Hz)" is the rate at
+which odometry readings arrive."""
 OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "IMU": ("IMU frames lost", "IMU readings refused"),
     "Odometry": ("Odometry frames lost", "Odometry readings refused"),

@@ -117,16 +117,17 @@ class Notices:
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
-        """Return the sentence once, when its condition begins.
+        """Return the sentence if that of the previous call was empty, else an empty list.
 
-        ``sentence`` is empty while the condition does not hold.
+        ``sentence`` is empty while its condition does not hold, so each occurrence is reported
+        once.
         """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []
 
 
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
-    """Return a sentence: no valid data arrived for ``silence_s``, and what to check.
+    """Return a sentence on ``silence_s`` seconds without valid data, and on what to check.
 
     ``bytes_came``: whether invalid bytes arrived; ``baudrate``: whether the port has a baud rate.
     """

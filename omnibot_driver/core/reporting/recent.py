@@ -10,7 +10,7 @@ from omnibot_driver.core.board import RateName
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 
 RECENT_S: Final = 10.0
-"""Time in s for which figures are kept and an event is reported."""
+"""Time in s for which figures are kept, and for which the diagnosis shows an event."""
 
 
 class RecentFigures:
@@ -30,7 +30,7 @@ class RecentFigures:
             self._window.popleft()
 
     def grew(self, name: str, count: int, now: float) -> bool:
-        """Store the count of this name; return whether the count has grown within RECENT_S."""
+        """Store ``count`` for ``name``; return whether it has grown in the last RECENT_S."""
         before, at = self._counts.get(name, (count, -math.inf))
         if count > before:
             at = now

@@ -6,8 +6,8 @@ The bytes of a tick come late, never early: arrivals are on or above the line, w
 true period. Bytes that a read did not bring were sent after that read, so the line cannot be much
 lower either. Two points are kept of every block of ticks:
 
-*Latest*, the least delayed arrival, is an upper bound. It always holds; bursts, stalls and losses
-only make it loose.
+*Latest*, the least delayed arrival, is an upper bound. It is always valid; after bursts, stalls and
+losses it is only higher than necessary.
 
 *Earliest*, from what a read did not bring, is a lower bound. A read that was late gives a bound
 that is too high, so the highest tenth of the bounds is left out. A bound far below the arrivals is
@@ -49,9 +49,10 @@ The place is late enough to follow recent points, and early enough not to follow
 last second.
 """
 FEWEST_READS: Final = 12
-"""Least number of reads in a block that is enough to find out which of them were late."""
+"""Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
+late ones cannot be recognized."""
 LATE_PART: Final = 0.1
-"""At most this fraction of the reads is assumed to be late by more than ``LATE_S``, in s."""
+"""Largest assumed fraction of reads that are late by more than ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest allowed distance of an earliest point below a latest one, as a fraction of a period.

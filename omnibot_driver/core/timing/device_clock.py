@@ -36,17 +36,18 @@ LARGEST_LOSS_TICKS: Final = 25
 If more are missing, everything known about the clock is forgotten.
 """
 BEAT_READS: Final = 12
-"""Among this many consecutive reads, at least one has little delay.
+"""Number of consecutive reads of which at least one has little delay.
 
 If an adapter delivers every 16 ms, the phase of the tick at which reads occur repeats after five
 reads, so 12 reads see each phase twice.
 """
 CALM: Final = 0.45
-"""The tick of a read is sure if the read is at most this fraction of a period from the line. The
-read before it must be as near to the line. The limit must be less than half a period.
-"""
+"""Largest distance of a read from the line, as a fraction of a period, at which the tick of the
+read is certain. The read before it must be as near to the line. The fraction must be less than a
+half."""
 LARGEST_RISE: Final = 0.02
-"""If the line is raised, each step of the stamps exceeds the period by at most this fraction."""
+"""Largest fraction by which a step of the stamps may exceed the period. After the line was raised,
+the stamps approach it slowly."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
@@ -89,7 +90,8 @@ class DeviceClock:
         If the next tick is seen soon after a late tick, both ticks had waited to be read.
         """
         self._awaited: Point | None = None
-        """The tick after the newest one, and a time in s until which no read had brought it."""
+        """Lower bound for the tick after the newest one: until this time in s, it had not
+        arrived."""
         self._cut_off: Point | None = None
         """Lower bound for the tick whose sample the last read cut; None if no sample was cut.
 
@@ -172,7 +174,7 @@ class DeviceClock:
         return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """Return each reading's tick, counted with known losses and corrected by displacements."""
+        """Return each reading's tick number: lost readings count, and displacements correct it."""
         ticks: list[int] = []
         for reading in readings:
             if isinstance(reading, ImuReading):
@@ -257,10 +259,10 @@ class DeviceClock:
         self._seen_tick, self._seen_at = tick, now
 
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
-        """Set the stamp of a tick by the line, without a step back and without a large step ahead.
+        """Set the stamp of a tick to the line's time, but limit the step from the last stamp.
 
-        ``latest_s``: upper limit of the stamp; ``room_s``: largest step in s that leaves the same
-        step for each later stamp of this read.
+        ``latest_s``: upper limit of the stamp. ``room_s``: step in s with which this stamp and all
+        later ones of the read stay before the time of the read.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
