@@ -72,7 +72,7 @@ class ReadingClock(Protocol):
         """Rate error of the board's clock in ppm; positive if it is faster than the host's."""
 
     def restart(self) -> None:
-        """Forget all earlier readings: they do not help to find the times of later readings."""
+        """Forget all earlier readings, because a new stream of readings begins."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None

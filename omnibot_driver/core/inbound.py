@@ -45,9 +45,9 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes, and return the estimates to publish at once; call ``process`` afterwards.
 
-        A command between the calls of ``hear`` and ``process`` is handled as if it came before the
-        bytes. That would be wrong if the bytes change the mode: then ``hear`` calls ``process``
-        itself and returns an empty list, and the caller's call of ``process`` returns True.
+        A command that arrives between the two calls is handled as if it had arrived before the
+        bytes. This would be wrong if the bytes change the mode. In this case ``hear`` itself calls
+        ``process`` and returns an empty list, and the caller's call of ``process`` returns True.
         Requests other than commands call ``process`` before they begin.
         """
         self._liveness.came_at = now

@@ -24,8 +24,8 @@ PAUSE_RETRY_S: Final = 1.5
 sends a notice every second, so data without a notice for this time shows that the command was
 lost."""
 FLOWING_S: Final = 0.1
-"""To measure how long data has flowed, the driver adds up the gaps between receptions. One gap adds
-at most this time, in s. A running board sends every 10 ms."""
+"""Largest time, in s, that one gap between receptions adds to the measured time of uninterrupted
+data. A running board sends every 10 ms."""
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command, or the notice of a paused board, takes to arrive. A notice
 that arrives sooner than this after a command may have been sent before the board obeyed. If data
@@ -101,12 +101,18 @@ class ModeManager:
         return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
-        """Begin with an open port. The board may even be waiting for the rest of a command."""
+        """Wake the board after its port was opened, and start it if it should run.
+
+        Waking also ends a partial command, in case the board still waits for the rest of it.
+        """
         self.output = NO_PACKETS
         self._begin(now)
 
     def closed(self, why: str) -> None:
-        """Fail a request for the reason ``why``, because the port is lost or closed."""
+        """Fail the request in progress, if any, because the port is lost or closed.
+
+        ``why``: the reason, as the message of the answer.
+        """
         self.phase = Phase.CLOSED
         self._answer(False, why)
 
@@ -237,9 +243,9 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether an earlier P may still be on its way, or the received data may be wrong.
-        If True, P is sent only after data has flowed for ``PAUSE_RETRY_S``, because a second P
-        would resume the board.
+        ``with_p``: whether the board may already have obeyed a P, or may soon obey one that is on
+        its way. If so, a new P is sent only after data has flowed for ``PAUSE_RETRY_S``, because P
+        resumes a paused board.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

@@ -123,7 +123,11 @@ class Reporter:
         self.notify(self._notices.unconfirmed(self._board.mode, measured=measured, blind=blind))
 
     def set_to_zero(self, *, sideways: bool, planar: bool) -> None:
-        """Report, once each, which parts of a body velocity were set to zero."""
+        """Report which parts of a body velocity were set to zero, each part only once.
+
+        ``sideways``: whether it had a sideways part that the wheels cannot produce; ``planar``:
+        False if it also had motion out of the plane.
+        """
         if sideways:
             self.notify(self._notices.once(SIDEWAYS))
         if not planar:

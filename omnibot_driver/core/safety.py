@@ -54,8 +54,10 @@ class SafetyStops:
         self._liveness, self._reporter = liveness, reporter
         self._task = task
         self._button_held = False
-        """Whether the e-stop button was held after its last event; the event may predate the
-        connection."""
+        """Whether the e-stop button is held, according to the last report about it.
+
+        The report may be from an earlier connection.
+        """
 
     def react(self, measured: list[Measured], now: float) -> None:
         """Process the readings in order: report estimates, and stop the robot where necessary."""

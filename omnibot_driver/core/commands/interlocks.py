@@ -41,7 +41,10 @@ class Interlocks:
         return "the driver is shutting down" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused, by this module or by an earlier check."""
+        """Record that a motion command was refused, so its sender is still active.
+
+        This module or an earlier check has refused it.
+        """
         self._interlock.be_active(now)
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:

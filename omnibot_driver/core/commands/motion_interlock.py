@@ -56,10 +56,10 @@ class MotionInterlock:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Begin anew to measure the pause that ends a refusal: a sender may be active now.
+        """Restart the measurement of the pause that ends a refusal.
 
-        A refused command shows that its sender is active, whatever the reason for the refusal.
-        While this process stalls, the driver cannot see whether a sender pauses.
+        Call it when a command is refused for any reason, because its sender is active. Call it
+        also after a stall of this process, because a sender may have been active meanwhile.
         """
         self._commanded_at = now
 

@@ -234,8 +234,8 @@ class CommandPipeline:
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop an invalid goal, or a goal that the robot drives away from; return notices.
 
-        A goal becomes invalid when the odometry frame moves within the board's frame. The notices
-        are for the user.
+        A goal is invalid if the origin of the odometry frame has moved since the command, because
+        of a reset of the odometry or a restart of the board. The notices are for the user.
         """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):

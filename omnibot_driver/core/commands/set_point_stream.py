@@ -20,8 +20,11 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 PACE_S: Final = 0.01
 """Shortest time between frames, in s; more frequent frames would only fill a buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Shortest time between two set-points, in s. With a shorter pause, lost bytes would affect
-a larger share of the time (docs/internals/integrity.md). Commands at 50 Hz are not slowed."""
+"""Shortest time between two set-points, in s. Commands at 50 Hz are not slowed.
+
+With a shorter pause, set-points damaged by lost bytes would be in force for a larger share of the
+time (docs/internals/integrity.md).
+"""
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
 
@@ -95,9 +98,9 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that a request was written, and adapt what to send next.
 
-        Packets that begin with Stop on every channel count as a Stop. If a motion frame lost bytes,
-        the board may take the bytes of other packets for its end. So after other packets the stream
-        repeats the set-point at once.
+        Packets that begin with Stop on every channel count as a Stop. After all other packets the
+        stream repeats the set-point at once: if the last motion frame lost bytes, the board may
+        have completed it with the first bytes of these packets.
         """
         if self._heard is not None:
             self._heard(packets, now)

@@ -25,7 +25,7 @@ AT_LEAST: Final = 2
 """Smallest number of displacements in a proof, even if one lasts long enough: a single displacement
 may be damaged, or may date from before the wheels turned."""
 PROOFS: Final = 2.0
-"""Factor by which the duration of standstill is multiplied to get the time to wait for a proof."""
+"""Least time to wait for a proof, as a multiple of the duration of standstill that it needs."""
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 

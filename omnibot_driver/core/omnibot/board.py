@@ -126,8 +126,8 @@ class OmniBot:
     def edge(self) -> SampleBoundary | None:
         """Where the last read ended in the stream of IMU samples; None if this is unknown.
 
-        The position follows from the bytes held after the last decoded frame: whether they begin or
-        complete an IMU frame, and how many bytes come after that IMU frame.
+        The position is computed from the bytes held after the last decoded frame: whether they
+        begin with a complete or incomplete IMU frame, and how many bytes follow this frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -217,7 +217,7 @@ class OmniBot:
         """Do nothing: the board does not have a command that resets only its odometry."""
 
     def leave(self) -> None:
-        """Do nothing: this board has no periodic packets to end before the driver ends."""
+        """Do nothing: the driver sends this board no polls or subscriptions that it must end."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Return the stream that encodes commands and repeats their frames."""

@@ -7,8 +7,8 @@ about three times less likely. This module knows what a board is likely to send 
 the line is to damage frames. It does not know how interpretations are searched (``trellis``) or
 when one is accepted (``decoder``).
 
-Content is weak evidence: the cost of a frame's content stays below the cost of calling the frame
-damaged. So the frame of a true shock is delivered if it lies between two complete frames.
+Content is weak evidence: odd content costs less than the assumption that the frame is damaged. So
+the frame of a true shock is delivered if the frames right before and after it are complete.
 """
 
 from math import ceil, floor
@@ -38,13 +38,19 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of a frame that gained bytes, if a header is where the frame should have ended."""
+"""Extra cost of assuming that a frame gained bytes, if a header follows its regular length."""
 BAD_RUN: Final = 6.0
-"""Cost of beginning a run of unexplained bytes (a bad run), which a lost burst or noise causes."""
+"""Cost of beginning a run of unexplained bytes (a bad run).
+
+Noise, or the loss of many bytes at once, causes such a run.
+"""
 BAD_TAIL: Final = 2.5
 """Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
 UNKNOWN_START: Final = 1.0
-"""Cost if the first bytes are the rest of a frame: after a silence, a whole frame is likelier."""
+"""Cost of assuming that the first bytes are not the beginning of a frame.
+
+After a silence, the first bytes are more likely a whole frame than the rest of one.
+"""
 BAD_BYTE: Final = 0.35
 """Cost of each byte of a bad run, in addition to ``BAD_RUN``. A bad run of 14 bytes therefore costs
 more than any true IMU frame."""
@@ -53,7 +59,7 @@ BAD_HEADER: Final = 0.5
 GAP: Final = 5.0
 """Cost of a pause of the line within a frame; the board sends a frame without a pause."""
 BAD_TEXT: Final = 4.0
-"""Cost of a complete text within a bad run: nine fixed letters are not a coincidence."""
+"""Cost of a complete text within a bad run: nine fixed bytes hardly arise by chance."""
 KNOWN_GAP: Final = 11.0
 """Cost of a pause within a frame, on a line that so far paused only between frames.
 
@@ -72,14 +78,17 @@ LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 One word that differs much makes a frame odd; a shock changes several words.
 """
 AFTERSHOCK: Final = 1.5
-"""Cost of an odd IMU frame after another odd one, because a shock lasts several frames."""
+"""Cost of an odd IMU frame after another odd one.
+
+It is less than the cost of the first one, because a shock lasts several frames.
+"""
 WEIGHTLESS: Final = 2.5
 """Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
 """Cost of an acceleration below 0.5 g, one word of which has the bytes of an IMU header.
 
-A gyro word of -6 has these bytes. In a run of IMU frames, such words are the headers of a second,
-shifted run of false frames, in which gyro words take the place of accelerations.
+Such a frame is probably read from a wrong start: at a gyro word of -6, which has the bytes of a
+header. Gyro words, which are small, are then read as accelerations.
 """
 JUMP: Final = 2.5
 """Cost of a counter that did not advance by one: a frame before this frame was lost."""
@@ -259,8 +268,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the last byte of this frame may belong to the next header.
 
-    False for bytes that a header does not contain. Also False for an IMU frame whose last word
-    equals that of the IMU frame before, unless the last byte is FF.
+    False if no header contains this byte. If the last word of an IMU frame equals that of the
+    previous IMU frame, True only if the byte is FF.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

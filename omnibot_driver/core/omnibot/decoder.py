@@ -42,7 +42,7 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""A frame whose content costs at least this waits until the bytes after it arrive."""
+"""Least cost of a frame's content at which the decoder waits for the bytes after the frame."""
 DOUBT_BYTES: Final = 170
 """Number of uncertain bytes at which the decoder must decide. In nominal mode the board sends this
 number of bytes in 100 ms."""
@@ -51,11 +51,11 @@ SHORTEST_RUN: Final = DELTA_LENGTH
 CALM_S: Final = 10.0
 """Time in s without damage after which a line is regarded as one that loses few bytes.
 
-On such a line, less evidence is needed that the last byte of a frame is not part of the next
-header.
+On such a line, the decoder needs less evidence before it assumes that the last byte of a frame is
+not the first byte of the next header.
 """
 FRAMES_TO_SETTLE: Final = 3
-"""An uncertain frame is discarded if at least this number of certain frames follow."""
+"""Number of certain frames after an uncertain frame at which the uncertain one is discarded."""
 
 
 @dataclass(slots=True)
@@ -151,7 +151,7 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Accept the new bytes if all are calm frames that were due; return True if accepted."""
+        """Accept ``data`` if it consists of calm frames that were due; return whether it does."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
@@ -236,7 +236,10 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept all frames of ``walk`` but the uncertain last two; return False for ``_walk``."""
+        """Accept all frames of ``walk`` except the last two: the odd bytes after them raise doubt.
+
+        Always return False, because ``_walk`` must return False afterwards.
+        """
         believed = len(walk.frames) - 2
         if believed > 0:
             self._take(walk, believed, walk.known_after(believed, self.expectation), found)

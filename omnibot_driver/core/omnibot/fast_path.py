@@ -57,8 +57,8 @@ class Walk:
 
     ``ends``: position after each frame. ``lessons``: for each frame from which the expectation will
     learn, the number of frames before it, the frame, and the last IMU frame before it. ``known``:
-    contexts that are already computed (as fields of a Context), each with the number of frames
-    after which it applies.
+    pairs of a number of frames and the context after that number of frames (as the fields of a
+    Context), for some numbers only.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")

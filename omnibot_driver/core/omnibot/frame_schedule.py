@@ -61,9 +61,9 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: number of bytes right before the frame that belong to no frame. IMU frames lost
-        before a pose are returned with the frame after the pose. A delta resets the count of lost
-        IMU frames, because the SEQ of the delta shows losses.
+        ``skipped``: number of bytes right before the frame that belong to no frame. For a pose the
+        result is 0: IMU frames lost before it are included in the result for the next frame. Each
+        lost IMU frame is returned only once.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

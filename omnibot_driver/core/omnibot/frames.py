@@ -22,7 +22,8 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""Header bytes. If a frame that lost bytes ends in one, that byte may belong to the next header."""
+"""The bytes of headers. If one of them is the last byte of a frame, the frame may have lost a byte,
+and this byte may belong to the next header."""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")

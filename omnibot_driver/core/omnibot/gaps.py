@@ -27,16 +27,16 @@ from omnibot_driver.core.omnibot.late_reads import (
 )
 
 LATE_S: Final = 0.011
-"""Longest assumed idle time in s of a line, while the board runs and no bytes are lost.
+"""Longest pause in s between two reads that is normal while the board runs: about one tick.
 
-An adapter that collects bytes for a longer time causes pauses of its own.
+Before a longer pause ended, bytes were lost, an adapter collected bytes, or the reader was late.
 """
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
 TICK_BYTES: Final = 14 + 9 + 15
 """Most bytes that the board sends in one tick; a read of more bytes after a pause was late."""
 PAUSES_TO_TRUST: Final = 16
-"""After this many pauses between frames, the line is assumed to cause the pauses, not an
+"""Number of pauses between frames after which the line is assumed to cause the pauses, not an
 adapter."""
 
 _FIRST: Final = attrgetter("first")
@@ -51,8 +51,8 @@ class InterFrameGaps:
     * ``certain``: whether ``sharp`` and ``between`` were confirmed so often that one more
       confirmation changes nothing.
     * ``at_pace``: whether the bytes of the last read came without a pause before them.
-    * ``collected``: whether the last read brought the bytes of more than a tick. If so, the read
-      may have ended anywhere in a tick; an end right after the first byte of a frame is unlikely.
+    * ``collected``: whether the bytes of the last read were collected for more than a tick. Such a
+      read is unlikely to end right after the first byte of a frame.
 
     ``byte_s``: time in s that the line takes for a byte.
     """
@@ -133,7 +133,7 @@ class InterFrameGaps:
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether a pause ended at ``start``, less than half a tick before the last read."""
+        """Return whether the bytes from ``start`` on came within half a tick, after a pause."""
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
                 came = next(read.now for read in self._reads if read.end > start)

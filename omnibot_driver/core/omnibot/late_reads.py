@@ -37,17 +37,17 @@ HALF_TICK_S: Final = TICK_S / 2
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Tolerance in s: a delay that differs from whole ticks by at most this may be due to lost
-bytes."""
+"""Largest difference in s between a delay and a whole number of ticks at which lost bytes may be
+the cause of the delay."""
 INTO_TICK_S: Final = 1e-3
 """A delta or pose begins about this time, in s, after its tick began: an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
 """Largest difference in s between the delays of two punctual reads, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Tolerance in s: bytes that arrive this much earlier or later are still at the pace of the
-line."""
+"""Largest difference in s between the arrival time of bytes and the time expected from the baud
+rate, at which the bytes are regarded as arriving at the pace of the line."""
 FEW_BYTES: Final = 2
-"""Up to this number of bytes, the pace at which bytes arrive cannot be measured."""
+"""Largest number of bytes that are too few to measure the pace at which bytes arrive."""
 TICKS_TO_PROVE: Final = 2
 """Number of late ticks, after a first late tick, that prove lost bytes.
 
@@ -79,10 +79,11 @@ _END: Final = attrgetter("end")
 
 
 class Gap(NamedTuple):
-    """A pause before one of the bytes from ``first`` to ``before`` - 1, between two reads.
+    """A pause between two reads, before one of the bytes from ``first`` to ``before`` - 1.
 
-    During the pause the line was idle, or the reader was late. ``price``: cost of assuming a frame
-    across the pause, if the line was idle; ``pause_s``: time in s between the two reads.
+    During the pause the line was idle, or the reader was late. ``price``: cost of assuming that one
+    frame was sent partly before and partly after the pause, if the line was idle; ``pause_s``: time
+    in s between the two reads.
     """
 
     first: int
@@ -99,9 +100,9 @@ def cause(
     ``reads``: all reads since the pause, from the one that ended it; ``byte_s``: time in s that the
     line takes for a byte. The reader was late
 
-    * if any later bytes are on time again. But if all bytes so far came at the pace of the line,
-      the reader may have been prompt, and ``start`` may be in the middle of another frame: then the
-      next frame decides;
+    * if any later bytes are on time again. Exception: if all bytes since the pause came at the pace
+      of the line, perhaps the reader was prompt and no frame begins at ``start``. Then the cause is
+      found from the next frame;
     * if bytes came faster than the line can send them, because they had waited to be read;
     * if the frame is a text or a text follows it, because a paused board does not send frames in
       ticks;

@@ -21,14 +21,14 @@ REACH: Final = 15 + 2
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""Costs of the remaining bytes of a bad run, from about ``DAMAGE`` down to the cost of one byte."""
+"""Costs of the last 15, 14, ... 1 bytes of a bad run; the first is a little below ``DAMAGE``."""
 
 
 def least_costs(data: bytes) -> list[float]:
     """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    The result is valid while more bytes may follow. Along an edge of the graph, the least cost
-    decreases by at most the price of the edge.
+    An incomplete frame at the end costs nothing, because more bytes may follow. Along an edge of
+    the graph, the least cost decreases by at most the price of the edge.
     """
     size = len(data)
     ends = _undamaged(data)

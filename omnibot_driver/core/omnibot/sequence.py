@@ -16,20 +16,20 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Largest difference in s, without a restart, between the elapsed time and the counted time.
+"""Difference in s between the elapsed and the counted time up to which no restart is assumed.
 
-The drift of the board's clock is allowed in addition.
-
-If a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in ten, arrival times are wrong by
-0.24 s. The limit is about twice this error.
+The limit is extended by the possible drift of the board's clock. It is about twice the largest
+error of arrival times: 0.24 s, if a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in
+ten.
 """
 DRIFT: Final = 0.01
-"""Largest relative error of the board's clock, and so of the counted time of a long gap.
+"""Largest relative error of the board's clock, and so of the counted time.
 
-After a silence of minutes, the count therefore says little about a restart, and the pose decides.
+After a silence of minutes the error may be seconds. The count then shows little about a restart;
+the board's pose shows whether it restarted.
 """
 EARLY_S: Final = 0.2
-"""Tolerance in s by which the counted time since a restart may exceed the elapsed time.
+"""Time in s by which the counted time since a restart may exceed the elapsed time.
 
 The elapsed time is too short if the last delta before the restart was read late. A restart of the
 board takes longer than this tolerance.
@@ -67,10 +67,10 @@ class Sequence:
         poses are ignored."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
-        """The last delta's count if it was too high for the elapsed time, else None.
+        """Count of the last delta, if it was too high for the elapsed time, else None.
 
-        Until the next delta continues that count, the elapsed time is trusted instead: a bit may be
-        flipped, or the frame may be false.
+        A bit may be flipped, or the frame may be false. So lost deltas are computed from the
+        elapsed time instead, until a delta continues this count.
         """
         self._left: tuple[int, float, int] | None = None
         """Last count before a supposed restart, its arrival time in s, and first count after it."""

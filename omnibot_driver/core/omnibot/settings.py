@@ -18,7 +18,7 @@ class OmniBotSettings:
     a commanded pose; ``delta_frame``: what deltas are: differences of positions in the board's
     earth frame, motion along the board's own axes, or (older firmware) encoder counts of the wheels
     A, B, C; ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``,
-    constant for the life of the ``OmniBot``.
+    constant as long as the ``OmniBot`` exists.
     """
 
     baudrate: int = 115200

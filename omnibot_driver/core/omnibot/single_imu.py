@@ -62,8 +62,9 @@ def take_pieces(
 ) -> ImuReading | None:
     """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
 
-    Return None and change nothing if the first piece is ``GAP_S`` old, if ``take_single`` rejects
-    the frame, or if the last byte may belong to the next header because bytes were lost.
+    Return None and change nothing if the first piece arrived ``GAP_S`` or more before ``now``, if
+    ``take_single`` rejects the frame, or if the frame may have lost bytes, so that its last byte
+    may belong to the next header.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu

@@ -92,7 +92,7 @@ class Translation:
         self.modes.apply(happening)
 
     def _catch_up(self) -> None:
-        """Tell the mode and the frame schedule how many IMU frames ``single_imu`` took."""
+        """Add the IMU frames that ``single_imu`` took to the mode, schedule and IMU count."""
         singles = self._most_singles - self.singles_to_come
         self.singles_to_come = self._most_singles = 0
         if singles:

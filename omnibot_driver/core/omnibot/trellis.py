@@ -36,11 +36,13 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""A frame is sure if every other interpretation of its first byte costs at least this much more.
+"""Least extra cost, at which a frame is sure, of all other interpretations of its first byte.
 Each of them is then at least 30 times less likely."""
 STEP: Final = 5.5
-"""The cost limit first exceeds the lower bound by this; the search raises it until it finds a
-path."""
+"""Difference between the first cost limit of the search and the lower bound of the cost.
+
+If the search finds no path below this limit, it raises the limit and begins again.
+"""
 BEYOND: Final = 0.025
 """Half the step of the prices (0.05), added to the cost limit.
 
