@@ -61,7 +61,10 @@ class LongTask:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 
     def watch(self, *, driven: bool) -> None:
-        """Record whether a command drives the robot. If such a drive ends, the task fails."""
+        """Fail the task if a command drove the robot at the last call, and none does so now.
+
+        ``driven``: whether a command drives the robot now.
+        """
         if self._driven and not driven:
             self.give_up("the robot was stopped meanwhile; call again")
         self._driven = driven

@@ -55,7 +55,8 @@ class SpeedLimits:
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
         """Return the twist that is reached in ``duration_s`` with limited acceleration.
 
-        ``now`` is the present twist. The twist changes along a straight line to ``wanted``.
+        ``now`` is the present twist. Its linear velocity changes along a straight line to that of
+        ``wanted``; its yaw rate changes independently.
         """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),

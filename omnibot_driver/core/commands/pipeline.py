@@ -185,7 +185,10 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """Return the fault that the newest estimate shows. Without estimates, use ``reading``."""
+        """Return the fault that the robot's newest measured motion shows, or None.
+
+        The motion is ``rolling`` of the newest odometry estimate; if it is unknown, ``reading``.
+        """
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()

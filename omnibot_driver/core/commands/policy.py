@@ -80,7 +80,10 @@ class CommandPolicy:
         self._actuator.apply(setpoint, now)
 
     def discard(self, now: float) -> None:
-        """Drop the current command and send nothing more; a latched e-stop stays latched."""
+        """Drop the current command and send nothing more.
+
+        While the e-stop is latched, the emergency stop is still repeated.
+        """
         self.current = self._stopping_since = None
         if not self.latched:
             self._actuator.apply(None, now)
@@ -111,7 +114,7 @@ class CommandPolicy:
         self.proof.stopped(now)
 
     def latch(self, now: float) -> None:
-        """Latch the e-stop until its release."""
+        """Drop the current command, and repeat the emergency stop until ``release``."""
         if not self.latched:
             self.current = self._stopping_since = None
             self.latched = True

@@ -87,7 +87,10 @@ class FrameDecoder:
         self.skipped: list[int] = []
         """For each frame of the last call, the number of discarded bytes right before it."""
         self.at_rest = False
-        """Whether all bytes so far are decoded, and the line usually pauses between frames."""
+        """Whether all received bytes are decoded, and the line usually pauses only between frames.
+
+        If so, faster code may decode the next bytes.
+        """
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self.expectation = Expectation(accel_counts_per_g, schedule)

@@ -29,7 +29,7 @@ from omnibot_driver.core.omnibot.late_reads import (
 LATE_S: Final = 0.011
 """Longest pause in s between two reads that is normal while the board runs: about one tick.
 
-Before a longer pause ended, bytes were lost, an adapter collected bytes, or the reader was late.
+Causes of a longer pause are lost bytes, an adapter that collects bytes, or a late reader.
 """
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""

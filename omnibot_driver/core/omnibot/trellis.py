@@ -36,7 +36,7 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""Least extra cost, at which a frame is sure, of all other interpretations of its first byte.
+"""A frame is sure if each other interpretation of its first byte costs at least this much more.
 Each of them is then at least 30 times less likely."""
 STEP: Final = 5.5
 """Difference between the first cost limit of the search and the lower bound of the cost.
@@ -262,7 +262,10 @@ class _Search:
         self._edges.append(edge)
 
     def _context(self, node: int) -> Context:
-        """Return the context on the cheapest path to ``node``; mostly unknown after damage."""
+        """Return the context on the cheapest path to ``node``.
+
+        After a damaged frame or a bad run, only a small part of the context is known.
+        """
         found, damaged, at = self._contexts.get(node), False, node
         while found is None:
             edge = self._by[at]
