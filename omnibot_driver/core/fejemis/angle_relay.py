@@ -29,8 +29,8 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is carried over to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""If damage can change the text of an angle to the right into that of an angle to the left, the
-text is used only if the angle to the left is less than ``ACROSS`` degrees."""
+"""Limit, in degrees, of an angle to the left that a board may read if the text of an angle to the
+right is damaged. Texts whose damage can give ``ACROSS`` or more are avoided."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

@@ -11,14 +11,13 @@ from typing import Final
 from omnibot_driver.core.fejemis.messages import FrontAngle
 
 OLDEST_S: Final = 0.06
-"""The robot is stopped when the last angle is older than this time in s: four periods of
-``fwl``."""
+"""Age of the last angle, in s, above which the robot is stopped: four periods of ``fwl``."""
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all but the frame counter."""
 SICK_LINES: Final = 3
-"""The sensor is regarded as faulty when this number of lines in a row report a fault: a single line
-may be damaged."""
+"""Number of lines in a row that must report a fault before the sensor is regarded as faulty. A
+single line may be damaged."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Accepted jump of the angle in degrees, in addition to the motion of the fastest servo."""
@@ -102,7 +101,11 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Return True if the wheel can have reached the angle, or if two angles confirm a jump."""
+        """Return whether the wheel can have reached the angle.
+
+        Also return True if the previous angle was rejected and is near this one: two such angles
+        confirm a jump.
+        """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (

@@ -20,10 +20,10 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Shortest interval between two arrivals, in periods, at which late samples prove a loss.
+"""Interval between the arrivals of two late samples, in periods, above which a sample was lost.
 
-If two samples in a row are late by a period, and arrive at least this interval apart, a sample was
-lost before them. If both samples had waited for a stalled host, they would have arrived at once."""
+Both samples are late by a period or more. If nothing was lost and both samples had waited for a
+stalled host, they would have arrived at once."""
 CYCLE_S: Final = 0.0015
 """Longest assumed time in s that one control cycle takes to send its lines, in any order."""
 PHASE_BLOCKS: Final = 3

@@ -35,18 +35,22 @@ PAIR_WITHIN_S: Final = 0.005
 evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""The pauses before the lines show which line of a sample comes first. The sum of the pauses, in s,
-is the evidence: from ``KNOWN_S`` on, the order is known; ``SUREST_S`` is the largest sum."""
+"""Limit of the evidence, in s, that shows which line of a sample comes first.
+
+The evidence is the sum of the pauses before gyro lines, minus the sum of those before acceleration
+lines: the pause before the first line of a sample is longer. From ``KNOWN_S`` on, the order is
+known.
+"""
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that is added if another periodic line comes between a gyro and an acceleration
-line, because a control cycle has then ended between them."""
+"""Evidence in s that is added to the pause between a gyro and an acceleration line if another
+periodic line comes in this pause. That line shows that a control cycle has ended in the pause."""
 PATIENCE: Final = 60
 """Count of lines after which the order is decided even if the evidence is weak.
 
 Neither order gains evidence if the board sends both lines half a period apart."""
 MOST: Final = 10
-"""For each kind of line, the driver counts the lines that came outside of pairs, minus the lines
-that came within pairs. This difference is kept between ``-MOST`` and ``MOST``."""
+"""Limit of a number that is kept for each kind of line: the count of lines that came outside of
+pairs, minus the count of lines that came within pairs."""
 UNPOSED: Final = 20
 """Largest count of gyro or acceleration lines for which a pair waits for the next pose; after more
 lines, the pair is rejected."""

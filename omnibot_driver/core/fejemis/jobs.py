@@ -30,8 +30,8 @@ AGAIN_S: Final = 0.4
 SAID: Final = 3
 """How many times the request of a job is sent, except for a calibration."""
 UNCHANGED_S: Final = 2.4
-"""If the offsets are still unchanged ``UNCHANGED_S`` s after the request for a calibration, the
-request is regarded as lost."""
+"""Time in s after the request for a calibration from which the request is regarded as lost if the
+offsets are still unchanged."""
 CALIBRATIONS: Final = 2
 """Largest number of requests for one calibration; while the offsets are unchanged, the calibration
 is requested again."""

@@ -26,8 +26,8 @@ come within this time, only the newest is sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest allowed fraction of the wanted voltage: the driver reduces the voltage if the sum of a
-line with the wanted voltage does not detect damage."""
+"""Smallest allowed ratio of the sent to the wanted voltage. The driver sends a lower voltage if the
+sum of a line with the wanted voltage does not detect damage."""
 LEAST_TIME_S: Final = 0.04
 
 

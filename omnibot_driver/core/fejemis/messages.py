@@ -141,7 +141,10 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: distance of the steered wheel from the axle, then track, as in the help text."""
+    """``confs``: track, and distance from the axle to the steered wheel, both in m.
+
+    By the help text, the distance comes first; some boards send the track first.
+    """
 
     first_m: float
     second_m: float

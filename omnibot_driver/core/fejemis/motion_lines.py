@@ -21,8 +21,8 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Below this speed in m/s, the speed in the front board's line is 0, because near smaller speeds
-too few numbers can be written."""
+"""Speed in m/s below which the front board's line for a turn contains the speed 0. Near smaller
+speeds, too few numbers can be written."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the speed that a line gives."""

@@ -23,8 +23,8 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Each displacement corrects this fraction of the difference between the pose and the integral of
-the speeds.
+"""Fraction of the difference between the pose and the integral of the speeds that one displacement
+corrects.
 
 The fraction applies if rounding alone explains the difference.
 """
@@ -37,7 +37,7 @@ both axes.
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
 """``SLACK_M``, ``SLACK_RAD``: distance in m and angle in rad by which a pose may differ from the
-integral of the speeds."""
+integral of the speeds, in addition to the effect of an acceleration."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
@@ -48,8 +48,8 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""If this number of rejected poses in a row each agree with the rejected pose before, the board has
-begun a new frame."""
+"""Number of rejected poses in a row from which the board has begun a new frame, if each pose agrees
+with the rejected pose before it."""
 
 
 class PoseOdometry:
@@ -92,10 +92,10 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
 
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement up to ``pose``, and every 0.2 s the sum of all displacements.
+        """Return the displacement up to ``pose``; every 0.2 s, also return a PoseReading.
 
-        The sum is returned as a pose. If a later check rejects a displacement, the pose still
-        contains it.
+        The PoseReading is the sum of all displacements, even of those that a later check of the
+        driver rejects.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

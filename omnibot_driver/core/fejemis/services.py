@@ -18,8 +18,8 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""If the user requests to load a configuration while the robot moves, the driver sends a Stop, and
-loads the configuration this time in s later."""
+"""Time in s from a Stop to the loading of a configuration. The driver sends this Stop if the user
+requests the loading while the robot moves."""
 NO_DATA: Final = "no data from the boards; check their power and cables"
 
 

@@ -12,8 +12,7 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""The diagnostics show at most this number of lines that the firmware does not know: the latest
-ones."""
+"""Largest number of lines unknown to the firmware that the diagnostics show: the latest ones."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

@@ -23,8 +23,8 @@ board time in the line is implausible."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""Two board times agree if the time between them differs from the time between their arrivals by
-less than this time in s.
+"""Limit in s of the difference between two intervals: from one board time to the next, and from one
+arrival to the next. Below this limit, the two board times agree.
 
 If ``AGAIN`` implausible times in a row agree, over ``AGAIN_AFTER_S`` or longer, the clock begins
 again with these times. A shorter series may be lines that waited for a stalled host and arrived at

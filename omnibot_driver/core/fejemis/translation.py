@@ -40,8 +40,7 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time between two notices of a low battery, in s."""
 PERIOD_S: Final = 0.03
-"""An orientation that comes within this time in s after an IMU sample gets that sample's
-timestamp."""
+"""Age of the last IMU sample, in s, below which an orientation gets that sample's timestamp."""
 
 
 class Translation:

@@ -17,8 +17,9 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""After WAG_S (s) of constant heading, the driver turns the robot a little: WAG_UNITS per motor.
+"""If the heading has been constant for WAG_S (s), the driver turns the robot a little.
 
+It adds WAG_UNITS to the units of the left motor and subtracts them from those of the right one.
 If the turn changes the heading, the IMU works, and the heading was constant because the robot drove
 straight.
 """
@@ -70,7 +71,10 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """If RMRA does not report the turn, give the odometry the ratio of the wheel speeds."""
+        """Set the ratio of the wheel speeds in the odometry.
+
+        The odometry computes the turn from this ratio if RMRA does not report the turn.
+        """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
             self.odometry.left_over_right = self.loop.left_over_right
@@ -81,7 +85,7 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add uncertainty: the left wheel is not measured, and may have turned for ``seconds``."""
+        """Add uncertainty: for ``seconds``, the left wheel may have turned unmeasured."""
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
         turn_rad = min(math.pi, most_m / self._settings.track_m)

@@ -50,7 +50,7 @@ TRAITS: Final = Traits(
     },
 )
 UNREAD_S: Final = 0.5
-"""If no reading has come for this time in s, the next reply is reported as NOTHING_MEASURED.
+"""Time in s without a reading after which the next reply is reported as NOTHING_MEASURED.
 
 Measurements of a moving robot come at shorter intervals.
 """
@@ -213,8 +213,9 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether no RM has run since the server's start, so that its clock may be set back.
+        """Whether no RM has run since the server's start.
 
+        Only then may the server's clock be set back without harm.
         RM integrates the heading over the time since the previous RM. If the clock was set back in
         that time, the heading is useless.
         """

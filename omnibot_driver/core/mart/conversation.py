@@ -123,7 +123,10 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record that a missing reply has come: ``reply``, unless it is a copy of another reply."""
+        """Stop expecting a missing reply of this form, because ``reply`` is that reply.
+
+        If ``reply`` is a copy of an earlier reply, do nothing.
+        """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
 
@@ -174,8 +177,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        Afterwards a late reply is still expected, except after a controlled move: the stop of the
-        move waits for the move's reply.
+        The reply is then recorded as missing, because it may still come late. The reply to a
+        controlled move is not recorded, because the stop of the move waits for it.
         """
         if self.pending is None:
             return None

@@ -29,9 +29,10 @@ END_M, END_RAD = 0.004, math.radians(0.4)
 END_M (m) applies to the position, END_RAD (rad) to the heading.
 """
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
-"""Standard deviations of a turn on the spot that the server reports in whole degrees.
+"""Standard deviations of the angle that the server reports for a turn on the spot.
 
-TOLD_TURN_RAD (rad) applies to each turn; TOLD_TURN is a part of the turn. Both errors add up.
+TOLD_TURN_RAD (rad) comes from the whole degrees of the report; TOLD_TURN is relative to the angle.
+Both errors add up.
 """
 PIVOT: Final = 0.01
 """Standard deviation of the offset between the robot's centre and the point about which it turns.
@@ -41,11 +42,21 @@ The value is a part of the track, and applies to turns on the spot.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation of the heading after a straight controlled move, in rad."""
 BEND_WALK: Final = 0.5
-"""If only commands show a turn, this part of the turn's error is independent in each step."""
+"""Ratio of two errors of a turn that is known only from commands.
+
+One error has the same direction in all steps. The other is independent in each step; its standard
+deviation is BEND_WALK times that of the first.
+"""
 ASTRAY: Final = 0.7
-"""Position error due to an uncertain heading: part of the distance, per rad² of variance."""
+"""Factor from the variance of the heading, in rad², to the relative error of a distance.
+
+The error applies along and across the direction of motion; it is at most the distance itself.
+"""
 SPREAD: Final = 0.3
-"""Standard deviation of a time that is uniformly distributed in an interval of length 1 (1/√12)."""
+"""Standard deviation of a time that is uniformly distributed in an interval of length 1.
+
+The exact value is 1/√12.
+"""
 CLOCK_S: Final = 0.01
 """Uncertainty of a reply's time on a good network, in s; on other networks it is larger."""
 Errors = list[tuple[float, float, float, float]]
@@ -78,8 +89,9 @@ class Doubt:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
         ``bend``: standard deviation of the ratio of left to right wheel speed if the turn is known
-        from that ratio alone, else 0; ``aside_m``: standard deviation across the direction of
-        motion in m, because the heading was not measured at the time of the count.
+        from that ratio alone, else 0; ``aside_m``: standard deviation of the position across the
+        direction of motion, in m; the error arises because the heading was not measured at the time
+        of the count.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)

@@ -38,7 +38,7 @@ A request for 19 inches (0.48 m) becomes a move of 0.73 m.
 """
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
-"""A turn is made only if it reduces the heading error by at least this, in degrees."""
+"""Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
 """Each turn since the last straight move adds WIDER * NEAR_RAD to the allowed heading error.
 
@@ -49,7 +49,7 @@ MOST_MOVES: Final = 9
 
 
 LEAST_LIKE: Final = 0.35
-"""A move whose relative difference from its request exceeds this value may have run twice."""
+"""Relative difference between a move and its request, above which the move may have run twice."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move, in s: SETTLES_S, plus S_PER_DEG for each degree or S_PER_IN for each
 inch. SLOW doubles S_PER_DEG and S_PER_IN."""

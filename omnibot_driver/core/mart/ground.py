@@ -37,15 +37,15 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""After an absence of the server, no motion is started for this time in s from its first reply.
+"""Time in s from the server's first reply after an absence until a motion may be started.
 
 The server opens its ports before it has started up completely. VOLTS and most motions crash a
 server that has just started; a crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""A longer silence than ABSENT_S (s) plus ABSENT_TRIPS exchange durations counts as an absence."""
+"""Silence after which the server counts as absent: ABSENT_S (s), plus ABSENT_TRIPS exchanges."""
 ABSENT_BUSY_S: Final = 2.5
-"""If the server may be busy, only a longer silence than this, in s, counts as an absence.
+"""Silence in s after which a server that may be busy counts as absent.
 
 A stop, for example, keeps the server busy.
 """

@@ -41,11 +41,11 @@ ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """Two readings count as the same value if they differ by no more than this, in V or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""A value that comes this number of times in a row is accepted, even if replies may be late."""
+"""Number of like values in a row after which the value is accepted, even if replies may be late."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""For this time in s after a failed RM, uncommanded motion is regarded as caused by that RM."""
+"""Time in s after a failed RM within which it is regarded as the cause of uncommanded motion."""
 
 
 class Health:

@@ -19,9 +19,10 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units that the server may leave unanswered.
+"""Largest relative change of the motors' units (sum of both sides) that may remain unanswered.
 
-The limit applies while the heading is unknown: a larger unanswered change stops the robot.
+If the server does not answer a larger change while the heading is unknown, the driver stops the
+robot: it would not know whether the change makes the robot turn.
 """
 
 

@@ -23,9 +23,12 @@ from omnibot_driver.core.mart.words import (
 )
 
 PROVED_S: Final = 0.2
-"""A motion may start only if the last successful check of the IMU is at most this old, in s."""
+"""Age of the last successful check of the IMU, in s, up to which a motion may start."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""Usual duration of a check in s; half of any additional time is regarded as the reply's delay."""
+"""Usual duration of a check in s.
+
+If a check takes longer, half of the additional time is regarded as the delay of the reply.
+"""
 FAILS: Final = {RESET: 3, CHECK: 1}
 """Number of failed checks in a row after which the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0

@@ -34,7 +34,7 @@ class MeanSpeeds:
         self._track.append((at_s, self._way_m, self._yaw_rad))
 
     def correct(self, turn_rad: float) -> None:
-        """Add a correction of the heading; it becomes a part of the next displacement."""
+        """Add a correction of the heading to the turn of the next displacement."""
         self._yaw_rad += turn_rad
 
     def forget(self) -> None:

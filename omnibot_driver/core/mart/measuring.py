@@ -20,7 +20,7 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS
 
 STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
-"""Times in s for which a robot may roll out: ROLLS_S after a stop, ROLLS_AFTER_MOVE_S after a
+"""Times in s for which a robot may coast: ROLLS_S after a stop, ROLLS_AFTER_MOVE_S after a
 controlled move.
 
 If a controlled move fails, the server reports the failure at once, before the robot is at rest.

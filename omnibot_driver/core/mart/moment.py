@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""A reply is regarded as uncertain if its time uncertainty is at least this, in s."""
+"""Time uncertainty of a reply, in s, from which the reply is regarded as uncertain."""
 
 
 @dataclass(frozen=True, slots=True)

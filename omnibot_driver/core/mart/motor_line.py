@@ -64,7 +64,10 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Add the other motor's changes of slope and offset to those of this line."""
+        """Add ``slope`` and ``offset`` to this line.
+
+        They are the changes of the other motor's line when it last learned from a measurement.
+        """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
 

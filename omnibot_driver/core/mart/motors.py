@@ -18,10 +18,13 @@ SLOWEST_TURN_RADPS: Final = 0.01
 UNEQUAL: Final = 0.04
 """Standard deviation of the ratio of the two motors' speeds at equal units."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
-"""Predictions use at most this relative difference between the gains of the two motors."""
+"""Largest relative difference between the gains of the two motors that predictions use."""
 Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
-"""Fewest units at which the motors are compared; at fewer, a line's error has too much effect."""
+"""Fewest units at which the speeds of the two motors are compared.
+
+At fewer units the motors are slow, so an error of a line would change the ratio of speeds too much.
+"""
 
 
 class Motors:
@@ -125,5 +128,5 @@ def _learn_spin(lines: Lines, units: int, speed: float) -> None:
 
 
 def _nominal_units_per_count(settings: MartSettings) -> float:
-    """Return the speed of one count per second, in nominal units at 1 V."""
+    """Return the nominal units that turn an ideal motor by one count per second at 1 V."""
     return abs(settings.metres_per_count) * settings.nominal_volts / settings.speed_per_unit

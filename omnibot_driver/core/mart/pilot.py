@@ -47,7 +47,7 @@ SILENT_S, GREET_AGAIN_S = 0.15, 0.1
 Two exchange durations are added to SILENT_S.
 """
 COPY_S: Final = 0.25
-"""If ENC is unanswered for this time in s after a move, a duplicate of the move may be running."""
+"""Time in s without an answer to ENC after which a duplicate of the last move may be running."""
 
 
 class Pilot(Hearing):

@@ -55,7 +55,7 @@ class Polls:
         self._asked_s.clear()
 
     def due(self, state: State, now: float) -> list[Word]:
-        """Return the queries that are due, sorted by the time at which each is a full period late.
+        """Return the queries that are due, sorted by the sum of due time and period.
 
         Thus each query gets its turn even if an exchange takes longer than a period.
         """

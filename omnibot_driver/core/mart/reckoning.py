@@ -39,7 +39,7 @@ ACCELERATION_RADPS2: Final = 3.0
 FRESH_S: Final = 0.2
 """Age of the last heading, in s, up to which the measured turn rate is regarded as current."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations in m and rad of what the robot moves unmeasured after a lost connection."""
+"""Standard deviations in m and rad of the unmeasured motion if a connection was lost in a drive."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 
@@ -120,11 +120,11 @@ class Reckoning:
             self.slowing_since_s = now
 
     def stand(self, now: float) -> None:
-        """Record that the robot was stopped; its roll-out is not measured yet."""
+        """Record that the robot was stopped; it may still coast."""
         self.stands, self._stood_s = True, now
 
     def rest(self) -> None:
-        """Record that the motion is over and its roll-out is measured."""
+        """Record that the motion is over, and that the distance coasted after it is measured."""
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:
@@ -152,10 +152,10 @@ class Reckoning:
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add an error: the ratio of the wheels' speeds has changed at an uncertain time.
+        """Add the heading error that a change of the wheels' speed ratio causes.
 
-        ``part``: the change of the ratio; ``late_s``: the interval in s within which the change
-        takes effect.
+        The error arises because the time of the change is uncertain. ``part``: relative change of
+        the ratio; ``late_s``: length in s of the interval in which the change takes effect.
         """
         turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
@@ -194,9 +194,9 @@ class Reckoning:
 
     @property
     def maybe(self) -> tuple[float, float]:
-        """Distance of the right wheel in m and turn in rad by a motion that may not have begun.
+        """Distance of the right wheel in m, and turn in rad, if the last motion has begun.
 
-        Both are zero if it is certain whether the motion has begun.
+        Both are zero while it is certain whether the motion has begun.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -230,9 +230,9 @@ class Reckoning:
         return turn_rad if self.told_rad is None else 0.0  # the reported turn includes it
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """Correct this motion's guessed turn at the first reported heading.
+        """Correct the heading if it was computed from commands until the server reported a turn.
 
-        Return the correction in rad, which is not a motion of the robot.
+        Return the correction in rad. It is not a motion of the robot.
         """
         if not self._guessed:
             return 0.0
@@ -244,7 +244,10 @@ class Reckoning:
         return wrong_rad
 
     def spin_told(self, degrees: float) -> None:
-        """Correct the heading by a reported turn on the spot, in degrees with the board's sign."""
+        """Correct the heading after a turn on the spot by the angle that the server reports.
+
+        ``degrees``: this angle, with the server's sign.
+        """
         self.told_rad = math.radians(degrees) * self._settings.heading_sign
         self._correct_yaw(self.told_rad - self.spun_rad)
 
@@ -292,9 +295,10 @@ class Reckoning:
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return the seconds by which the last heading is older than FRESH_S; 0 unless RM drives.
+        """Return the age of the last heading beyond FRESH_S, in s, and the error that results.
 
-        The second value is the standard deviation of the robot's turn within these seconds, in rad.
+        The age is 0 in each motion but RM. The error is the standard deviation of the robot's turn
+        within this time, in rad.
         """
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:

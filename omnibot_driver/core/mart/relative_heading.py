@@ -17,15 +17,15 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
-"""A heading may be from before RM if it is this near, in rad, to the last heading before RM."""
+"""A heading that differs by less than this (rad) from the last one before RM may be that one."""
 MOST_RAD: Final = 1e7
-"""Largest heading in rad that still resolves small turns.
+"""Size in rad from which a heading is rejected, because such a number cannot show small turns.
 
 The server integrates the turn rate over unsigned milliseconds of its wall clock. If that clock was
 set back, the heading is about 1e15 degrees.
 """
 AHEAD_S: Final = 0.3
-"""The heading is predicted to the time of a count, but at most for this time in s."""
+"""Longest time in s by which a heading is predicted beyond its report, to the time of a count."""
 ODD_TIMES: Final = 3
 """Number of implausible headings in a row after which the last of them is accepted."""
 SPREADS: Final = 4

@@ -22,7 +22,10 @@ MOST_CHANGE: Final = 15
 It is small, because a duplicated command acts twice.
 """
 MOST_BACKWARD: Final = 5
-"""Limit in place of MOST_CHANGE while reversing on a slow network, where duplicates stay unseen."""
+"""Limit in place of MOST_CHANGE while the robot drives backward on a slow network.
+
+A duplicated command may come on a slow network, and is not noticed while the robot drives backward.
+"""
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s: SETTLE_S is the pause in learning after a large change; LEARN_S is the shortest
 window of learning."""
@@ -34,20 +37,21 @@ The window grows by LEARN_TRIPS durations. The standard deviation of the speeds 
 1 + LESS_PER_S * duration in s.
 """
 SLOWEST_MPS: Final = 0.015
-"""A wheel whose measured speed is above this, in m/s, is regarded as turning."""
+"""Measured speed in m/s above which a wheel is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
 """Slowest wheel speed in m/s with which a motion starts, so that the server sees the wheel turn."""
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
-"""Factor by which the units of a start grow after a start that moved nothing."""
+"""Factor from the units of a start that did not turn the motors to the units of the next start."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""For this time in s after a change of the turn rate, the heading error is not integrated."""
+"""Time in s after a change of the commanded turn rate in which no heading error is integrated."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Variances that a change of units adds to the ratio of speeds, per squared relative change.
+"""Factors from a squared relative change of units to the variance of the ratio of wheel speeds.
 
-COPIED is for a change that may arrive twice, MISSED for a change that was not answered.
+A change that may arrive twice adds COPIED times its square to the variance; a change that was not
+answered adds MISSED times its square.
 
 A change may arrive twice if exchanges take longer than SLOW_TRIP_S (s). The variances are
 deliberately large, because a wrong ratio of speeds lasts for the whole motion.
@@ -59,8 +63,9 @@ class _Side:
     """One motor.
 
     ``line``: the learned speed for each number of units; ``units``: commanded units;
-    ``window_units_s``, ``window_m``: units and distance summed over the present window;
-    ``stood_s``: time for which the wheel has stood although it must turn.
+    ``window_units_s``: sum of units times seconds in the present window; ``window_m``: distance in
+    m that the wheel has rolled in this window; ``stood_s``: time in s for which the wheel has stood
+    although its units suffice to turn it.
     """
 
     line: MotorLine
@@ -70,7 +75,7 @@ class _Side:
     window_m: float = 0.0
 
     def wanted_units(self, speed: float) -> int:
-        """Return the units for a speed in nominal units; zero for a wheel that must not turn."""
+        """Return the units that give ``speed`` (in nominal units); zero if it is not positive."""
         return round(min(MOST_UNITS, max(0.0, self.line.units(speed)))) if speed > 0.0 else 0
 
 
@@ -115,11 +120,11 @@ class SpeedLoop(Motors):
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
-        """Learn that no motor turns with the present units, or with ``units`` on both sides.
+        """Record that no motor turns with the present units, or with ``units`` on both sides.
 
         MOST_DEAD units or more turn each motor that is not blocked, so nothing is learned from
-        them. If a motor has already turned with its present units, its line is not changed, but the
-        next start uses more units.
+        them. If a motor certainly turns with its present units by its line, the line is not
+        changed, but the next start uses more units.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units

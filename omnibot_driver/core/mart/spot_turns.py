@@ -18,7 +18,7 @@ from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
-"""If the relative change of the commanded rate is larger than this, the turn is begun anew."""
+"""Relative change of the commanded rate above which the driver begins the turn anew."""
 OFF, OFF_AGAIN = 0.05, 0.12
 """Relative errors of a turn's rate at which the turn is begun anew, with other units.
 
@@ -26,21 +26,21 @@ The driver uses OFF until a turn has shown how fast the motors turn. Then it use
 to stop and start again would often disturb the motion more than a smaller error does.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Parts of the commanded rate, for turns in which the robot may be held.
+"""Parts of the commanded rate: limits for turns that are slow because something holds the robot.
 
-If the motors are known, a robot that turns slower than HELD is regarded as held. A rate below
-LEAST_LESSON is learned as LEAST_LESSON, so that the next turn has at most 1.7 times the units.
+If the motors are known, a rate below HELD is not learned. Otherwise the driver learns LEAST_LESSON
+in place of a lower rate, so that the next turn has at most 1.7 times the units.
 """
 EVEN: Final = 0.15
-"""A turn shows the motors' speed only if its rate changes by less than this part of the mean."""
+"""Relative change of a turn's rate below which the turn shows how fast the motors turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
 """Parts of the commanded rate. If a turn slower than HINDERED is followed by one faster than
-TOO_FAST, something held the robot in the slow turn, and what was learned from it is false."""
+TOO_FAST, something held the robot in the slow turn. The driver forgets what it learned from it."""
 SAME, CORRECTIONS = 0.2, 2
 """Two rates count as equal if their relative difference is at most SAME. While the commanded rate
 stays equal, the driver begins the turn anew at most CORRECTIONS times to correct its rate."""
 STEADY: Final = 0.03
-"""A larger relative change than this makes the commanded rate count as a new rate."""
+"""Relative change of the commanded rate above which it counts as a new rate."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """A turn shows how fast the motors turn if it takes SPINS_UP_S (s) plus the averaging time of
 speeds, and exceeds SEEN_RAD (rad).
@@ -126,7 +126,7 @@ class SpotTurns:
         self._set_units = None
 
     def may_be_forgotten(self, now: float) -> bool:
-        """Return whether the server may have been restarted since the setting."""
+        """Return whether the server may have been restarted since the speed of turns was set."""
         return now - self._set_s > JUST_SET_S
 
     def begin(self, rate_radps: float) -> None:
@@ -186,7 +186,7 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the measured rate for learning, or a minimum if the measured rate is lower."""
+        """Return the measured rate for learning; if it is too low, return a minimum instead."""
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
@@ -232,7 +232,7 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what a slow turn showed if this turn shows that something held the robot then.
+        """Forget what was learned from a slow turn if this turn shows that it was hindered.
 
         ``part``: rate of this turn as a part of the commanded one. From the slow and the fast turn
         together, the driver would learn a dead zone that the motors do not have.

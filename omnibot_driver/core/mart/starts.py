@@ -89,7 +89,7 @@ class Starts(Adjusting):
         return self._begin(start, now)
 
     def _spin_setting(self, now: float) -> Request | None:
-        """Return the setting of the speed for the next turn on the spot, if it must be sent."""
+        """Return the request that sets the speed of turns on the spot, if it must be sent now."""
         motion, twist = self._wish(now)
         if motion is not Motion.SPIN or is_turn_ramped(self._wanted, now):
             return None

@@ -29,7 +29,10 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 BLIND_S, TRIPS = 0.8, 3
 """Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
 FROZEN_S: Final = 0.5
-"""A heading that is constant for this time in s plus two exchange durations shows a dead IMU."""
+"""The robot is stopped if its heading is constant for this time in s plus two exchange durations.
+
+In that case, the IMU is dead or the robot is stuck.
+"""
 NO_START_S: Final = 1.5
 """Time in s after the start within which the wheel must turn."""
 LATE: Final = " while the robot drives: check the network"
@@ -130,9 +133,9 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user.
 
-        With a nonempty ``why``, the user's command is discarded as well, unless its direction is
-        blocked: a block lasts until the command changes. ``arrived``: whether the start has
-        certainly arrived, so that a stop cannot overtake it.
+        With a nonempty ``why``, the driver also discards the user's command. It keeps the command
+        if the direction of the present motion is already refused (see ``_block``). ``arrived``:
+        whether the start has certainly arrived, so that a stop cannot overtake it.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)

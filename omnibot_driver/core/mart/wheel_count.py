@@ -29,7 +29,7 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""If this number of counts equal the last count before the start, the start was lost."""
+"""The start is regarded as lost if this number of counts equal the last count before the start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,8 @@ class Step:
     """The distance between two counts.
 
     ``wheel_m``: distance in m; ``seconds``: time between the counts. ``lost``: whether the
-    robot has also moved by an unknown amount; ``unsure``: whether the distance may be zero instead.
+    robot has also moved by an unknown amount; ``unsure``: whether the true distance may be zero,
+    because the start may have been lost.
     """
 
     wheel_m: float
@@ -51,9 +52,8 @@ class WheelCount:
 
     ``last``: last accepted count, or None before the first; ``told_s``: time of that count;
     ``from_s``: earliest possible time of that count; ``certain``: whether the last reply cannot be
-    the answer to another query. ``maybe``: a count that does not show whether the motion has begun,
-    because it equals the last count before a start that is not acknowledged; 0 if the last count is
-    not of this kind.
+    the answer to another query. ``maybe``: the last count if it equals the last count before
+    the start, so that it does not show whether the motion has begun; else 0.
     """
 
     def __init__(self) -> None:
