@@ -105,7 +105,7 @@ class Serializer:
 
 
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
-    """Parse a serialised geometry_msgs/Twist; return its planar part, and whether the rest is zero.
+    """Parse a serialised geometry_msgs/Twist; return its planar part and whether it is planar.
 
     Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist (a middleware
     might deliver such bytes).
@@ -146,7 +146,7 @@ class Messages:
 
 
 def difference(settings: MessageSettings) -> str:
-    """Return the type of a message that rclpy serialises differently; empty if there is none."""
+    """Return a message type whose bytes differ from rclpy's own; empty if all types agree."""
     reading = ImuEstimate(0.0, (1.1, -2.2, 3.3), (-4.4, 5.5, -6.6))
     noise = Covariance(1.2, 2.3, 3.4, 4.5, 5.6, 6.7)
     tangent, twist = Pose(7.7, -8.8, 9.9), BodyTwist(0.1, -0.2, 0.3)
@@ -172,7 +172,7 @@ def difference(settings: MessageSettings) -> str:
 
 
 def _same(ours: bytes, theirs: bytes, kind: type) -> bool:
-    """Return whether two serialisations mean the same message.
+    """Return whether two serialisations contain the same message.
 
     Padding is ignored, because rclpy leaves arbitrary bytes in the padding and after the end.
     """

@@ -48,8 +48,8 @@ def declare(node: Node) -> dict[str, Any]:
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
     """Return the driver's parameter values after a change; ``values`` are those before the change.
 
-    Each value is converted to its parameter's own type. ROS also passes an integer for a real
-    number, and a message would publish that integer as 0.
+    Each value is converted to its parameter's own type. ROS accepts an integer for a real
+    parameter; without the conversion, a message would publish that integer as 0.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})

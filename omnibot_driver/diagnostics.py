@@ -29,8 +29,8 @@ class Diagnostics:
     """The publisher of the diagnostics of one link.
 
     ``refusals`` is called for each message and returns the number of refused commands and the last
-    refusal. ``hardware_id`` distinguishes robots. ``to_check`` says what may be wrong with a board
-    whose data is not understood.
+    refusal. ``hardware_id`` distinguishes robots. ``to_check``: advice to the user on what to check
+    when the driver cannot decode the board's data.
     """
 
     def __init__(

@@ -33,7 +33,7 @@ SETUP: Final = (
 
 
 class Ending:
-    """The end of the driver: the main thread waits here for a signal or a call of ``begin``.
+    """Lets the main thread wait until the driver must end: at a signal or a call of ``begin``.
 
     The wait uses a pipe: Python writes a signal's number into it, whichever thread receives the
     signal. A thread that waits for a lock can miss a signal, and a signal handler must not use a
@@ -159,7 +159,7 @@ def _run(ending: Ending, args: list[str]) -> None:
 
 
 def _set_deadline() -> None:
-    """End the process if the shutdown hangs; the guard then stops the robot."""
+    """Have the process end if the shutdown takes too long; the guard then stops the robot."""
 
     def give_up() -> None:
         try:

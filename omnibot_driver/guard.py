@@ -27,7 +27,7 @@ WORDS = b"="
 END = b"\n"
 """End of a message that begins with ``WORDS`` and replaces both stop commands."""
 BYE = b"!"
-"""Message that the driver has stopped the robot itself, so that the guard may end."""
+"""Message by which the driver ends the guard after the driver itself has stopped the robot."""
 LIMIT_S = 0.5
 """Time without a heartbeat, in s, after which the guard assumes that the driver hangs."""
 TIMES = 20
@@ -40,11 +40,11 @@ DRIVER = 0
 
 
 Words = list[tuple[int, bytes]]
-"""Descriptors, each with the bytes to write to it."""
+"""The packets of one command: pairs of a descriptor and the bytes to write to it."""
 
 
 def watch(stop: Words, emergency_stop: Words) -> None:
-    """Watch the driver until it ends; send the stop if it hangs, or ends without ``BYE``."""
+    """Watch the driver to its end; send the stop if the driver hangs, or ends without ``BYE``."""
     patience_s: float | None = LIMIT_S
     latched, rest = False, b""
     while True:
@@ -69,7 +69,7 @@ def watch(stop: Words, emergency_stop: Words) -> None:
 
 
 def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
-    """Split input into heartbeats, the newest complete stop commands, and an incomplete rest."""
+    """Split input into all heartbeats, the last complete stop commands, and an incomplete rest."""
     beats = given = b""
     while WORDS in heard:
         before, _, after = heard.partition(WORDS)

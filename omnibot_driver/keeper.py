@@ -23,25 +23,27 @@ from omnibot_driver.core.packets import Packets
 
 BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
-"""Shortest time between two starts, in s, for a guard that dies at once."""
+"""Shortest time between two starts of a guard, in s. It limits how often the driver restarts a
+guard that always ends at once."""
 HANGS_AFTER: Final = 50
 """Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
-"""While this number of killed guards have not ended yet, the driver starts no further guard."""
+"""Number of killed guards that have not ended yet, at which the driver starts no further guard."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
 """Longest wait for a killed guard to end, in s. A guard that takes longer is in an
 uninterruptible sleep, and the driver does not wait for its end."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
-"""Longest wait for a guard that repeats the stop, in s; includes the start of a slow process."""
+"""Longest wait for a guard to repeat the stop and end, in s. It includes the time in which a slow
+guard process starts."""
 
 
 class Keeper:
     """A guard process for open lines, from construction until ``end``.
 
     ``descriptors``: file descriptors of the lines, by channel; None for a missing line. ``stop``:
-    what the guard sends; ``emergency_stop``: what the guard sends instead while the e-stop is
-    latched.
+    packets that the guard sends; ``emergency_stop``: packets that it sends instead while the e-stop
+    is latched.
     """
 
     def __init__(
@@ -63,8 +65,8 @@ class Keeper:
     def beat(self, now: float, *, latched: bool = False) -> str:
         """Send a heartbeat; call this every ``BEAT_S``, neither more nor less often.
 
-        Returns a sentence, only once, if the guard does not work; otherwise an empty string. Does
-        not wait for any process.
+        Returns a sentence the first time that the guard does not work, and an empty string at all
+        other times. Does not wait for any process.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT

@@ -34,8 +34,9 @@ proof takes longer. Afterwards the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown for a proof that the robot is at rest, in s, without a guard process."""
 SILENCE_S: Final = 0.25
-"""Longest wait for a second proof of standstill, in s; longer for a board whose proof takes longer.
-Nothing is sent during this wait, so the second proof shows that the last Stop was not damaged."""
+"""Longest wait for a second proof that the robot is at rest, in s; longer for a board whose proof
+takes longer. The driver sends nothing during this wait. The second proof therefore shows that the
+board received the last Stop undamaged."""
 
 T = TypeVar("T")
 

@@ -237,7 +237,7 @@ def age(stamp: Time, now_ns: int) -> float:
 
 
 def is_stamped(stamped: TwistStamped) -> bool:
-    """Return whether the message has a stamp; zero means none."""
+    """Return whether the sender has set the stamp; a stamp of zero means that it has not."""
     stamp = stamped.header.stamp
     return bool(stamp.sec or stamp.nanosec)
 
@@ -253,10 +253,12 @@ def time_message(nanoseconds: int) -> Time:
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Return wall clock minus steady clock in ns; ``wall_ns`` was read between the steady times.
+    """Return wall clock minus steady clock, in ns.
 
-    ``known_ns``, the offset so far, is kept unless the readings contradict it. So a pause of the
-    thread between the readings causes no jitter, but a step of the wall clock takes effect at once.
+    The wall clock was read between two readings of the steady clock, ``before_ns`` and
+    ``after_ns``. The function returns ``known_ns``, the offset so far, unless the readings
+    contradict it. So a pause of the thread between the readings causes no jitter, but a step of the
+    wall clock takes effect at once.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -212,7 +212,7 @@ class OmniBotDriver(Node):
         session.command_pose(messages.goal_pose(goal, frame), now)
 
     def _look_around(self) -> None:
-        """Log mistakes that the middleware does not report, each once."""
+        """Warn once of each mistake that ROS does not report, such as two nodes of one name."""
         for look in list(self._looks):
             if warning := look():
                 self.get_logger().warning(warning)

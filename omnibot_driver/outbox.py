@@ -20,7 +20,7 @@ Delivery = Callable[[], object]
 
 
 class Outbox:
-    """A queue of calls: ``put`` orders them, ``deliver`` and ``serve`` make them."""
+    """A queue of calls. ``put`` appends a call; ``deliver`` and ``serve`` make the calls."""
 
     def __init__(self) -> None:
         self._waiting: deque[Delivery] = deque()
@@ -80,6 +80,6 @@ class Outbox:
             self.deliver()
 
     def close(self) -> None:
-        """End ``serve`` after the calls that still wait."""
+        """Let ``serve`` make the calls that still wait, and then return."""
         self._closed = True
         self._handed_over.set()

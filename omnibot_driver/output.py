@@ -2,8 +2,8 @@
 
 """Log lines that never block the process. Knows descriptors; must not know what is printed.
 
-rclpy writes log lines while it holds the interpreter. A terminal that is stopped by ctrl-S, or a
-pipe without a reader, would freeze every thread, the watchdog included, and the robot would
+rclpy holds the interpreter's lock while it writes a log line. A terminal that is stopped by ctrl-S,
+or a pipe without a reader, would freeze every thread, the watchdog included, and the robot would
 continue with its last command. Output therefore passes through a pipe that drops lines when it is
 full, and does not block.
 """

@@ -223,7 +223,7 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text is new since the driver last decoded data of the board.
+        """Return whether this text was not logged since the driver last decoded data of the board.
 
         A port that is lost and opened again and again is therefore reported once.
         """

@@ -3,8 +3,8 @@
 """The reader's work: open the port, wait for bytes, hand them to the session, deliver at once.
 
 No timer and no other thread delays a measurement between the wire and the listener. A port that is
-lost is opened again, with a guard beside it. Whatever ends the reading, a stop is sent to the
-robot.
+lost is opened again and gets a new guard process. When the reader ends the use of a port, for any
+reason, it first sends a stop to the robot.
 """
 
 import math
@@ -23,7 +23,7 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import LinesChanged, Transport
 
 COUNT_EVERY_S: Final = 1.0
-"""Interval at which the kernel is asked for its count of losses, in s."""
+"""Interval, in s, at which the reader reads the kernel's count of losses."""
 BACK_OFF: Final = 1.5
 LONGEST_WAIT_S: Final = 2.0
 
@@ -105,7 +105,7 @@ class Reader:
         self._outbox.deliver()
 
     def _attach_anew(self, port: Transport) -> None:
-        """Begin a new connection on the present lines, after a line was lost or came back."""
+        """Begin a new connection on the lines that are open, after one was lost or reopened."""
         with self._lock:
             self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
@@ -162,7 +162,10 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Process the effects of received bytes, except measurements; the caller holds the lock."""
+        """Let the session act on received bytes; the caller holds the lock.
+
+        The measurements in these bytes have been handled before.
+        """
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:
             self._shared.settle()
@@ -179,7 +182,10 @@ class Reader:
             self._session.overran(self._earlier_overruns + self.overruns)
 
     def _detach(self, port: Transport, *, comes_back: bool) -> None:
-        """Stop the robot, then end the use of the port, for whatever reason the reading ended."""
+        """Stop the robot, then end the use of the port.
+
+        ``comes_back``: whether the reader tries to open the port again.
+        """
         with self._lock:
             if self._shared.write_error is None:
                 self._shared.write(
@@ -200,6 +206,6 @@ class Reader:
         self._outbox.deliver()
 
     def _tell(self, delivery: Delivery) -> None:
-        """Deliver an event of the reader that occurred without the lock."""
+        """Deliver an event that occurred while the reader thread did not hold the lock."""
         self._outbox.put(delivery)
         self._outbox.deliver()

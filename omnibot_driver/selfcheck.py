@@ -19,16 +19,16 @@ LONGEST_LATENCY_MS: Final = 5
 minimum 1 ms."""
 RECORDING: Final = "replay://"
 WITHOUT_CLOCK: Final = ("sim://", RECORDING)
-"""URL schemes of ports without a real robot, for which simulated time is accepted."""
+"""URL schemes of ports without a real robot. With them, the driver accepts simulated time."""
 
 
 def core_kind() -> str:
-    """Return ``compiled`` or ``interpreted``, for the part of the core that can be compiled."""
+    """Return ``compiled`` if the core's compilable modules are compiled, else ``interpreted``."""
     return "interpreted" if clock_fit.__file__.endswith(".py") else "compiled"
 
 
 def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
-    """Return a warning about the adapter's latency timer; empty for a short or absent timer."""
+    """Return a warning if the adapter's latency timer is too long; empty without such a timer."""
     device = Path(port).resolve().name
     try:
         text = (sysfs / "class/tty" / device / "device/latency_timer").read_text(encoding="ascii")
@@ -79,7 +79,7 @@ def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
 
 
 def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
-    """Return a warning about ``cmd_vel`` publishers whose type is not received; else empty."""
+    """Return a warning if ``cmd_vel`` is published with a type that the driver does not receive."""
     ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
     if stamped:
         ours, other = other, ours

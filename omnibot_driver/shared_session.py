@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One session and its open port, shared by threads: one lock, and one order of all events.
+"""One session and its open port, which threads share under one lock; all events keep their order.
 
-Each input ends with ``settle``: due packets are written, the guard gets the present stop command,
-and the events are queued in the outbox. This module starts no thread and opens no port.
+After each input to the session, ``settle`` writes the due packets, gives the guard the present stop
+command, and queues the events in the outbox. This module starts no thread and opens no port.
 """
 
 import math
@@ -95,9 +95,10 @@ class SharedSession:
         """Pass ``wish``, the motion that a sender wants, to the session by ``action``.
 
         ``sent_ns``: the possible times of day, in ns, at which the command was sent.
-        ``moves_base``: whether ``wish`` is a motion of the base; then a refusal concerns the motion
-        interlock. Raises CommandRefused for a wish that waited while this process was stalled. Each
-        refusal is also delivered, in its place among the events, unless the outbox is full.
+        ``moves_base``: whether ``wish`` is a motion of the base. Only then is the motion interlock
+        informed of a refusal. Raises CommandRefused for a command that waited while this process
+        was stalled. Each refusal is also delivered, in its place among the events, unless the
+        outbox is full.
         """
         try:
             with self.lock:
@@ -175,7 +176,7 @@ class SharedSession:
             self.settle()
 
     def heed_stall(self) -> bool:
-        """Stop the robot if this process was stalled; return whether it was."""
+        """Stop the robot if this process was stalled; return whether this process was stalled."""
         return self._heed_stall(boot_time_s())
 
     def _heed_stall(self, boot_s: float) -> bool:
@@ -185,7 +186,7 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Record that the pacer, and so the watchdog, is alive; send the guard its heartbeat."""
+        """Record that the pacer, which runs the watchdog, is alive; send the guard a heartbeat."""
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)
         self._stall_detector.passed(boot_s, time.time_ns())

@@ -13,9 +13,9 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Shortest stall, in s: time without a call of ``passed``, which should be called ten times a
-second. This limit is less than the guard's, so the driver notices every stall in which the guard
-acts."""
+"""Time without a call of ``passed``, in s, from which the process is regarded as stalled.
+``passed`` should be called ten times a second. The guard waits longer before it acts, so the driver
+notices every stall in which the guard acts."""
 SETTLE_S: Final = 0.25
 """Time after a stall, in s. A command that arrives within this time is regarded as sent during the
 stall, whatever its send time. A command that was sent within this time is regarded as sent during
@@ -54,7 +54,7 @@ class StallDetector:
         """Time of day at which the steady clock showed 0, in ns."""
 
     def begun(self, now: float) -> float:
-        """Return the length of a stall so far, in s, once for each stall; otherwise 0."""
+        """Return the length of a stall so far, in s, at the first call in the stall; else 0."""
         length_s = now - self._passed_at
         if self._begun or length_s < STANDSTILL_S:
             return 0.0

@@ -34,13 +34,13 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s/s. A crystal is off by a tenth of this value, and
 NTP corrects a clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""A message that seems early is this many times less likely to come from a sender than a message
+"""Factor by which a sender is a less likely source of a message that seems early than of a message
 that seems late by the same time."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Among this many messages of a sender, at least one is assumed to have almost no delay. With fewer
-messages, all of them may have been delayed; then the estimated send time of the next message is too
-late."""
+"""Number of messages of a sender of which at least one is assumed to have had almost no delay. With
+fewer messages, all of them may have been delayed; then the estimated send time of the next message
+is too late."""
 
 Differences = tuple[float, float]
 """Our clock at a message's arrival minus the sender's clock at its sending, in s: by our time of
@@ -132,7 +132,7 @@ class Transit:
 
 
 class _Sender:
-    """One sender on a topic, and its clock compared with both of our clocks."""
+    """One sender on a topic, with the offsets of both of our clocks from its clock."""
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
         self.number: int | None = None
@@ -140,11 +140,11 @@ class _Sender:
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
-        """Return whether this sender may have sent message ``number``; its numbers only grow."""
+        """Return whether this sender may have sent ``number``: a number above its last one."""
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
-        """Return how unlikely it is that this sender sent a message, to compare senders."""
+        """Return a number that is smaller the more likely this sender sent the message."""
         late_s = min(
             offset.late_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)
@@ -169,7 +169,7 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """Return the excess of the difference over the offset and drift, in s; may be negative."""
+        """Return how far the difference is above the offset plus drift, in s; negative if below."""
         drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
         return difference_s - self._least_s - drift_s
 

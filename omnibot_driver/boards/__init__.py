@@ -44,7 +44,7 @@ class Profile(Protocol):
         """Return a board object, made from checked parameter values."""
 
     def settings(self, values: Mapping[str, Any]) -> object:
-        """Return the value for ``Board.settings`` that these parameter values give."""
+        """Return these parameter values in the form that ``Board.settings`` expects."""
 
     def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
         """Return a function that opens the connection to the real board."""

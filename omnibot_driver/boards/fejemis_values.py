@@ -54,7 +54,7 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
 
 
 def require_whole_settings(values: Mapping[str, Any]) -> None:
-    """Reject an incomplete set of values that a board takes together in one command."""
+    """Reject a set parameter if another one of the same command to the board is unset."""
     _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
     _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")
     offset = ("front_wheel_offset", "front_wheel_inverted")

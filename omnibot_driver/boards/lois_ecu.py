@@ -90,7 +90,7 @@ def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
 
 
 def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
-    """Return the kinematics of both wheels, with their calibrated sizes."""
+    """Return the kinematics of both wheels, from the calibrated wheel sizes and track."""
     linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
     return DifferentialKinematics(
         wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]

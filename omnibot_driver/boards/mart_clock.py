@@ -10,7 +10,8 @@ import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""In these seconds of a minute, TIME is sent with the next minute, which begins within 4 s."""
+"""Seconds of a minute in which the driver sends TIME with the number of the next minute. That
+minute begins within 4 s."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of the MART controller that not every board has. No ROS is needed."""
+"""The parameters of the MART controller that not every board has. This module does not use ROS."""
 
 from typing import Final
 

@@ -28,7 +28,7 @@ def make(values: Mapping[str, Any]) -> OmniBot:
 
 
 def settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """Make the settings that the board's data does not show, from checked parameter values."""
+    """Make the settings that the board does not report, from checked parameter values."""
     return OmniBotSettings(
         baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],

@@ -26,7 +26,7 @@ With the real robot: lift its wheels off the ground first ({page}), then run
 def status_row(
     state: str, rates_hz: tuple[int | None, int], leg: int, pose: Pose, *velocities: BodyTwist
 ) -> str:
-    """Return a row under HEADING; ``velocities`` are the commanded and the measured twist."""
+    """Return a table row below HEADING; ``velocities``: commanded, then measured twist."""
     imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
     for twist in velocities:
@@ -50,7 +50,7 @@ def introduce(
     exports: str,
     seconds: float,
 ) -> None:
-    """Print what the demo does, and what the user can do with it.
+    """Print what the demo does, and the commands that the user can try.
 
     ``options`` are the arguments of the simulator and of the driver.
     """

@@ -47,7 +47,7 @@ class Program:
             self._process.wait()
 
     def failure(self, what: str) -> DemoFailed:
-        """Return an exception that says what happened, with the child's last output."""
+        """Return an exception whose message is ``what`` and the last output of the child."""
         self._log.seek(0)
         lines = self._log.read().splitlines()[-10:] or ["(nothing)"]
         return DemoFailed("\n  ".join([f"{what}. Last output of the {self._name}:", *lines]))

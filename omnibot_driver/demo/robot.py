@@ -29,9 +29,9 @@ ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
 
 
 class Robot:
-    """The robot as a ROS program uses it: subscribed topics in, ``cmd_vel`` out.
+    """The robot as a ROS program uses it: it subscribes to topics and publishes ``cmd_vel``.
 
-    After every second odometry message it publishes a command, which is a halt unless ``driving``.
+    After every second odometry message it publishes a velocity, which is zero unless ``driving``.
     ``imu``: whether the robot has an IMU. ``sideways``: whether it can drive along its y axis.
     """
 
@@ -61,7 +61,7 @@ class Robot:
         self._executor.add_node(node)
 
     def close(self) -> None:
-        """Leave ROS; an executor that outlives its context reports errors when Python ends."""
+        """End the executor and the ROS context; at exit, a remaining executor reports errors."""
         self._executor.shutdown(timeout_sec=0.0)
         rclpy.try_shutdown()
 
@@ -85,7 +85,10 @@ class Robot:
         return self._node.count_subscribers("odom") > 1
 
     def stands(self) -> bool:
-        """Return whether the last five odometry messages showed an idle robot at rest."""
+        """Return whether the robot is at rest and not driven.
+
+        The last five odometry messages must have shown this.
+        """
         return self._stood_for >= 5
 
     def row(self) -> str:

@@ -16,7 +16,7 @@ BOARD: Final = Parameter(
     "Kind of motor board that the driver controls.",
     fixed=True,
 )
-"""Parameter that names the board; each board's table sets its default and its only choice."""
+"""Parameter that names the board. In a board's table, that board is its default and only choice."""
 
 LINE: Final = (
     Parameter(

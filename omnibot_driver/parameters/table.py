@@ -205,7 +205,7 @@ def _require_ranges(values: Mapping[str, Any]) -> None:
 
 
 def _require_possible_speeds(values: Mapping[str, Any]) -> None:
-    """Reject speed limits above the fastest possible speed: odometry would reject such motion."""
+    """Reject a ``max_*_speed`` above its ``fastest_*_speed``: odometry would reject such motion."""
     for kind, unit in (("linear", "m/s"), ("angular", "rad/s")):
         commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
         if commanded in values and values[commanded] > values[possible]:

@@ -12,11 +12,10 @@ from typing import Final, Protocol
 from omnibot_driver.core.packets import Packet, Packets
 
 READ_TIMEOUT_S: Final = 0.2
-"""Longest wait of a ``read``, in s; a reader that ``interrupt`` cannot wake ends after this
-time."""
+"""Longest wait of a ``read``, in s, even if ``interrupt`` cannot end the ``read``."""
 WRITE_TIMEOUT_S: Final = 0.2
 NONE_MISSING: Final[Mapping[int, str]] = {}
-"""Value of ``missing`` for a transport that is never open in part."""
+"""Value of ``missing`` for a transport that is either completely open or closed."""
 
 
 class LinesChanged(Exception):
@@ -46,7 +45,7 @@ class Transport(Protocol):
         """Number of times the kernel has lost bytes since the opening; None without a counter."""
 
     def read(self) -> Packet:
-        """Wait for a packet and return it; after a while without any, return an empty packet.
+        """Wait for a packet and return it; return an empty packet if none arrives for a while.
 
         Raises LinkError when the line is lost, and LinesChanged when one of several lines is lost
         or open again.

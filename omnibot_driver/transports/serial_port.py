@@ -43,8 +43,9 @@ class SerialPort:
 
     ``parameter`` is the parameter that names the port, for error messages.
 
-    Linux raises DTR and RTS when the first program opens a port. Closing leaves them raised, so a
-    board that is wired to them restarts at most once after it is plugged in.
+    Linux raises DTR and RTS when the first program opens a port. This class leaves both lines
+    raised when it closes the port. A board that restarts when a line is raised therefore restarts
+    at most once after it is plugged in.
     """
 
     ends_with_us = False

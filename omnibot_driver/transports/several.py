@@ -85,7 +85,7 @@ class Several:
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
-        """Return the bytes received on one of the lines; the lines take turns.
+        """Return the bytes received on one line. Lines that have bytes are read in turn.
 
         Raises LinesChanged when a line is lost or open again, and LinkError when all are missing.
         """
@@ -149,7 +149,7 @@ class Several:
         return [line.port for line in self._lines if line.port is not None]
 
     def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
-        """Yield each line with its bytes, in the order of the lines' first packets."""
+        """Yield each line with all its bytes; lines come in the order of their first packets."""
         for channel in dict.fromkeys(channel for channel, _ in packets):
             own = tuple(packet for packet in packets if packet[0] == channel)
             yield self._lines[channel], joined(own)

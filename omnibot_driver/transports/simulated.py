@@ -105,7 +105,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
         return len(waiting) if self._has_datagrams(channel) else sum(map(len, waiting))
 
     def write(self, packet: Packet) -> None:
-        """Queue a packet for the board, which reads it by its next tick."""
+        """Queue a packet for the board, which reads it at its next tick at the latest."""
         self._inbox.put(packet)
 
     def read(self, timeout_s: float | None) -> Packet:

@@ -28,7 +28,7 @@ UNREACHABLE: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH,
 
 
 class UdpPorts:
-    """A ``Transport`` of connected sockets, one for each of ``channels`` channels."""
+    """A ``Transport`` with one connected socket per channel; ``channels`` is their number."""
 
     ends_with_us = False
     missing = NONE_MISSING
@@ -149,7 +149,7 @@ class UdpPorts:
 
 
 def _is_silence(error: OSError) -> bool:
-    """Return whether the error means that the other side is absent, perhaps during a restart."""
+    """Return whether the error only means that the other side does not listen at present."""
     return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
 
 

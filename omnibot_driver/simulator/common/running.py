@@ -22,7 +22,8 @@ UNREAD_LIMIT = 4095
 """Number of unread bytes that a Linux terminal holds; further bytes are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
-"""The thread runs the missed ticks after a delay of up to this time in s; else it skips them."""
+"""Longest delay of the thread, in s, after which it runs the missed ticks. After a longer delay it
+skips them."""
 
 _JOIN_S = 5.0
 

@@ -17,7 +17,7 @@ _TRIES = 100
 
 
 class UdpSocket:
-    """A socket bound to ``address``; it sends to the sender of the last datagram."""
+    """A socket bound to ``address``. It sends to the address that sent the last datagram."""
 
     def __init__(self, bound: socket.socket) -> None:
         bound.setblocking(False)

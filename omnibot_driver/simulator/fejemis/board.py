@@ -3,7 +3,7 @@
 """The pair of simulated Teensys and their robot, which advance in steps of a millisecond.
 
 The module is pure: it takes bytes, advances by ticks of ``tick_s``, and returns bytes; the same
-settings and input give the same output. It knows which half is at which port, and when a fault
+settings and input give the same output. It knows which Teensy is at which port, and when a fault
 occurs. It must not know commands.
 
 Assumptions where the manual says nothing: an ``rc`` never expires; a Teensy that restarts switches

@@ -125,7 +125,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return, by key, a function for each item in the help text; it returns the item's line."""
+        """Return, by item of the help text, the function that returns the item's line."""
         return super().items() | {
             "hbt": self._heartbeat,
             "adc": lambda: f"adc {self.settings.volts * 100:.0f} 2050 812 790 0",

@@ -112,7 +112,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return, by key, a function for each item in the help text; it returns the item's line."""
+        """Return, by item of the help text, the function that returns the item's line."""
         return super().items() | {
             "hbt": lambda: (
                 f"hbt {self.clock_text(4)} {self.config.number} {self.version} 0.00 1 0.011"

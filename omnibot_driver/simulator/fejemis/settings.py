@@ -54,9 +54,9 @@ class Firmware:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """A planned fault: ``what`` happens to the Teensy ``half``, ``at_s`` after construction.
+    """A planned fault of the Teensy ``half``, which occurs ``at_s`` seconds after construction.
 
-    ``what`` is a name in ``faults``.
+    ``what`` is the fault's name in ``faults``.
     """
 
     at_s: float

@@ -33,7 +33,7 @@ WITHOUT_NUMBERS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A line that a Teensy executed; ``at_s``: time since construction, in s."""
+    """A line that a Teensy executed ``at_s`` seconds after construction."""
 
     at_s: float
     text: str
@@ -46,8 +46,8 @@ class Teensy(Generic[C]):
     Teensy.
 
     The caller may change the following attributes at any time. sums: whether lines carry checksums.
-    silent: the Teensy obeys, but sends nothing. hung: the Teensy neither obeys nor sends, and its
-    last control outputs stay in effect. unplugged: the cable is out, but the Teensy keeps running.
+    silent: the Teensy obeys, but sends nothing. hung: the Teensy neither obeys nor sends, and the
+    motors keep its last outputs. unplugged: the cable is out, but the Teensy keeps running.
     powered: False once the power is cut.
     """
 
@@ -82,7 +82,7 @@ class Teensy(Generic[C]):
     # What each kind of Teensy extends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return, by subscription key, a function for each item; it returns the item's line."""
+        """Return, by key of a subscription, the function that returns the item's line."""
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
             "id": lambda: f"id {self.config.name} {self.config.number}",
@@ -107,7 +107,7 @@ class Teensy(Generic[C]):
         """Reset the state, as after power-up."""
 
     def started(self) -> None:
-        """Do what the end of a boot requires."""
+        """Adjust the state at the end of a boot; called once for each boot."""
 
     def cycle(self) -> None:
         """Run one control cycle."""

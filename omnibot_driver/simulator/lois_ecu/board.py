@@ -117,7 +117,7 @@ class SimulatedLois:
 
     @property
     def terminal_mode(self) -> int:
-        """Terminal mode that 0x11 wrote last.
+        """Terminal mode that the last command 0x11 set.
 
         The board sends lines of its own only in modes 0 and 4.
         """
@@ -276,7 +276,7 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """Finish the pass over the timers, then make another pass; both take less than 1 ms."""
+        """Run the main loop for 1 ms: finish the pass over the timers and make another."""
         for _ in range(2):
             if not self._scan:
                 self._read_input()

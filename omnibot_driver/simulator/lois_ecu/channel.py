@@ -49,8 +49,8 @@ class WheelChannel:
         self._count = 0
         self._ticked_s = 0.0
         self.turned_ticks = 0
-        """Ticks since the odometry last read this number; the sign is that of the wheel's true
-        direction."""
+        """Ticks since the odometry last read this number; negative if the wheel truly turned
+        backward."""
         self.record: list[int] = []
         self.record_left = 0
         self._records_torque = False
@@ -91,7 +91,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        The manual implies this rule; with a quirk, a stalled wheel keeps its measured speed.
+        The manual implies this rule; the quirk ``keeps_speed_of_stalled_wheel`` disables it.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0
@@ -141,7 +141,7 @@ class WheelChannel:
             self._next_target = 0
 
     def reset(self) -> None:
-        """Set the ticks to zero and, unless a quirk prevents it, stop the motor."""
+        """Set the ticks to zero and, without ``reset_clears_ticks_only``, stop the motor."""
         self.ticks = 0
         if not self._quirks.reset_clears_ticks_only:
             self.command_duty(0)

@@ -51,7 +51,7 @@ class Terminal:
         return b""
 
     def mixed(self) -> bytes:
-        """Advance by one step; return a waiting character of each sensor, or b"" if ``busy``."""
+        """Advance by 1 ms; return the next character of each sensor, or b"" if ``busy``."""
         if self.busy:
             speed = CHARACTERS_PER_STEP.get(self.mode, BYTES_PER_STEP)
             self._to_sensor = max(self._to_sensor - speed, 0.0)

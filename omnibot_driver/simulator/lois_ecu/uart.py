@@ -12,7 +12,7 @@ INPUT_DEPTH = 600
 
 
 class Uart:
-    """The port; if ``loses``, only the first byte that arrives while interrupts are off is kept.
+    """The port; if ``loses``, it keeps only the first byte that arrives while interrupts are off.
 
     received: all bytes sent to the port. lost_bytes: number of bytes that were lost.
     input: characters received but not read yet.

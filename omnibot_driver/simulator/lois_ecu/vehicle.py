@@ -40,8 +40,8 @@ class Edge:
 class Vehicle:
     """The robot; ``truth`` is its true pose and motion.
 
-    ``corrections``: for each encoder, the board's factors for the short and the long level, which
-    make both levels equally long.
+    ``corrections``: for each encoder, the board's factors for the durations of the short and the
+    long level. The encoder's levels are as long as these factors assume.
     """
 
     def __init__(

@@ -36,7 +36,7 @@ def words(command: int, high: int, low: int) -> bytes:
 
 
 def bits_of(number: float) -> int:
-    """Return the bits of a float32; a number that is too large becomes infinity."""
+    """Return the bits of ``number`` as a float32; a number that is too large becomes infinity."""
     try:
         return int.from_bytes(struct.pack(">f", number), "big")
     except OverflowError:

@@ -2,9 +2,9 @@
 
 """Supervision of a motion in progress, 100 times a second, as the server does it.
 
-This module detects the start and the stop of the wheel, and obstacles; it also ends controlled
-moves. Without samples of the IMU, it detects only obstacles and the dock, and only in controlled
-linear moves. It knows motions; it does not know commands.
+This module detects from the encoder when the right wheel starts and stops, and detects obstacles;
+it also ends controlled moves. Without samples of the IMU, it detects only obstacles and the dock,
+and only in controlled linear moves. It knows motions; it does not know commands.
 """
 
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ _TIMED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR)
 
 
 def stop_motors(server: "MartServer", motion: Motion) -> None:
-    """Set both motor registers to stop, and begin to wait until the wheel is at rest."""
+    """Set both motor registers to stop; ``sample`` then waits until the right wheel is at rest."""
     if motion.kind is Kind.REFERENCE and (
         motion.left < motions.FAST_REGISTER or motion.right < motions.FAST_REGISTER
     ):

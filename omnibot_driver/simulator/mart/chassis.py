@@ -110,7 +110,7 @@ class Chassis:
 
     @property
     def powered(self) -> bool:
-        """Whether the motors have a command to turn."""
+        """Whether at least one motor is commanded to turn."""
         return self.right != STOP or self.left != STOP
 
     @property

@@ -81,7 +81,7 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _joined(server: "MartServer") -> bool:
-    """Return whether something in progress makes the server refuse L."""
+    """Return whether the server refuses L because of a motion, recording or MCS in progress."""
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict
     others = [each for each in server.motions if each.kind is not Kind.REFERENCE]

@@ -11,10 +11,11 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server derives from it.
 
-    alive: False while the IMU is unplugged; it can be set at any time, in addition to the times in
-    the settings. closed: whether the server has stopped using the IMU, until RST IMU or SB.
-    rate_dps: turn rate of the last sample in deg/s, minus the bias that the server knows.
-    heading_deg: the relative heading in degrees, left positive.
+    alive: False while the IMU is unplugged; the caller can set it at any time. During the outage
+    that the settings plan, the IMU fails even if ``alive`` is True. closed: whether the server has
+    stopped using the IMU, until RST IMU or SB. rate_dps: turn rate of the last sample in deg/s,
+    minus the bias that the server knows. heading_deg: the relative heading in degrees, left
+    positive.
     """
 
     def __init__(self, settings: MartSettings) -> None:

@@ -11,7 +11,7 @@ SAMPLE_S = 0.01
 START_SAMPLES, STOP_SAMPLES, STILL_SAMPLES = 60, 75, 15
 SLOW_STOP_SAMPLES = 188
 FAST_REGISTER = 45
-"""Register value below which RM is so fast that it stops gently (0 is full forward)."""
+"""Register value (0 is full forward) below which RM counts as fast; a fast RM stops gently."""
 SETUP_S = 0.05
 BIAS_SAMPLE_S = 0.0107
 LOST_AT_START_S, LOST_S = 0.5, 1.5

@@ -114,7 +114,7 @@ class MartServer(ServerState):
         return new
 
     def restart(self, boot_s: float = BOOT_S) -> None:
-        """Start the server program again; the motors keep their last command.
+        """Restart the server program; the motors keep the last command that they got.
 
         Datagrams of the next ``boot_s`` seconds are lost. START_UP_S later the server has started
         up completely.

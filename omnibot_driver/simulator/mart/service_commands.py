@@ -246,7 +246,7 @@ def stop_record(server: "MartServer", text: str) -> str | None:
 
 
 def set_motors(server: "MartServer", text: str) -> str | None:
-    """Write the motor registers directly, the right one first, once (MCS)."""
+    """Write two numbers to the motor registers, the right one first (MCS)."""
     numbers = wire.fields(text)
     if len(numbers) < 2:
         return missing(server, "MCS with one number")

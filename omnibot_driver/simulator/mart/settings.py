@@ -29,9 +29,9 @@ class Quirks:
     reference_speed_wraps: RM with a speed below 1 or above 127 writes a register value that wraps
         around, which RMCS then clamps.
     reference_start_counts_on: RM counts samples until the wheel turns. The count does not begin at
-        zero, but continues from the count of the samples during the last stop of RM. After a stop
-        of 0.56 to 0.6 s RM fails at once; after a longer stop RM waits endlessly for a stuck
-        motor. The reason in the reply to RM is that of the last F or B.
+        zero, but at the number of samples that the previous stop of RM took. If that stop took
+        0.56 to 0.6 s, RM fails at once; if it took longer, RM waits endlessly for a stuck motor.
+        The reply to a failed RM gives the reason why the last F or B failed.
     speed_word_first: a speed word has an effect only before the number; after the number it is
         ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB with 0 inches, or with a word instead of a
@@ -86,7 +86,8 @@ FIRMWARE = Quirks(
 )
 """Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""Quirks of the public source where it contradicts the observation; elsewhere as observed."""
+"""Quirks of the public source code. They equal ``FIRMWARE`` except where the code contradicts what
+was observed on the running server."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {

@@ -22,7 +22,7 @@ NEAR_READINGS_S = 0.15
 """Duration of the three readings that confirm a near obstacle, in s."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Time in s that the server, which counts unsigned milliseconds, adds to a negative duration."""
+"""Time in s by which the server misreads a negative duration: it counts unsigned milliseconds."""
 FILES = 100
 
 Then = Callable[..., None]
@@ -95,7 +95,7 @@ class ServerState:
 
     @property
     def motion(self) -> Kind | None:
-        """Kind of motion in progress as the server sees it, or None."""
+        """Kind of motion that the server regards as in progress, or None."""
         return next((each.kind for each in self.motions if each.running), self.starting)
 
     @property
@@ -120,7 +120,7 @@ class ServerState:
 
     @property
     def conflict(self) -> bool:
-        """Whether something in progress makes the server refuse other motions."""
+        """Whether the server refuses motions, because of a motion, recording or MCS in progress."""
         return self.manual or self.recording or any(each.running for each in self.motions)
 
     def save(self, note: FileNote) -> None:

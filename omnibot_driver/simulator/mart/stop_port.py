@@ -33,7 +33,7 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
-    """Stop an uncontrolled motion; return whether a notice of the motion's end will follow."""
+    """Stop an uncontrolled motion; return whether the port must wait for a notice of its end."""
     if motion.kind is Kind.SPIN:
         if motion.stopping:
             return False

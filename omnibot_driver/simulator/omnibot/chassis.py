@@ -2,8 +2,8 @@
 
 """Kinematics of the three omni wheels (manual, Control equation and Odometry equation).
 
-Knows the pure kinematics, without the gains of the firmware's command path, and how a displacement
-changes a pose. Must not know encoder counts, time, or whose pose it is.
+Knows the kinematics and how a displacement changes a pose. It does not know the scales by which the
+firmware converts commands. Must not know encoder counts, time, or whose pose it is.
 """
 
 from math import cos, pi, sin

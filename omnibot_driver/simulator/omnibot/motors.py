@@ -20,7 +20,7 @@ PWM_LIMIT = 4095.0
 DEAD_ZONE_PWM = 60.0
 """Largest effort that leaves a wheel at rest, in PWM steps."""
 STICKING_SPEED = 0.3
-"""Speed in counts per tick below which the dead zone stops a wheel, so that it never creeps."""
+"""Speed, in counts per tick, below which a wheel stops if its effort is within the dead zone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

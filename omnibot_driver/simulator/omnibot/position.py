@@ -13,11 +13,12 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 from omnibot_driver.simulator.omnibot.wire import Triple
 
 SPEED_PER_WAY = 2.0
-"""Speed per distance from the goal, in 1/s, up to FASTEST_MPS and FASTEST_RADPS."""
+"""Speed divided by the distance from the goal, in 1/s; the speed is limited to FASTEST_MPS and
+FASTEST_RADPS."""
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3
-"""Tolerance of the goal, in m and in rad."""
+"""Distance from the goal, in m, and angle from it, in rad, up to which the robot does not move."""
 
 
 def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
@@ -31,8 +32,8 @@ def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
 def approach(pose: PlanarPose, goal: PlanarPose) -> tuple[float, float, float]:
     """Return the twist straight to the goal: body x and y in m/s, yaw rate in rad/s.
 
-    The robot turns while it drives. The heading is unwrapped: to a goal that is a full turn away,
-    the robot makes that turn.
+    The robot turns while it drives. The heading is unwrapped: if the goal's heading is a full turn
+    away, the robot makes this full turn.
     """
     dx_m, dy_m = goal.x_m - pose.x_m, goal.y_m - pose.y_m
     way_m, turn_rad = hypot(dx_m, dy_m), goal.yaw_rad - pose.yaw_rad

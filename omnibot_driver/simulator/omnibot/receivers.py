@@ -46,7 +46,7 @@ _NOTHING: Final[Step] = (b"", None, False)
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
     """Find frames by counting seven bytes after FF FE, without a timeout.
 
-    The bytes FF FF FE also contain a header.
+    A header is also found in FF FF FE: its last two bytes.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""
