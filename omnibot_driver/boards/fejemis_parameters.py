@@ -70,9 +70,9 @@ WHEELS: Final = (
         "steering_distance",
         0.42,
         "m",
-        "Distance from the axle of the driving wheels to the steered wheel, F and S in the"
-        " manual; written to both boards together with track (confs). Unset: the boards keep their"
-        " own values.",
+        "Distance from the axle of the driving wheels to the steered wheel. The manual calls it F"
+        " or S. The driver writes it to both boards together with track (confs). Unset: the boards"
+        " keep their own values.",
         low=0.01,
         high=10.0,
         unset=True,

@@ -149,7 +149,7 @@ SENSORS: Final = (
         "range_type",
         "ultrasound",
         "",
-        "Type of both sonars in range/front and range/rear.",
+        "Sensor type of both sonars, reported in range/front and range/rear.",
         choices=("ultrasound", "infrared"),
     ),
     Parameter(

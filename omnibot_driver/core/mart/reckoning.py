@@ -259,7 +259,7 @@ class Reckoning:
     def _finish_turn(self) -> None:
         """End a turn on the spot after its last count.
 
-        A reported angle that differs too much from the wheel's turn is discarded.
+        A reported angle that differs too much from the turn measured at the wheel is discarded.
         """
         told_rad = self.told_rad
         wrong_rad = 0.0 if told_rad is None else self.spun_rad - told_rad

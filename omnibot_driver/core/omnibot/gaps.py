@@ -34,7 +34,7 @@ Causes of a longer pause are lost bytes, an adapter that collects bytes, or a la
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
 TICK_BYTES: Final = 14 + 9 + 15
-"""Most bytes that the board sends in one tick; a read of more bytes after a pause was late."""
+"""Largest number of bytes in one tick; a read of more bytes after a pause was late."""
 PAUSES_TO_TRUST: Final = 16
 """Number of pauses between frames after which the line is assumed to cause the pauses, not an
 adapter."""

@@ -194,7 +194,7 @@ def timing(log: Log) -> Figure:
             )
         grid[row, 0].set_ylim(low - 0.04 * (high - low), high + 0.18 * (high - low))
     dress(grid[0, 0], "ms", "Step between stamps minus the median step")
-    dress(grid[1, 0], "ms", "Delay of arrival above the smallest delay")
+    dress(grid[1, 0], "ms", "Delay of arrival minus the smallest delay")
     for axes in grid[:, 1]:
         dress(axes, "", "Distribution")
         axes.set_xticks([])

@@ -122,7 +122,7 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel at rest whose reported speed is near its set point gets no power: it is stalled."""
+    """If the reported speed of a wheel at rest is near its set point, the wheel gets no power."""
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
     assert not looks_stalled(still, targets=(-19, -19))

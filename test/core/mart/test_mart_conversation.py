@@ -165,7 +165,7 @@ def stopping(motion: Motion, *, started_s: float = 0.0, owed: int = 0) -> Stoppi
 
 
 def test_a_stop_is_repeated_until_it_is_answered() -> None:
-    """If a repeated stop fails with "no motion", that proves the stop as well as an ok does."""
+    """A repeated stop that fails with "no motion" proves the stop, just as an ok does."""
     stop = stopping(Motion.REFERENCE)
     assert stop.due(10.0) == (words.SRM,)
     assert stop.due(10.1) == ()

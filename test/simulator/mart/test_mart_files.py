@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""File downloads from the public server, and how EXIT ends it."""
+"""File downloads from the public server, and how EXIT ends the server."""
 
 import pytest
 from mart_rig import Rig
