@@ -36,10 +36,11 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.status import Status
+from omnibot_driver.parameters import RANGE_TYPES
 
 UNMEASURED_VARIANCE: Final = 1e6
 """Variance of z, roll and pitch, which planar odometry lacks, and of an unknown twist."""
-RADIATION: Final = {"ultrasound": Range.ULTRASOUND, "infrared": Range.INFRARED}
+RADIATION: Final = dict(zip(RANGE_TYPES, (Range.ULTRASOUND, Range.INFRARED), strict=True))
 """Value of ``radiation_type`` in sensor_msgs/Range, by the type of the sensor."""
 SHORTEST_QUATERNION: Final = 1e-3
 MOST_TILT_RAD: Final = 0.1

@@ -9,7 +9,7 @@ user sets it (`fejemis_values.py`).
 import math
 from typing import Final
 
-from omnibot_driver.parameters import Parameter
+from omnibot_driver.parameters import RANGE_TYPES, Parameter
 
 MOST_GAINS: Final = 17
 """Number of gains that ``cpsteer`` lists."""
@@ -207,7 +207,7 @@ SENSORS: Final = (
         "infrared",
         "",
         "Type of the time-of-flight sensor in range/tof.",
-        choices=("ultrasound", "infrared"),
+        choices=RANGE_TYPES,
     ),
     Parameter(
         "tof_field_of_view",
@@ -238,7 +238,7 @@ SENSORS: Final = (
         "ultrasound",
         "",
         "Type of the sonar in range/sonar.",
-        choices=("ultrasound", "infrared"),
+        choices=RANGE_TYPES,
     ),
     Parameter("sonar_field_of_view", 0.5, "rad", "Field of view of the sonar.", low=0.01, high=3.0),
     Parameter(
@@ -252,7 +252,7 @@ SENSORS: Final = (
         "infrared",
         "",
         "Type of both infrared sensors in range/ir1 and range/ir2.",
-        choices=("ultrasound", "infrared"),
+        choices=RANGE_TYPES,
     ),
     Parameter(
         "ir_field_of_view",

@@ -4,7 +4,7 @@
 
 from typing import Final
 
-from omnibot_driver.parameters import Parameter
+from omnibot_driver.parameters import RANGE_TYPES, Parameter
 
 WHEELS: Final = (
     Parameter(
@@ -150,7 +150,7 @@ SENSORS: Final = (
         "ultrasound",
         "",
         "Sensor type of both sonars, reported in range/front and range/rear.",
-        choices=("ultrasound", "infrared"),
+        choices=RANGE_TYPES,
     ),
     Parameter(
         "range_field_of_view",

@@ -10,11 +10,12 @@ board's profile. This package does not use ROS or a board; its types are plain P
 value raises a ParameterError that names the parameter and the allowed values.
 """
 
-from omnibot_driver.parameters.parameter import Parameter, Value
+from omnibot_driver.parameters.parameter import RANGE_TYPES, Parameter, Value
 from omnibot_driver.parameters.settings import session_settings
 from omnibot_driver.parameters.table import Check, Table, nearest, table
 
 __all__ = [
+    "RANGE_TYPES",
     "Check",
     "Parameter",
     "Table",

@@ -11,6 +11,8 @@ from omnibot_driver.core.errors import ParameterError
 TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a string"}
 """Names of the types in ROS."""
 QUOTE: Final = "YAML reads on, off, yes and no as true or false; put the word in quotes"
+RANGE_TYPES: Final = ("ultrasound", "infrared")
+"""Values of a parameter for the type of a range sensor."""
 DUMPED_UNSET: Final = "null"
 """Value of an unset parameter in the file of ``ros2 param dump``, as the driver reads it."""
 NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six")
