@@ -108,6 +108,7 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
         ("guard", 1, "must be a bool, not 1"),
         ("command_rate", True, "must be a double, not True"),
         ("gyro_bias", 0.1, "must be an array of doubles, not 0.1"),
+        ("gyro_bias", None, "must be an array of doubles, not an empty value"),
         ("axis_signs", "111", "must be an array of integers, not '111'"),
         ("port", "", "must be a device or a URL, not ''"),
     ],
@@ -248,5 +249,5 @@ def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
     assert gain.check("null") is None  # from a file that ros2 param dump has written
     with pytest.raises(ParameterError, match="'gain' must be 0 to 9"):
         gain.check(10.0)
-    with pytest.raises(ParameterError, match="must be a double, not None"):
+    with pytest.raises(ParameterError, match="must be a double, not an empty value"):
         replace(gain, unset=False).check(None)

@@ -133,7 +133,8 @@ class Parameter:
 
     def _refusal(self, value: object, wanted: str) -> ParameterError:
         remark = f" ({QUOTE})" if self.kind is str and isinstance(value, bool) else ""
-        return ParameterError(f"parameter '{self.name}' must be {wanted}, not {value!r}{remark}")
+        given = "an empty value" if value is None else repr(value)  # rclpy: `[]` and `~` are None
+        return ParameterError(f"parameter '{self.name}' must be {wanted}, not {given}{remark}")
 
 
 def _converted(value: object, kind: type) -> object:

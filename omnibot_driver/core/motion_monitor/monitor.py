@@ -74,7 +74,7 @@ ADVICE: Final[Mapping[Fault, str]] = {
     Fault.TURNS_TOO_FAST: "check the parameters of the wheels and scales",
     Fault.BEYOND_LIMITS: "check the parameters of the wheels and scales",
     Fault.UNCOMMANDED: (
-        "The driver sends Stop. If the robot is not being pushed, switch the motors off by hand"
+        "the driver sends Stop. If the robot is not being pushed, switch the motors off by hand"
         " and check the cable"
     ),
     Fault.BLOCKED: "check motor power, and whether the wheels are blocked",

@@ -58,7 +58,7 @@ TRAITS: Final = Traits(
         ),
         Fault.BEYOND_LIMITS: "check `control_method`, `linear_scale` and `angular_scale`",
         Fault.UNCOMMANDED: (
-            "The driver sends Stop. If the robot is not being pushed, call ~/pause or switch the"
+            "the driver sends Stop. If the robot is not being pushed, call ~/pause or switch the"
             " motors off by hand, and check the cable"
         ),
         Fault.BLOCKED: (
