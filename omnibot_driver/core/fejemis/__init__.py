@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis sweeping robot: two Teensy boards that send and obey lines of text.
+"""The Fejemis sweeping robot: two Teensy boards that exchange lines of text with the driver.
 
-The package works on bytes and times only, without ports, clocks or ROS.
+The package only handles bytes and times. It does not use ports, clocks or ROS.
 """
 
 from omnibot_driver.core.fejemis.decoder import FejemisDecoder

@@ -1,10 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The set-point stream for both boards, which repeats the motion lines.
+"""Repeats the motion lines (``rc``) to both boards.
 
-While ``Encoder`` limits the drive board's speed, each new angle of the front wheel may allow more
-speed. So, while the speed is limited, the stream sends the motion lines with each new angle, and
-not only at the repetition rate. The module decides when a line is due, not what the line contains.
+``Encoder`` limits the drive board's speed while the front wheel has not reached its angle. Each new
+angle of the wheel may allow more speed. So while the speed is limited, this module sends the motion
+lines again after each new angle, in addition to the usual repetition. It also does so while lines
+have no checksums, to replace damaged lines soon.
+
+The module knows when a line is due; it does not know what the line contains.
 """
 
 import math
@@ -21,11 +24,17 @@ class Listener(Protocol):
     """An object that is notified of each new order."""
 
     def wanted(self, *, estop: bool) -> None:
-        """Take note of a new order; ``estop``: whether the order is an emergency stop."""
+        """Receive the notification of a new order.
+
+        ``estop``: whether the order is an emergency stop.
+        """
 
 
 class PairStream(SetpointStream):
-    """The set-point stream of both boards; ``driving``: whether a motion is commanded."""
+    """Sends the set-point to both boards, and repeats it.
+
+    ``driving``: whether the set-point is a motion, not a stop.
+    """
 
     def __init__(self, encoder: Encoder, proof: StopProof, listener: Listener) -> None:
         self.driving = False
@@ -33,12 +42,12 @@ class PairStream(SetpointStream):
         super().__init__(encoder, proof)
 
     def connect(self) -> None:
-        """Begin a new connection; no motion is commanded yet."""
+        """Begin a new connection, on which no motion is commanded yet."""
         self.driving = False
         super().connect()
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the set-point; notify the listener whether the order is an emergency stop."""
+        """Replace the set-point, and notify the listener of the new order."""
         is_stop = wanted is None or isinstance(wanted, Stop | EmergencyStop)
         self.driving = not is_stop and not wanted.is_zero  # type: ignore[union-attr]
         self._listener.wanted(estop=isinstance(wanted, EmergencyStop))
@@ -47,7 +56,7 @@ class PairStream(SetpointStream):
         super().apply(wanted, now)
 
     def angle_told(self, angle_rad: float, now: float) -> bool:
-        """Take the front angle, in rad; return True if a new fault of the front wheel is found.
+        """Receive the front wheel's angle in rad; return whether a new fault of the wheel is found.
 
         The fault is that the wheel does not follow its commanded angle.
         """

@@ -1,17 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The front wheel's angle as a line for the drive board, in digits that make damage detectable.
+"""Writes the front wheel's angle as a line for the drive board, so that damage is detected.
 
-If two characters whose codes add up to 99 are lost, the sum (checksum) of a line does not change.
-So the driver sends an angle in digits without such a pair; to get these digits, it rounds the angle
-by at most half a degree. The rounding error is added to the next angles, so the mean is correct.
-Some angles to the right contain a ``6`` that rounding cannot avoid. If the minus sign and this
-``6`` are both lost, the sum does not change, and the board receives an angle of less than 10° to
-the left.
+**Lines with a checksum.** If a line loses two characters whose codes add up to 99, its checksum
+stays correct. So the driver rounds the angle, by at most half a degree, to digits without such a
+pair. The rounding error is added to the next angle, so the mean of the angles is correct. Some
+angles to the right need a minus sign and a ``6``, which are such a pair. If both are lost, the
+board reads an angle of less than 10° to the left.
 
-Without sums, the board does not detect any loss. So the driver sends whole degrees: the loss of a
-digit never makes a whole number larger, so the received angle never exceeds 90°. Beyond 90°, the
-board would compute an inner wheel that is faster than the outer one.
+**Lines without a checksum.** The board detects no loss. So the driver sends whole degrees. A whole
+number never becomes larger if a digit is lost, so the board never reads more than 90°. Beyond 90°,
+the board would drive its inner wheel faster than the outer one.
 """
 
 import math
@@ -27,21 +26,23 @@ from omnibot_driver.core.fejemis.sums import MODULUS
 ROUNDED: Final = 5
 """Largest allowed rounding of an angle, in tenths of a degree."""
 MOST_OWED: Final = 0.5
-"""Largest rounding error that is carried over to the next angle, in degrees."""
+"""Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Limit, in degrees, of an angle to the left that a board may read if the text of an angle to the
-right is damaged. Texts whose damage can give ``ACROSS`` or more are avoided."""
+"""Limit, in degrees, of the angle that a board may read after undetected damage.
+
+A text is not used if its damaged forms include this angle, a larger one, or one to the right.
+"""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
 class AngleRelay:
-    """Turns angles into lines, and carries the rounding error over to the next angle."""
+    """Turns angles into lines, and adds the rounding error of each angle to the next angle."""
 
     def __init__(self) -> None:
         self._owed_deg = 0.0
 
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
-        """Return the ``fwl`` line for the angle; ``sums``: whether the caller adds a sum."""
+        """Return the ``fwl`` line for the angle; ``sums``: whether the caller adds a checksum."""
         angle_deg = math.degrees(angle_rad)
         wanted_deg = angle_deg + self._owed_deg
         text = _with_sum(round(10 * wanted_deg)) if sums else b"%d" % round(wanted_deg)
@@ -50,10 +51,10 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """Yield each number that a board may read instead of ``text`` if two characters are lost.
+    """Yield the number that a board reads for each undetected loss of two characters of ``text``.
 
-    Only losses that the sum does not detect are included. A remaining text that is not a number
-    gives 0.
+    A loss is undetected if the checksum stays correct. If the remaining text is not a number, the
+    result is 0.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
@@ -78,7 +79,7 @@ def _with_sum(tenths: int) -> bytes:
 
 
 def _written(tenths: int) -> list[str]:
-    """Return the notations of an angle with and without redundant zeros, shortest first."""
+    """Return all ways to write the angle, with and without redundant zeros."""
     whole, tenth = divmod(abs(tenths), 10)
     heads = [str(whole), f"0{whole}"] if whole else ["0", ""]
     tails = [f".{tenth}", f".{tenth}0"] if tenth else ["", ".", ".0", ".00"]

@@ -1,12 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis as a ``Board`` of the driver: two Teensy boards as one robot.
+"""The Fejemis as a ``Board`` of the driver: its two Teensy boards appear as one robot.
 
-This module composes the parts and encodes requests. ``ports.py`` finds which board (half) is at
-which port, ``inbound.py`` handles messages, ``translation.py`` converts them to readings,
-``encoder.py`` encodes orders, ``watch.py`` stops the robot on timeouts, ``obedience.py`` checks
-whether the drive board obeys, ``upkeep.py`` keeps both boards sending and configured, and
-``services.py`` handles the user's requests other than motion, such as brush and lift.
+This module connects the parts of the package and writes the lines of stop, start and pause. Each
+part is one file:
+
+- ``ports.py`` finds out which board is at which port.
+- ``inbound.py`` receives all messages, and ``translation.py`` converts them to readings.
+- ``encoder.py`` converts orders to motion lines.
+- ``watch.py`` stops the robot if a board is silent or its data is too old.
+- ``obedience.py`` checks whether the drive board obeys.
+- ``upkeep.py`` keeps both boards sending and configured.
+- ``services.py`` has the user's other requests, such as brush and lift.
 """
 
 import math
@@ -35,9 +40,11 @@ from omnibot_driver.core.traits import Traits
 
 
 class FejemisBoard(Board):
-    """A Fejemis robot as a ``Board``; ``settings`` may be replaced at any time.
+    """A Fejemis robot as a ``Board``.
 
-    ``services``: functions that only this kind of robot has, such as brush and lift.
+    ``services``: the user's requests that only a Fejemis has, such as brush and lift.
+
+    ``settings``: the user's settings; they may be replaced at any time.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -66,7 +73,7 @@ class FejemisBoard(Board):
 
     @property
     def settings(self) -> FejemisSettings:
-        """The settings that the boards do not report."""
+        """The user's settings."""
         return self._settings
 
     @settings.setter
@@ -83,12 +90,16 @@ class FejemisBoard(Board):
 
     @property
     def geometry(self) -> Geometry:
-        """Track and wheelbase in m, as used by the drive board; until known, from the settings."""
+        """Track and wheelbase in m, as the drive board uses them.
+
+        Until the board has reported them, they come from the settings.
+        """
         return self._upkeep.geometry
 
     @property
     def front_angle_rad(self) -> float | None:
-        """Angle of the front wheel in rad, limited to ±90°; None if missing, old or faulty."""
+        """Angle of the front wheel in rad, limited to ±90°; None while unknown, too old or faulty.
+        """
         front = self._translation.front
         return front.drives_by_rad if front.known(self._now) else None
 
@@ -119,7 +130,7 @@ class FejemisBoard(Board):
 
     @property
     def figures(self) -> BoardFigures:
-        """Counters and figures for diagnostics, over all connections."""
+        """Counters and other values for diagnostics; the counters continue over all connections."""
         source = self._obedience.source
         return shown.figures(self._ports, self._upkeep, self._translation, source, self.refusal)
 
@@ -136,14 +147,15 @@ class FejemisBoard(Board):
         self._obedience.begin()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Return the readings that ``data`` completes."""
+        """Decode ``data``, and return the readings from its complete lines."""
         self._open(now)
         self._inbound.receive(data, now, channel)
         self._inbound.look(now, driving=self.driving)
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines, and fail a running job, because the ports are closed."""
+        """Discard incomplete lines and end the running job as failed, because the ports are closed.
+        """
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
@@ -151,9 +163,10 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def silence(self) -> None:
-        """Forget the mode, switch brush and lift off, and subscribe to the boards' data again.
+        """Handle the silence of both boards.
 
-        Called when neither board sends data.
+        The mode becomes unknown, brush and lift are switched off, and the driver subscribes to all
+        data again.
         """
         self._inbound.mode = Mode.UNKNOWN
         for half in self._ports.halves:
@@ -163,19 +176,22 @@ class FejemisBoard(Board):
     def stalled(self) -> None:
         """Switch brush and lift off after a stall of the driver.
 
-        The guard process may already have switched them off during the stall. The time of the stall
-        is not regarded as silence of the boards.
+        The guard process may already have done so during the stall. The driver did not read during
+        the stall, so this time is not regarded as silence of the boards.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 
     def leave(self) -> None:
-        """Switch brush and lift off at once, because the driver ends; the wheels may stop later."""
+        """Switch brush and lift off at once, because the driver ends.
+
+        The driver may stop the wheels later.
+        """
         self._upkeep.machine.off()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Act on timeouts, and return the readings that result."""
+        """Check the timeouts, and return the readings that result, such as notices for the user."""
         self._open(now)
         self._inbound.look(now, driving=self.driving)
         return self._taken(now)
@@ -198,7 +214,7 @@ class FejemisBoard(Board):
         return self._actuator is not None and self._actuator.angle_told(angle_rad, now)
 
     def remark(self, text: str) -> None:
-        """Queue a notice that the user gets only once."""
+        """Queue a notice for the user that is shown only once."""
         self._told.remark(text)
 
     def reset_odometry(self) -> None:
@@ -215,7 +231,7 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Take a new order: latch the e-stop if the order is an e-stop, else release the e-stop."""
+        """Receive a new order: an e-stop is latched, and any other order releases the e-stop."""
         if not estop:
             self._obedience.release(self._now)
         elif not self._obedience.estopped:
@@ -225,26 +241,28 @@ class FejemisBoard(Board):
             self._upkeep.jobs.interrupt(why)
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """Return the two lines as packets, one for each board."""
+        """Return the packets that send one line to each board."""
         return self._ports.line("drive", drive) + self._ports.line("front", front)
 
     def stop(self) -> Packets:
-        """Return ``rc 2 0 0`` for both boards."""
+        """Return the packets that send the Stop line, ``rc 2 0 0``, to both boards."""
         return self._ports.both(STOP)
 
     def emergency_stop(self) -> Packets:
-        """Return ``stop`` for the drive board; for the front board, lines that stop brush and lift.
+        """Return ``stop`` for the drive board, and the lines that switch brush and lift off.
 
-        The front board does not have a ``stop`` command.
+        The front board has brush and lift, and does not know the command ``stop``.
         """
         return self._ports.ending("drive", b"stop") + self._all_off()
 
     def _all_off(self) -> Packets:
-        """Return the lines that switch lift and brush off."""
         return self._ports.ending("front", *OFF)
 
     def switch_off(self) -> Packets:
-        """Return lines that switch lift and brush off, and let the board show its own lights."""
+        """Return lines that switch brush and lift off.
+
+        The lines also let the front board show its own lights again.
+        """
         return self._ports.ending("front", *self._upkeep.machine.switch_off())
 
     def wake(self) -> Packets:
@@ -252,14 +270,17 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
-        """Forget faults of the front wheel, and cancel a requested power-off, even in an e-stop."""
+        """Forget faults of the front wheel, and cancel a requested power-off.
+
+        This happens whenever the user calls ~/start, even during an e-stop.
+        """
         self._encoder.follower.start()
         self._upkeep.jobs.keep_power()
 
     def start(self) -> Packets:
-        """Return a Stop and then ``start``; return no packets during an emergency stop.
+        """Return a Stop and then ``start``; return no packets during an e-stop.
 
-        The Stop comes first because after ``start`` the board may obey its last command again.
+        After ``start`` the board may obey its last motion command again. So the Stop comes first.
         """
         if self._obedience.estopped:
             return NO_PACKETS
@@ -269,7 +290,7 @@ class FejemisBoard(Board):
     def pause(self) -> Packets:
         """Return the packets that stop the motion and pause the drive board.
 
-        Brush and lift are switched off too.
+        The packets also switch brush and lift off.
         """
         self._obedience.pause()
         self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
@@ -277,13 +298,13 @@ class FejemisBoard(Board):
         return self.stop() + self.emergency_stop()
 
     def force_pause(self) -> Packets:
-        """Return the packets of ``pause``, which work in any mode."""
+        """Return the packets of ``pause``, which works in any mode."""
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two alternatives for the guard process: Stop, or emergency stop and then Stop.
+        """Return two alternatives for the guard process: Stop, or an emergency stop and then Stop.
 
-        The packets of each alternative also switch brush and lift off.
+        Both alternatives also switch brush and lift off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 
@@ -298,7 +319,7 @@ class FejemisBoard(Board):
         return min(wake_at, self._inbound.watch.wake_at) if self.mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:
-        """Return the packets to send now: relayed front angle, ``start``, and requests."""
+        """Return the packets to send now: the relayed front angle, ``start``, and requests."""
         packets = NO_PACKETS
         if (angle_rad := self._inbound.take_relay()) is not None:
             text = self._relay.text(angle_rad, sums=self.with_sums)

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parser of one line of text: keyword, numbers and their ranges.
+"""Parses one line of text into a message.
 
-A line is rejected as damaged if a field is missing, or a number is outside the range that the
-boards can measure. Extra fields are ignored, because newer firmware adds fields. Each line is
-parsed alone, and its checksum is checked elsewhere.
+A line is rejected as damaged if a field is missing, or if a number is outside the range that the
+boards can measure. Extra fields are ignored, because newer firmware adds fields.
+
+The module knows keywords, fields and ranges; it does not know checksums or other lines.
 """
 
 import math
@@ -46,21 +47,19 @@ TURN: Final[Range] = (-180.0, 180.0)
 SPEED: Final[Range] = (-10.0, 10.0)
 """Accepted range of the speed of a wheel's rim, in m/s."""
 RATE: Final[Range] = (-4000.0, 4000.0)
-"""Accepted range of a turn rate, in degrees per second; the gyros of such boards do not measure
-more."""
+"""Accepted range of a turn rate, in degrees per second. No gyro of such boards measures more."""
 FORCE: Final[Range] = (-320.0, 320.0)
 """Accepted range of the specific force, in m/s²; 320 m/s² are about 32 g."""
 FIELD: Final[Range] = (-5000.0, 5000.0)
 """Accepted range of the magnetic field, in µT."""
 ANGLE: Final[Range] = (-7.0, 7.0)
-"""Accepted range of an attitude angle, in rad; wide enough for any convention of wrapping."""
+"""Accepted range of roll, pitch and yaw, in rad. It includes both -π..π and 0..2π."""
 HEADING: Final[Range] = (-1e4, 1e4)
-"""Accepted range of a pose's heading, in rad; wide, because a board may count full turns."""
+"""Accepted range of a pose's heading, in rad. It is wide, because a board may count full turns."""
 VOLTS: Final[Range] = (-1.0, 60.0)
 AMPS: Final[Range] = (-100.0, 100.0)
 NEAR: Final[Range] = (-1.0, 100.0)
-"""Accepted range of a distance sensor's value, in m; a negative value reports a failed
-measurement."""
+"""Accepted range of a measured distance, in m. A negative value reports a failed measurement."""
 TIME: Final[Range] = (0.0, LONGEST_TIME_S)
 PLACE: Final[Range] = (-FARTHEST_M, FARTHEST_M)
 ANY: Final[Range] = (-1e10, 1e10)
@@ -87,13 +86,13 @@ def is_known(keyword: str) -> bool:
 
 
 def decimals_of(field: str) -> int:
-    """Return the count of characters after the decimal point; -1 if the field has no point."""
+    """Return how many characters follow the decimal point; -1 if the field has no point."""
     _, point, after = field.partition(".")
     return len(after) if point else -1
 
 
 def numbers(fields: list[str], *ranges: Range) -> list[float] | None:
-    """Return a number for each range; None if a field is missing, malformed or out of range.
+    """Return one number for each range; None if a field is missing, malformed or out of range.
 
     Extra fields are ignored.
     """
@@ -219,8 +218,7 @@ STATUS: Final = {
     "cpsteer": 1, "gyroo": 3, "acco": 3, "magw": 3, "mago": 3, "enc": 1, "mot": 1, "svp": 1,
     "svjt": 1, "tof1": 1, "gyroc": 1, "acccal2": 1, "brush": 1,
 }  # fmt: skip
-"""Keywords of status lines and of answers to requests, each with the least accepted count of
-numbers."""
+"""For each keyword of a status line or an answer: how many numbers the line must have at least."""
 WORDS: Final = ("id", "ver", "log", "confirm")
 _PARSERS: Final[dict[str, Parse]] = {
     "hbt": _heartbeat,

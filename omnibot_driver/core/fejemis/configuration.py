@@ -1,13 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The configuration stored on a board: the driver reads it, and writes the user's values to it.
+"""Reads the configuration that is stored on a board, and writes the user's values to the board.
 
-Written values are read back, and written again until the board reports them, at most ``TRIES``
-times. They are written at least once to each new or restarted board and after each change by the
-user, because the board may report rounded numbers, which hide a small difference. A number is
-accepted only when two readings in a row agree, because 1 in 99 damaged answers passes its checksum,
-and the driver computes the geometry with these numbers. The module knows which line requests which
-numbers.
+**Writing.** After a write, the driver reads the values back. It repeats the write until the board
+reports the wanted values, at most ``TRIES`` times. It writes at least once to each new or restarted
+board, and after each change by the user, even if the board already reports the values. The board
+may report rounded numbers, and rounding could hide a small difference.
+
+**Reading.** A number is accepted after two equal readings in a row. A single reading is not enough,
+because 1 in 99 damaged lines has a correct checksum, and the driver computes the robot's geometry
+from these numbers.
+
+The module knows which line requests which numbers; it does not know when the robot stands still.
 """
 
 import math
@@ -30,7 +34,10 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
     "drive": (b"confi", b"gyrooi", b"accoi", b"magoi", b"cpdrivei"),
     "front": (b"fwoi", b"cpsteeri", b"iri"),
 }
-"""Requests for the configuration, by board; both boards send ``confs`` by subscription."""
+"""Lines that request the configuration of each board.
+
+``confs`` is not in the list, because it is a subscribed stream.
+"""
 ON: Final[Mapping[Role, tuple[Written, ...]]] = {
     "drive": (Written.WHEELS, Written.STEERING, Written.MAGNETOMETER, Written.ACCELEROMETER),
     "front": (Written.STEERING, Written.FRONT_WHEEL, Written.INFRARED, Written.STEERING_GAINS),
@@ -38,25 +45,36 @@ ON: Final[Mapping[Role, tuple[Written, ...]]] = {
 EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
-"""Relative difference allowed when a number is read back, because boards print few digits."""
+"""Largest relative difference between a written number and the number that is read back.
+
+The numbers may differ because boards print few digits.
+"""
 DIGIT: Final = 6e-4
 
 
 class Configuration:
-    """Configuration of one board; ``told``: its confirmed numbers, by the keyword of their line."""
+    """Configuration of one board.
+
+    ``told``: the confirmed numbers, by the keyword of the line that reports them.
+    """
 
     def __init__(self, role: Role, written: Mapping[Written, tuple[float, ...]]) -> None:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """The last reported numbers by keyword, even if a second reading has not confirmed them."""
+        """Numbers of the last reading, by keyword. They may still lack the second, equal reading.
+        """
         self.turned = False
-        """Whether the board's ``confs`` begins with the track, which is last in the help text."""
+        """Whether the board's ``confs`` line begins with the track.
+
+        By the help text, the track comes last.
+        """
         self.written = written
         self.begin()
 
     def begin(self) -> None:
-        """Read all numbers and write the settings again: the board may have other values now."""
+        """Read all numbers and write all settings again, because the board may have other values.
+        """
         self.told.clear()
         self._once.clear()
         self._next_at = -math.inf
@@ -83,13 +101,14 @@ class Configuration:
 
     @property
     def pending(self) -> bool:
-        """Whether the board is new, so that it may lack the user's settings and must not drive."""
+        """Whether the board is new and may lack the user's settings, so that it must not drive."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new
 
     def due(self, now: float, *, stands: bool) -> list[bytes]:
-        """Return the lines to send now; settings are written only if the robot ``stands``."""
+        """Return the lines to send now; settings are written only while the robot ``stands`` still.
+        """
         if now < self._next_at:
             return []
         missing, unwritten = self._missing(), self._unwritten()
@@ -113,7 +132,7 @@ class Configuration:
         return [*texts, *(text for text in ASKED[self.role] if _KEY[text] in keys)]
 
     def hear(self, message: Message) -> None:
-        """Take a message that may report part of the configuration."""
+        """Receive a message; store its numbers if they are part of the configuration."""
         match message:
             case WheelConfiguration():
                 key, numbers = "conf", message.numbers
@@ -139,7 +158,8 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        Track and wheelbase are those that the user has set, unless the board reports other values.
+        The user's values are returned unless the board has reported different ones. They are exact,
+        and the board's numbers are rounded.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):
@@ -179,7 +199,8 @@ def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
 
 
 def _near(told: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
-    """Return whether the numbers read from the board equal the wanted ones, except for rounding."""
+    """Return whether the numbers that the board reports equal the wanted ones, except for rounding.
+    """
     return len(told) >= len(wanted) and all(
         abs(one - other) <= max(DIGIT, NEAR * abs(other))
         for one, other in zip(told, wanted, strict=False)
@@ -199,5 +220,5 @@ _REPORT: Final[Mapping[Written, str]] = {
     Written.ACCELEROMETER: "acco",
     Written.STEERING_GAINS: "cpsteer",
 }
-"""For each setting: the keyword of the line that reports the setting."""
+"""For each setting: the keyword of the line that reports it."""
 _SHOWN: Final = frozenset(_KEY.values())

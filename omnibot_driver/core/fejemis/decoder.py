@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Decoder of one board's bytes: splits lines, checks their checksums (sums), counts damaged lines.
+"""Splits the bytes from one board into lines, checks the lines, and counts the damaged ones.
 
-The manual shows lines without sums, but the public host programs send lines with sums. With the
-setting ``auto`` the decoder accepts both kinds until heartbeats show which kind the board uses;
-from then on it accepts only that kind. The decoder also checks decimals: the boards print each
-number with a fixed count of decimals, so a line whose decimals differ from earlier lines of its
-kind is damaged (``forms.py``).
+**Checksums.** The manual shows lines without checksums, but the public host programs send and
+expect them. With the setting ``auto``, the decoder accepts both kinds until the first heartbeat
+shows which kind the board uses. After that, the decoder accepts only lines of this kind.
+
+**Decimals.** The boards print each number with a fixed count of decimals. If the decimals of a line
+differ from earlier lines with the same keyword, the line is damaged (``forms.py``).
 
 The decoder does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
 bytes between calls, and looks at each byte a bounded number of times.
@@ -24,13 +25,18 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""Number of heartbeats in a row that prove that the board began or ceased to send sums. A single
-heartbeat may be damaged."""
+"""How many heartbeats in a row prove that the board began or ceased to send checksums.
+
+A single heartbeat may be damaged.
+"""
 
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counts since construction; ``faults``: lines that were damaged or of unknown kind."""
+    """Counts since construction.
+
+    ``faults``: how many lines were damaged or of an unknown kind.
+    """
 
     lines: int = 0
     faults: int = 0
@@ -39,12 +45,16 @@ class DecoderStatistics:
 
 
 class FejemisDecoder:
-    """Decoder of one board's lines; ``sums``: whether the lines have sums, None while unknown.
+    """Decoder of the lines from one board.
 
-    ``changed``: whether the lines began or ceased to have sums; the caller resets this flag.
-    ``doubtful``: whether the last line did not agree with ``sums``; lines to the board are then
-    sent without a sum. ``contradicted``: whether the last line contradicts the setting
-    ``line_sums``.
+    ``sums``: whether the board's lines have checksums; None while unknown.
+
+    ``changed``: whether the board began or ceased to send checksums. The caller resets this flag.
+
+    ``doubtful``: whether the last line did not agree with ``sums``. Until a line agrees again, the
+    driver sends lines without checksums to the board.
+
+    ``contradicted``: whether the last line contradicts the setting ``line_sums``.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:
@@ -52,13 +62,13 @@ class FejemisDecoder:
         self.changed = self.doubtful = self.contradicted = False
         self._held = b""
         self._cut = False
-        """Whether the line that is being received is already too long."""
+        """Whether the beginning of the present line was discarded because the line is too long."""
         self._forms = Forms()
         self.line_sums = line_sums
 
     @property
     def line_sums(self) -> LineSums:
-        """The setting: lines have sums (on), have no sums (off), or heartbeats decide (auto)."""
+        """The user's setting: checksums are on or off, or the heartbeats decide (auto)."""
         return self._line_sums
 
     @line_sums.setter
@@ -68,7 +78,7 @@ class FejemisDecoder:
         self._otherwise = 0
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """Return the messages that ``data`` completes, in order of arrival."""
+        """Return the messages that are complete with ``data``, in order of arrival."""
         *lines, rest = (self._held + data).split(b"\n")
         found = []
         for line in lines:
@@ -115,7 +125,7 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """Learn from a heartbeat, which comes without a request, whether lines have sums."""
+        """Learn from a heartbeat whether the board's lines have checksums."""
         if self._line_sums != "auto":
             self.contradicted = with_sum is not self.sums
             return

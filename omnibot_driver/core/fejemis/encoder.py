@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Converts an order into lines for both boards, given the front wheel's angle.
+"""Converts an order into motion lines for both boards, with regard to the front wheel's angle.
 
-The caller calls ``meaning`` with all packets that it sends. In this call, the encoder notes the
-angle that the front wheel must reach, and whether the drive board's speed is limited. The module
-knows geometry and lines, not when the lines are sent.
+The caller passes all packets that it sends to ``meaning``. From them the encoder notes which angle
+the front wheel must reach, and whether the drive board's speed is limited.
+
+The module knows geometry and lines; it does not know when lines are sent.
 """
 
 from typing import Protocol
@@ -38,7 +39,7 @@ class Pair(Protocol):
 
     @property
     def geometry(self) -> Geometry:
-        """Track B and wheelbase F, in m."""
+        """Track B and wheelbase F of the robot, in m."""
 
     @property
     def front_angle_rad(self) -> float | None:
@@ -51,22 +52,20 @@ class Pair(Protocol):
         """Return the packets of the boards' own emergency stop."""
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """Return the two lines as packets, one for each board."""
+        """Return the packets that send one line to each board."""
 
     @property
     def with_sums(self) -> bool:
         """Whether lines to both boards carry checksums."""
 
     def remark(self, text: str) -> None:
-        """Queue a notice that the user gets only once."""
+        """Queue a notice for the user that is shown only once."""
 
 
 class Encoder:
     """Encoder of orders.
 
-    ``held``: whether the speed is limited until the front wheel is at its angle. ``restless``:
-    whether to send the lines again with each front angle: while the speed is limited, and always if
-    lines have no checksums, so that a damaged line is replaced after 15 ms.
+    ``held``: whether the speed is limited because the front wheel has not reached its angle.
     """
 
     def __init__(self, pair: Pair, settings: FejemisSettings) -> None:
@@ -83,7 +82,11 @@ class Encoder:
 
     @property
     def restless(self) -> bool:
-        """Whether to send the lines again with the next angle of the front wheel."""
+        """Whether to send the motion lines again after each new angle of the front wheel.
+
+        This is so while the speed is limited, and always if lines have no checksums. Then a damaged
+        line is replaced after 15 ms.
+        """
         return self.held or not self._pair.with_sums
 
     def stop(self) -> Packets:
@@ -108,8 +111,8 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the body twist that ``packets`` command at the present front angle.
 
-        The encoder also notes that ``packets`` are sent. The twist is zero unless ``packets`` are
-        the last result of ``encode`` for an order to move.
+        The encoder also notes that ``packets`` are sent. If ``packets`` are not the last motion
+        that ``encode`` returned, they are regarded as a stop, and the twist is zero.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -1,23 +1,28 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Check that the front wheel follows its commanded angle; if not, motion is refused.
+"""Checks that the front wheel follows its commanded angle, and refuses motion if it does not.
 
-Without the refusal, a node that continues to send commands would move the robot again and again,
-each time for a second. After a first fault, motion is refused until the wheel has moved; after a
-second fault within 60 s, until ~/start is called. The module knows only angles and times.
+After a first fault, motion is refused until the wheel has moved. After a second fault within 60 s,
+motion is refused until the user calls ~/start. Without this refusal, a node that continues to send
+commands would move the robot again and again, for a second each time.
+
+The module knows angles and times; it does not know lines or speeds.
 """
 
 import math
 from typing import Final
 
 FOLLOWS_WITHIN_S: Final = 1.0
-"""Time in s within which the front wheel must get nearer to its commanded angle; otherwise a fault
-is found."""
+"""Time in s within which the front wheel must come nearer to its commanded angle.
+
+If the wheel comes no nearer within this time, it has a fault.
+"""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
-"""Deviation from the commanded angle, in rad, that is tolerated while the robot drives."""
+"""Tolerated deviation of the front wheel from its commanded angle, in rad, while the robot drives.
+"""
 MOVED_RAD: Final = math.radians(3.0)
-"""Angle in rad by which a stuck wheel must turn before motion is allowed again."""
+"""Angle in rad by which a stuck wheel must turn before the robot may move again."""
 AGAIN_WITHIN_S: Final = 60.0
 UNTIL_IT_MOVES: Final = (
     "the front wheel did not go where it was commanded; check the servo and its power. Motion is"
@@ -30,9 +35,9 @@ UNTIL_START: Final = (
 
 
 class Follower:
-    """Check of the front wheel.
+    """The check of the front wheel.
 
-    ``refusal``: the reason why the robot must not be driven; empty if driving is allowed.
+    ``refusal``: why the robot must not be driven; empty if driving is allowed.
     """
 
     def __init__(self) -> None:
@@ -52,11 +57,11 @@ class Follower:
         self.refusal, self._fault_at = "", -math.inf
 
     def aim(self, angle_rad: float, within_rad: float = FOLLOWS_RAD) -> None:
-        """Set the angle that the wheel must reach, and the allowed deviation, in rad."""
+        """Set the angle that the wheel must reach, and its allowed deviation, both in rad."""
         self._angle_rad, self._within_rad = angle_rad, within_rad
 
     def look(self, angle_rad: float, now: float) -> bool:
-        """Take the measured angle, in rad; return True if a new fault of the wheel is found.
+        """Receive the measured angle in rad; return whether a new fault of the wheel is found.
 
         The fault is that the wheel does not follow its commanded angle.
         """

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The form of each kind of line: how many fields, and how many decimals each number has.
+"""Learns the form of each kind of line: how many fields it has, and how many decimals each field.
 
-A board prints all lines of one kind in the same form, so a line in another form has lost or gained
-characters. The form of each kind is learnt from its lines; a new form replaces the learnt one after
-three lines in a row. A kind whose form keeps changing is not checked. The module does not know the
-meaning of a line.
+A board prints all lines of one kind in the same form. So a line in another form has lost or gained
+characters. After three lines in a row with the same new form, this form replaces the learnt one. A
+kind of line whose form keeps changing is no longer checked.
+
+The module knows forms; it does not know the meaning of a line.
 """
 
 from typing import Final
@@ -13,18 +14,19 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Number of lines with another form, in ``OF`` lines of a kind, after which the form is no longer
-checked.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: how often the form may vary before it is no longer checked.
 
-For lines with a correct sum, ``VARIES`` applies: they are rarely damaged, so fewer such lines show
-that the board itself varies the form."""
+The number counts lines in another form, among ``OF`` lines of one kind. ``VARIES`` is for lines
+with a correct checksum. Such lines are rarely damaged, so fewer of them show that the board itself
+varies the form.
+"""
 OF: Final = 24
 
 Form = tuple[int, ...]
 
 
 class Forms:
-    """The learnt forms, by keyword."""
+    """The learnt form of each kind of line, by the keyword of the line."""
 
     def __init__(self) -> None:
         self._kinds: dict[bytes, _Kind] = {}
@@ -32,7 +34,7 @@ class Forms:
     def admit(self, text: bytes, *, summed: bool) -> bool:
         """Return whether the line has the form of its kind.
 
-        ``summed``: whether the line has a correct sum.
+        ``summed``: whether the line has a correct checksum.
         """
         keyword, *fields = text.split()
         form = tuple(map(_shape, fields))
@@ -43,8 +45,6 @@ class Forms:
 
 
 class _Kind:
-    """The learnt form of one keyword."""
-
     def __init__(self, form: Form) -> None:
         self._form = self._other = form
         self._others = self._seen = self._strange = 0
@@ -70,7 +70,7 @@ class _Kind:
 
 
 def _shape(field: bytes) -> int:
-    """Return the count of decimals; -1 for a whole number, -2 for a field that is not a number."""
+    """Return how many decimals the field has; -1 for a whole number, -2 if it is not a number."""
     whole, point, after = field.partition(b".")
     if not point:
         return -1 if whole.lstrip(b"+-").isdigit() else -2

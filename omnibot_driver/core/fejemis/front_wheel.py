@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of the front wheel: whether the angle is known, and whether its sensor works.
+"""Checks each reported angle of the front wheel, and whether the angle sensor works.
 
-The module knows angles, the sensor's status bits and times, not what is commanded.
+The module knows angles, times and the sensor's status bits; it does not know the commanded angle.
 """
 
 import math
@@ -11,16 +11,18 @@ from typing import Final
 from omnibot_driver.core.fejemis.messages import FrontAngle
 
 OLDEST_S: Final = 0.06
-"""Age of the last angle, in s, above which the robot is stopped: four periods of ``fwl``."""
+"""Age of the last angle, in s, above which the robot is stopped: four periods of ``fwl`` lines."""
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
-"""Mask of the diagnosis bits that are checked: all but the frame counter."""
+"""Mask of the diagnosis bits that are checked: all bits except the frame counter."""
 SICK_LINES: Final = 3
-"""Number of lines in a row that must report a fault before the sensor is regarded as faulty. A
-single line may be damaged."""
+"""How many lines in a row must report a fault before the sensor is regarded as faulty.
+
+A single line may be damaged.
+"""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""Accepted jump of the angle in degrees, in addition to the motion of the fastest servo."""
+"""Jump of the angle, in degrees, that is accepted in addition to ``FASTEST_DEGPS``."""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -34,18 +36,20 @@ BITS: Final = (
     (1, True, "magneto core loops not finished"),
     (0, False, "supply in 5 V mode"),
 )
-"""For each diagnosis bit (manual, fwl): number, value without a fault, and name of the fault."""
+"""For each diagnosis bit (manual, fwl): its number, its value without a fault, the fault's name."""
 
 
 class FrontWheel:
-    """State of the front wheel; ``angle_rad``: last accepted angle, NaN before the first.
+    """State of the front wheel.
 
-    ``heard_at``: when that angle came, in s.
+    ``angle_rad``: the last accepted angle in rad; NaN before the first.
+
+    ``heard_at``: time in s at which this angle arrived.
     """
 
     def __init__(self) -> None:
         self.refused = 0
-        """Count of angles that were rejected because the wheel cannot have reached them."""
+        """How many angles were rejected because the wheel cannot have reached them."""
         self.begin()
 
     def begin(self) -> None:
@@ -59,7 +63,7 @@ class FrontWheel:
 
     @property
     def trouble(self) -> str:
-        """Faults of the angle sensor, as a sentence with advice; empty while the sensor works."""
+        """Faults of the angle sensor as a sentence with advice; empty while the sensor works."""
         if not self.fault:
             return ""
         return (
@@ -69,24 +73,24 @@ class FrontWheel:
 
     @property
     def stale_at(self) -> float:
-        """Time in s at which the last angle becomes too old, unless a new angle comes earlier."""
+        """Time in s at which the last angle becomes too old, if no new angle arrives before."""
         return self.heard_at + OLDEST_S + 1e-6
 
     @property
     def drives_by_rad(self) -> float:
-        """Front angle to relay to the drive board, in rad, limited to ±90°.
+        """Angle in rad that is relayed to the drive board, limited to ±90°.
 
-        Beyond 90°, by the manual's equations, the drive board's inner wheel would be faster than
-        the outer one.
+        Beyond 90°, by the manual's equations, the drive board would drive its inner wheel faster
+        than the outer one.
         """
         return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
 
     def known(self, now: float) -> bool:
-        """Return whether the angle sensor works, and its last angle is recent enough to drive."""
+        """Return whether the angle sensor works and its last angle is recent enough for driving."""
         return not self.fault and now - self.heard_at <= OLDEST_S
 
     def hear(self, told: FrontAngle, now: float) -> bool:
-        """Take an angle from the front board; return whether the angle is accepted."""
+        """Receive an angle from the front board; return whether the angle is accepted."""
         words = complaints(told)
         self._sick = self._sick + 1 if words else 0
         if words:
@@ -103,8 +107,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        Also return True if the previous angle was rejected and is near this one: two such angles
-        confirm a jump.
+        A jump is believed when two angles in a row confirm it: the previous angle was rejected, and
+        this angle is near it.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

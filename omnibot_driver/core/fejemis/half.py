@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One of the two Teensy boards (a half), at one port: identity, streams and silence.
+"""One of the two Teensy boards, called a half: its identity, its data streams and its silence.
 
-The driver subscribes to the board's streams, and subscribes again when a stream does not come: the
-subscription may be lost, and a board that restarts forgets all subscriptions. The module knows
-lines and times, not what a message is used for.
+The driver subscribes to the board's streams. It subscribes again if a stream does not arrive,
+because the subscription may be lost, and a board that restarts forgets all subscriptions.
+
+The module knows lines and times; it does not know what a message is used for.
 """
 
 import math
@@ -25,7 +26,7 @@ from omnibot_driver.core.fejemis.teensy_clock import EARLY_S, TeensyClock
 
 Role = Literal["drive", "front"]
 ROLES: Final[Mapping[int, Role]] = {90: "drive", 91: "front"}
-"""For each identity in a heartbeat (manual, Meta info): the role of the board."""
+"""The role of a board, by the identity in its heartbeats (manual, Meta info)."""
 STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
     "drive": {
         "hbt": 400, "pose": 20, "vel": 20, "gyro": 10, "acc": 10, "imupose": 20, "mag": 100,
@@ -33,19 +34,20 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
     },
     "front": {"hbt": 400, "fwl": 15, "ir": 100, "confs": 200},
 }  # fmt: skip
-"""Subscribed streams of each board, with their periods in ms.
+"""The streams to subscribe to on each board, with their periods in ms.
 
-``confs`` is subscribed, not requested: if the request ``confsi`` loses its last letter, the board
-reads it as a command that sets the geometry to zero."""
+``confs`` is a stream, although its numbers rarely change. It is not requested with ``confsi``: if
+this line loses its last letter, the board reads it as a command that sets the geometry to zero.
+"""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
-"""For each board: the stream without which the robot must not be driven."""
+"""The stream of each board without which the robot must not be driven."""
 TOGETHER: Final = ("gyro", "acc")
-"""Streams subscribed in one packet, so that the board sends both in the same cycle."""
+"""Streams that are subscribed in one packet, so that the board sends both in the same cycle."""
 AGAIN_S: Final = 0.5
 ASK_AGAIN_S: Final = 0.1
-"""Time between two requests for the heartbeat in s, while a restart cannot be ruled out."""
+"""Time in s between two requests for the heartbeat, while the board may have restarted."""
 MANY: Final = 30
-"""Number of damaged or unknown lines per second above which the user is notified.
+"""How many damaged or unknown lines per second are tolerated before the user is notified.
 
 A board sends a few hundred lines per second.
 """
@@ -55,28 +57,33 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
 class Half:
-    """State of one board; ``identity``: as in its heartbeats, None before the first heartbeat.
+    """State of one board.
 
-    ``restarted``: whether the board has restarted; the caller resets this flag.
+    ``identity``: the identity in its heartbeats; None before the first heartbeat.
 
-    If the needed stream pauses, the board may have restarted; the line that reports the restart may
-    be lost. The half is then unsure until a heartbeat shows that the board's time has continued.
+    ``restarted``: whether the board has restarted. The caller resets this flag.
+
+    ``heard_at``: time in s of the last valid line.
+
+    If the needed stream pauses, the board may have restarted, and the line that reports the restart
+    may be lost. So the half is ``unsure`` until a heartbeat shows that the board's time has
+    continued.
     """
 
     def __init__(self, line_sums: LineSums) -> None:
         self.statistics = DecoderStatistics()
         self.clock = TeensyClock()
         self.unknown_words: dict[str, None] = {}
-        """Lines of the driver that the firmware does not know."""
+        """Lines from the driver that the firmware does not know."""
         self.rejected = 0
-        """Count of the driver's lines that the board rejected as damaged."""
+        """How many lines from the driver the board has rejected as damaged."""
         self.identity: int | None = None
         self.role: Role | None = None
-        """Role of the board; None while unknown, or if the identity belongs to neither role."""
+        """Role of the board; None while the identity is unknown or not one of ``ROLES``."""
         self.begin(line_sums)
 
     def begin(self, line_sums: LineSums) -> None:
-        """Begin a new connection; the role is kept until a heartbeat contradicts it."""
+        """Begin a new connection. The role stays until a heartbeat contradicts it."""
         self.decoder = FejemisDecoder(line_sums)
         self.decoder.statistics = self.statistics
         self.unknown_words.clear()
@@ -84,8 +91,7 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the stream in ``NEEDED`` arrives, and the board has not restarted since the
-        stream began."""
+        """Whether the ``NEEDED`` stream arrives and the board has not restarted since."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -101,15 +107,15 @@ class Half:
 
     @property
     def sums(self) -> bool:
-        """Whether lines to the board have a sum."""
+        """Whether lines to the board carry a checksum."""
         return bool(self.decoder.sums) and not self.decoder.doubtful
 
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        A message may change the state of the half: if it shows a restart, the half forgets earlier
-        times of the board. Messages with an implausible board time are left out, and so are poses
-        before the first heartbeat.
+        This order matters, because a message can change the half: if it shows a restart, the half
+        forgets the earlier times of the board. Messages with an implausible board time are left
+        out. Poses before the first heartbeat are left out too.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):
@@ -117,7 +123,7 @@ class Half:
 
     @property
     def unknown_streams(self) -> list[str]:
-        """Subscribed streams that the firmware does not know."""
+        """Streams that the firmware does not know."""
         if self.role is None:
             return []
         streams = STREAMS[self.role]
@@ -126,7 +132,7 @@ class Half:
     def not_understood(self, now: float) -> bool:
         """Return whether many recent lines were damaged or unknown; True at most once a second.
 
-        Called after each read.
+        The caller calls this after each read.
         """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults
@@ -136,15 +142,16 @@ class Half:
         return True
 
     def came_at(self, keyword: str) -> float:
-        """Return the time of the last line with ``keyword``, in s; -infinity before the first."""
+        """Return when the last line with ``keyword`` arrived, in s; -infinity before the first."""
         return self._at.get(keyword, -math.inf)
 
     def note(self, keyword: str, now: float) -> None:
-        """Record that a line with this ``keyword`` came."""
+        """Record that a line with this ``keyword`` arrived."""
         self._at[keyword] = now
 
     def subscribe_again(self) -> None:
-        """Subscribe to all streams again: the board may have forgotten its subscriptions."""
+        """Subscribe to all streams again, because the board may have forgotten its subscriptions.
+        """
         self._at = {key: at for key, at in self._at.items() if key == "hbt"}
         self._next_at = -math.inf
         self.ready = False
@@ -217,7 +224,8 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """Accept the first identity at once, a different identity only if two heartbeats agree."""
+        """Accept the first identity at once, and a different identity after two equal heartbeats.
+        """
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self.identity:
@@ -246,7 +254,7 @@ class Half:
 
 
 def keyword_of(message: Message) -> str:
-    """Return the keyword of a message's stream; empty if the message belongs to no stream."""
+    """Return the keyword of the message's stream; empty if the message belongs to no stream."""
     if isinstance(message, Distance):
         return message.keyword
     return _KEYWORDS.get(type(message).__name__, "")

@@ -1,12 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Converts pairs of gyro and acceleration lines, which carry no time, into samples with timestamps.
+"""Computes when the board took each sample of its IMU, and converts the sample to SI units.
 
-The board measures turn rate and acceleration every ``PERIOD_S`` of its own clock, and sends both
-together. So samples are counted, and a sample's time is a phase plus a whole number of periods. The
-phase and this number follow from the arrival times: a sample cannot arrive before its time, and a
-sample that comes after a pose in the stream is not older than the pose. `imu_pairs.py` finds the
-pairs.
+The gyro and acceleration lines carry no time. The board takes a sample every ``PERIOD_S`` of its
+own clock, and sends both lines together. So the time of a sample is a start time (the phase) plus a
+whole number of periods. The module finds both from the arrival times, by two rules:
+
+- A sample cannot arrive before its own time.
+- A sample that arrives after a pose is not older than the pose.
+
+The module knows pairs of lines and times; it does not know how the pairs are found
+(``imu_pairs.py``).
 """
 
 import math
@@ -22,18 +26,21 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Interval between the arrivals of two late samples, in periods, above which a sample was lost.
 
-Both samples are late by a period or more. If nothing was lost and both samples had waited for a
-stalled host, they would have arrived at once."""
+Both samples arrive a period or more late. There are two possible causes. If the samples waited for
+a stalled host, they arrive at once. If they arrive at an interval, an earlier sample was lost.
+"""
 CYCLE_S: Final = 0.0015
-"""Longest assumed time in s that one control cycle takes to send its lines, in any order."""
+"""Longest assumed time in s in which the board sends all lines of one control cycle."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 
 
 class ImuSamples:
-    """Samples of the IMU in SI units; ``unit``: unit of the acceleration lines.
+    """Converts samples of the IMU.
 
-    ``rates``, ``forces``: the last sample in rad/s and m/s², NaN before the first.
+    ``unit``: unit of the acceleration lines.
+
+    ``rates``, ``forces``: the last sample in rad/s and in m/s²; NaN before the first.
     """
 
     def __init__(self, unit: AccelerationUnit) -> None:
@@ -43,7 +50,7 @@ class ImuSamples:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the count and the phase, because the board's streams start again."""
+        """Forget the phase and the count of periods, because the board's streams start again."""
         self._count = 0
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
@@ -52,7 +59,7 @@ class ImuSamples:
         self._delay_s = 0.0
 
     def reading(self, pair: Pair) -> ImuReading:
-        """Convert a pair of lines to SI units."""
+        """Convert a pair of lines to a reading in SI units."""
         gyro, acceleration = pair.gyro, pair.acceleration
         scale = STANDARD_GRAVITY if self.unit == "g" else 1.0
         self.rates = math.radians(gyro.x), math.radians(gyro.y), math.radians(gyro.z)
@@ -60,11 +67,13 @@ class ImuSamples:
         return ImuReading(self.forces, self.rates)
 
     def sampled_s(self, arrived_s: float, not_before_s: float, skipped: int) -> float:
-        """Return the board's time of the next sample, in s.
+        """Return when the board took the next sample, as a time of the board's clock in s.
 
-        ``arrived_s``: the sample's arrival in the board's time. ``not_before_s``: the board's time
-        of the pose that came before the sample. ``skipped``: count of samples that were left out
-        before this one.
+        ``arrived_s``: when the sample arrived, as a time of the board's clock.
+
+        ``not_before_s``: time of the last pose that arrived before the sample.
+
+        ``skipped``: how many incomplete samples were left out before this one.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -87,9 +96,9 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Set the phase to the latest value for which no sample arrives before its own time.
+        """Set the phase as late as possible, but so that no sample arrives before its own time.
 
-        The samples are those of the last ``PHASE_BLOCKS`` blocks of arrivals.
+        Only samples of the last ``PHASE_BLOCKS`` blocks of arrivals count.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

@@ -1,22 +1,24 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pairs gyro and acceleration lines, which carry neither time nor number, into samples of the IMU.
+"""Combines gyro and acceleration lines into samples of the IMU.
 
-The board sends both lines of a sample in one cycle, always in the same order, every ``PERIOD_S``. A
-pair is a first line and the second line that follows it, even if late, without another gyro or
-acceleration line between them. If the second line of one sample and the first line of the next
-sample are both lost, the two remaining lines look like a pair. Three observations reveal such a
-false pair:
+The lines carry neither time nor number. The board sends both lines of a sample in one cycle, always
+in the same order, every ``PERIOD_S``. A first line and the next second line form a pair if no other
+gyro or acceleration line comes between them. This is so even if the second line is late.
 
-- between its two lines comes a line of a kind that never comes within a pair;
-- its second line comes ``PAIR_WITHIN_S`` or more after the first. Such a pair waits for the next
-  pose: the times of two poses tell how many samples lie between them;
-- a pose follows in the same read, and its time shows that fewer lines came since the previous pose
-  than the board has sent. So a pair is returned only at this pose, or at the end of its read.
+A pair is false if its lines are of different samples. This happens if the second line of one sample
+and the first line of the next sample are both lost. Three observations show a false pair:
 
-One case remains undetected: the lines come late, but less than ``PAIR_WITHIN_S`` apart, and no pose
-follows in the read that completes the pair. Until the order of the two lines is known, some samples
-are left out.
+- A line of another kind comes between its two lines, and this kind does not usually come there.
+- The second line comes ``PAIR_WITHIN_S`` or more after the first. Such a pair waits for the next
+  pose: the times of two poses tell how many samples lie between them.
+- The next pose comes in the same read, and shows that lines are missing since the previous pose. So
+  a pair is returned at this pose, or at the end of its read.
+
+One false pair remains undetected: its lines come less than ``PAIR_WITHIN_S`` apart because they are
+late, and the read that completes the pair has no later pose.
+
+Some samples are left out at the beginning, until the order of the two lines is known.
 """
 
 import itertools
@@ -31,37 +33,44 @@ Kind = Literal["gyro", "acc"]
 
 PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
-"""Longest allowed delay in s between two lines that are accepted as a pair without further
-evidence."""
+"""Longest time in s between the two lines of a pair that needs no further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limit of the evidence, in s, that shows which line of a sample comes first.
+"""``KNOWN_S``, ``SUREST_S``: how much evidence, in s, decides the order, and the largest evidence.
 
-The evidence is the sum of the pauses before gyro lines, minus the sum of those before acceleration
-lines: the pause before the first line of a sample is longer. From ``KNOWN_S`` on, the order is
-known.
+The evidence shows which line of a sample comes first: the line with the longer pauses before it. It
+is the sum of the pauses before gyro lines minus the sum of those before acceleration lines.
 """
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that is added to the pause between a gyro and an acceleration line if another
-periodic line comes in this pause. That line shows that a control cycle has ended in the pause."""
-PATIENCE: Final = 60
-"""Count of lines after which the order is decided even if the evidence is weak.
+"""Evidence in s that is added if a line of another kind comes in the pause.
 
-Neither order gains evidence if the board sends both lines half a period apart."""
+Such a line shows that a control cycle has ended in the pause.
+"""
+PATIENCE: Final = 60
+"""How many pauses are measured before the order is decided even with weak evidence.
+
+If the board sends both lines half a period apart, the evidence stays weak.
+"""
 MOST: Final = 10
-"""Limit of a number that is kept for each kind of line: the count of lines that came outside of
-pairs, minus the count of lines that came within pairs."""
+"""Limit of the numbers in ``_outside``, upwards and downwards."""
 UNPOSED: Final = 20
-"""Largest count of gyro or acceleration lines for which a pair waits for the next pose; after more
-lines, the pair is rejected."""
+"""How many gyro or acceleration lines may come while a pair waits for the next pose.
+
+After more lines, the pair is rejected.
+"""
 
 
 @dataclass(slots=True)
 class Pair:
-    """A gyro and an acceleration line, probably of one sample; ``at``: when the second line came.
+    """A gyro and an acceleration line, probably of one sample.
 
-    ``pose_s``: the board's time of the last pose before the pair. ``skipped``: count of incomplete
-    samples before the pair. ``doubtful``: whether the pair must wait for a pose.
+    ``at``: time in s at which the second line arrived.
+
+    ``pose_s``: time of the last pose before the pair, by the board's clock.
+
+    ``skipped``: how many incomplete samples were left out before the pair.
+
+    ``doubtful``: whether the pair must wait for a pose.
     """
 
     gyro: Gyro
@@ -85,35 +94,35 @@ class ImuPairs:
     def begin(self) -> None:
         """Forget all lines and their order, because the board's streams start again."""
         self.first: Kind | None = None
-        """The keyword of a sample's first line; None while unknown."""
+        """The keyword of the line that comes first in a sample; None while unknown."""
         self._evidence_s = 0.0
-        """Evidence in s that gyro lines come first; if negative, that acceleration lines do."""
+        """The evidence of the order, in s: positive if gyro lines come first, else negative."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
         self._between: set[str] = set()
-        """The kinds of lines that have come since the last gyro or acceleration line."""
+        """The kinds of lines that arrived since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
-        """For each other kind of line: count of lines outside of pairs, minus count within
-        pairs."""
+        """For each other kind of line: how many came outside of pairs, minus how many within."""
         self._skipped = 0
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
         self._counts: dict[Kind, int] = {"gyro": 0, "acc": 0}
-        """Count of lines since the last pose, by kind."""
+        """How many gyro and acceleration lines arrived since the last pose."""
 
     def gyro(self, gyro: Gyro, now: float) -> None:
-        """Take a gyro line."""
+        """Receive a gyro line."""
         self._line("gyro", gyro, now)
 
     def acceleration(self, acceleration: Acceleration, now: float) -> None:
-        """Take an acceleration line."""
+        """Receive an acceleration line."""
         self._line("acc", acceleration, now)
 
     def other(self, kind: str) -> None:
-        """Take a line of a ``kind`` other than gyro and acceleration.
+        """Receive a line that is neither a gyro nor an acceleration line; ``kind``: its keyword.
 
-        The board sends such lines with every second sample.
+        If lines of this kind do not usually come within a pair, the present pair has lost its
+        second line.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -121,12 +130,12 @@ class ImuPairs:
             self._skipped += 1
 
     def attitude(self, attitude: Attitude, now: float) -> None:
-        """Take an orientation; ``take`` returns it after all pairs that came before it."""
+        """Receive an orientation; ``take`` returns it after all pairs that came before it."""
         self.other("imupose")
         self._queue.append((attitude, now))
 
     def pose(self, time_s: float) -> None:
-        """Take the board's time of a pose, and decide on the pairs since the previous pose."""
+        """Receive the board's time of a pose, and decide on the pairs since the previous pose."""
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
         if abs(periods) < 0.5:
@@ -141,9 +150,9 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return the decided pairs and the orientations among them, in order of arrival.
+        """Return the decided pairs and the orientations, in order of arrival.
 
-        Called after a pose and at the end of a read.
+        The caller calls this after a pose and at the end of a read.
         """
         taken: list[Pair | Oriented] = []
         while self._queue:
@@ -157,7 +166,7 @@ class ImuPairs:
         return taken
 
     def _reject(self, pair: Pair) -> None:
-        """Remove a pair whose two lines are probably of different samples."""
+        """Remove a false pair, and count its two lines as two incomplete samples."""
         at = next(at for at, item in enumerate(self._queue) if item is pair)
         del self._queue[at]
         lost = pair.skipped + 2
@@ -211,7 +220,8 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Record that lines of these ``kinds`` came outside (``step`` 1) or within (-1) a pair."""
+        """Record that lines of these ``kinds`` came outside of a pair (``step`` 1) or within (-1).
+        """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))
 

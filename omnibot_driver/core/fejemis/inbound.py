@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Handler of all messages: passes each to the parts that use it, and keeps the robot's mode.
+"""Handles all messages: passes each message to the parts that use it, and keeps the robot's mode.
 
-The handler notices restarts, faults and pauses of the boards, which stop the robot. The module does
-not know bytes, nor how lines to the boards are written.
+If a message shows a restart or a fault of a board, or if a board pauses, the module stops the
+robot. The module knows messages and times; it does not know how lines are written.
 """
 
 from collections.abc import Callable
@@ -20,15 +20,19 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""Function that takes the front angle in rad and the time in s, and returns whether the wheel fails
-to follow its commanded angle."""
+"""Receives the front wheel's angle in rad and the time in s.
+
+The function returns whether a new fault is found: the wheel does not follow its commanded angle.
+"""
 
 
 class Inbound:
-    """Handler of all messages; ``mode``: nominal while both boards send and the drive board obeys.
+    """Handler of all messages.
 
-    ``relay_rad``: an angle of the front wheel, in rad, to be relayed to the drive board, or None;
-    see ``take_relay``.
+    ``mode``: nominal while both boards send data and the drive board obeys.
+
+    ``relay_rad``: the front wheel's angle in rad that is still to be relayed to the drive board, or
+    None.
     """
 
     def __init__(
@@ -53,12 +57,13 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return and clear the angle to relay to the drive board, in rad; None if none is due."""
+        """Return a new angle to relay to the drive board, in rad; None if it was already returned.
+        """
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
-        """Decode the bytes that came at the port ``channel``, and act on the messages in them."""
+        """Decode the bytes from the port ``channel``, and handle the messages in them."""
         half = self._ports.halves[channel]
         for message in half.feed(data, now):
             if half.restarted:
@@ -80,7 +85,7 @@ class Inbound:
             self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
 
     def look(self, now: float, *, driving: bool) -> None:
-        """Check the timeouts, and update the mode; ``driving``: whether a motion is commanded."""
+        """Check the timeouts and update the mode; ``driving``: whether a motion is commanded."""
         machine = self._upkeep.machine
         was_unheard, self._front_unheard = self._front_unheard, now >= self.watch.front_unheard_at
         if self.watch.look(now, driving=driving):

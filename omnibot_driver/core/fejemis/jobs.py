@@ -1,12 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests to the boards other than motion, one job at a time, and how their success is proved.
+"""Runs the user's requests other than motion, one at a time, and checks whether they succeed.
 
-The boards do not acknowledge requests. A calibration has succeeded when new offsets were read twice
-with the same result; a single answer is not enough, because 1 in 99 damaged answers passes its
-checksum. Loading a configuration has succeeded when the configuration was read after the request.
-Saving cannot be checked: the job only waits until both boards have sent heartbeats after the
-request. The module does not read a clock.
+The boards do not acknowledge these requests. So each job has its own proof:
+
+- A calibration has succeeded when the new offsets are read twice with the same result. One reading
+  is not enough, because 1 in 99 damaged answers has a correct checksum.
+- Loading has succeeded when the configuration is read after the request.
+- Saving cannot be checked. The job only waits until both boards have sent a heartbeat after the
+  request.
+
+The module does not read a clock.
 """
 
 import math
@@ -19,33 +23,30 @@ from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, Whe
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
 POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
-"""The reason why nothing may move after a power-off was requested."""
+"""Why nothing may move after the user has requested to switch the power off."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
-"""Pairs of digits whose codes add up to 99, so that a sum does not detect the loss of both
-digits."""
+"""Pairs of digits whose codes add up to 99. A checksum does not detect the loss of both digits."""
 WITHIN_S: Final = 8.0
 CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""How many times the request of a job is sent, except for a calibration."""
+"""How many times the line of a job is sent, except for a calibration."""
 UNCHANGED_S: Final = 2.4
-"""Time in s after the request for a calibration from which the request is regarded as lost if the
-offsets are still unchanged."""
+"""Time in s after which unchanged offsets show that the command to calibrate was lost."""
 CALIBRATIONS: Final = 2
-"""Largest number of requests for one calibration; while the offsets are unchanged, the calibration
-is requested again."""
+"""How often a calibration is commanded at most, if the offsets stay unchanged."""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
     Job.CALIBRATE_GYRO: (b"gyroc", b"gyrooi", "gyroo"),
     Job.CALIBRATE_ACCELEROMETER: (b"acccal2", b"accoi", "acco"),
 }
-"""For each calibration: the command, the request for the result, and the answer's keyword."""
+"""For each calibration: the command, the request for the offsets, and the keyword of their line."""
 
 
 def whole_seconds(delay_s: float) -> int:
-    """Return the delay in whole seconds, at least 1, whose digits form no ``UNSEEN`` pair."""
+    """Return the delay in whole seconds, at least 1; its digits contain no ``UNSEEN`` pair."""
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
         seconds += 1
@@ -53,10 +54,14 @@ def whole_seconds(delay_s: float) -> int:
 
 
 class Jobs:
-    """The running job; ``done``: results for the caller to take.
+    """The running job.
 
-    ``powering_off``: whether the power will be cut soon. ``reload``: whether the boards may have
-    loaded a configuration; the caller must read the configuration again and reset this flag.
+    ``done``: results that the caller has to take.
+
+    ``powering_off``: whether a board will soon cut the power.
+
+    ``reload``: whether the boards may have loaded another configuration. The caller must then read
+    it again, and reset this flag.
     """
 
     def __init__(self) -> None:
@@ -86,7 +91,7 @@ class Jobs:
 
     @property
     def at_rest(self) -> str:
-        """The reason why the running job needs the robot at rest; empty if the robot may move."""
+        """Why the robot must stand still for the running job; empty if it may move."""
         job = self.job
         if job is not None and (job in OFFSETS or job is Job.LOAD):
             return f"a {job.value} is under way; wait for its answer"
@@ -97,8 +102,9 @@ class Jobs:
     ) -> None:
         """Begin a job after ``wait_s``. Raises RequestRefused while another job runs.
 
-        ``token``: identifies the job in its result. ``delay_s``: for a power-off, the time until
-        the power is cut.
+        ``token``: identifies the job in its result.
+
+        ``delay_s``: for a power-off, the time until the board cuts the power.
         """
         if self.job is not None:
             raise RequestRefused(
@@ -113,19 +119,20 @@ class Jobs:
             self._stay_on(0)
 
     def cancel(self, why: str) -> None:
-        """Fail the running job for the reason ``why``."""
+        """End the running job as failed, for the reason ``why``."""
         if self.job is not None:
             self._finish(False, f"{self.job.value} failed: {why}")
 
     def interrupt(self, why: str) -> None:
-        """Fail the running job for the reason ``why`` if the job needs the robot at rest."""
+        """End the running job as failed if it needs the robot to stand still; ``why``: the reason.
+        """
         if self.at_rest:
             self.cancel(why)
 
     def restarted(self, role: Role) -> None:
-        """Fail the running job, because the board ``role`` has restarted.
+        """End the running job as failed, because the board ``role`` has restarted.
 
-        A power-off fails, and is cancelled, only if the drive board has restarted.
+        A power-off concerns only the drive board. It continues if the front board has restarted.
         """
         if role == "front" and self.job is Job.POWER_OFF:
             return
@@ -142,7 +149,10 @@ class Jobs:
         self.powering_off = False
 
     def begin(self) -> None:
-        """Fail the running job: the connection is new. A requested power-off stays in force."""
+        """End the running job as failed, because the connection is new.
+
+        A requested power-off stays in force, because the board may already have received it.
+        """
         self.cancel("the port was lost meanwhile; call again once it is back")
 
     def due(self, now: float) -> Lines:
@@ -180,7 +190,7 @@ class Jobs:
                 return {"drive": [ask] if now - self._begun_at > CALIBRATION_S else []}
 
     def hear(self, role: Role, message: Message, now: float) -> None:
-        """Take a message that may prove the running job's success."""
+        """Receive a message, and check whether it proves the success of the running job."""
         job = self.job
         if job is None or not self._said:
             return

@@ -2,9 +2,9 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-Moving parts are switched on only at the user's request, and never for longer than requested: the
-lift runs for the time that is sent with its voltage. An e-stop, a pause or a lost board switches
-brush and lift off. The board does not acknowledge lines, so lines for brush and lights are sent
+Brush and lift run only if the user requests it. The lift never runs longer than requested, because
+each line for the lift contains the run time. An e-stop, a pause or a lost board switches brush and
+lift off. The board does not acknowledge lines, so lines for the brush and the lights are sent
 several times.
 """
 
@@ -19,22 +19,31 @@ OFF: Final = (b"motv 0 0", b"brush 0")
 TIMES: Final = 3
 BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
-"""Period in s at which ``brush 1`` is repeated while the brush is on: a line may be lost."""
+"""Period in s at which ``brush 1`` is repeated while the brush is on, because a line may be lost.
+"""
 PACE_S: Final = 0.05
-"""Shortest time in s between two lift commands, or between two light commands. If more commands
-come within this time, only the newest is sent."""
+"""Shortest time in s between two lift lines, or between two light lines.
+
+If the user commands more often, only the newest command is sent.
+"""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest allowed ratio of the sent to the wanted voltage. The driver sends a lower voltage if the
-sum of a line with the wanted voltage does not detect damage."""
+"""Smallest allowed ratio of the voltage that is sent to the wanted voltage.
+
+A lower voltage is sent if the checksum would not detect damage in the line with the wanted voltage.
+"""
 LEAST_TIME_S: Final = 0.04
 
 
 class Machine:
-    """State of brush, lift and lights; ``brush``: whether the brush is on.
+    """State of brush, lift and lights.
 
-    ``volts``: voltage of the lift in V, 0 once its run time is over.
+    ``brush``: whether the brush is on.
+
+    ``volts``: voltage of the lift in V; 0 when its run time is over.
+
+    ``colour``: red, green and blue of the lights; None before the first command.
     """
 
     def __init__(self) -> None:
@@ -42,10 +51,14 @@ class Machine:
         self.volts = 0.0
         self.colour: tuple[int, int, int] | None = None
         self._lift_line = b""
-        """Lift line that is still to be sent; empty if no line is waiting."""
+        """The line for the lift that is still to be sent; empty if there is none."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """``_lift_at``: time in s at which to send ``_lift_line``. ``_lift_again_at``: time from
-        which the next lift line may be sent. ``_lift_until``: time at which the lift stops."""
+        """``_lift_at``: time in s at which to send ``_lift_line``.
+
+        ``_lift_again_at``: time in s from which the next line for the lift may be sent.
+
+        ``_lift_until``: time in s at which the lift stops.
+        """
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf
@@ -72,7 +85,7 @@ class Machine:
         self._next_at = -math.inf
 
     def lift(self, volts: float, now: float, longest_s: float) -> None:
-        """Move the lift at ``volts`` for ``longest_s`` at most; positive ``volts`` raise the wheel.
+        """Move the lift at ``volts`` for at most ``longest_s``; a positive voltage raises it.
 
         0 V stops the lift at once. Raises CommandRefused for NaN or infinity.
         """
@@ -93,7 +106,7 @@ class Machine:
         self._led_at = max(now, self._led_again_at)
 
     def begin(self) -> None:
-        """Switch brush and lift off and send the colour again, because a board has restarted."""
+        """Switch brush and lift off, and send the colour again, because a board has restarted."""
         self.off()
         self._led_left = TIMES if self.colour else 0
         self._led_at = -math.inf if self.colour else math.inf
@@ -106,7 +119,7 @@ class Machine:
         self._next_at = -math.inf
 
     def switch_off(self) -> list[bytes]:
-        """Switch brush and lift off; return the lines that do so.
+        """Switch brush and lift off, and return the lines for it.
 
         The lines also let the board show its own lights again.
         """
@@ -152,7 +165,7 @@ class Machine:
 
 
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
-    """Return a ``motv`` line whose sum detects damage, and the run time in the line, in s."""
+    """Return a ``motv`` line in which a checksum detects damage, and the line's run time in s."""
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)

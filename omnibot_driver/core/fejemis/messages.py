@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The messages that the two boards send, one class for each kind, with numbers as sent.
+"""The messages that the two boards send: one class for each kind of line.
 
-Units are the boards': degrees, m/s², µT, V, A, m, s. Messages that are only shown in diagnostics
-are a ``Status`` or ``Words``. The module neither parses nor uses messages.
+The numbers are in the boards' units: degrees, m/s², µT, V, A, m, s. A message that is only shown in
+diagnostics is a ``Status`` or ``Words``.
 """
 
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from omnibot_driver.core.values import value
 
 @value(frozen=True, slots=True)
 class Heartbeat:
-    """``hbt``: the heartbeat, with the board's time, identity, firmware version and voltage.
+    """``hbt``: the heartbeat of a board.
 
-    ``state``: on the drive board, the variable rcSource, which is -1 while the board ignores motion
+    ``state``: on the drive board, the variable rcSource. It is -1 while the board ignores motion
     commands.
     """
 
@@ -37,7 +37,10 @@ class FrontAngle:
 
 @value(frozen=True, slots=True)
 class BoardPose:
-    """``pose``: pose by the board's dead reckoning; ``decimals``: decimals of x and y as sent."""
+    """``pose``: the pose that the board computes from the motion of its wheels.
+
+    ``decimals``: how many decimals x and y have in the line.
+    """
 
     time_s: float
     x_m: float
@@ -48,7 +51,10 @@ class BoardPose:
 
 @value(frozen=True, slots=True)
 class WheelSpeeds:
-    """``vel``: rim speeds of both wheels; ``time_s``: board's time, None if it was not sent."""
+    """``vel``: rim speeds of both wheels.
+
+    ``time_s``: the board's time; None if the line has no time.
+    """
 
     left_mps: float
     right_mps: float
@@ -57,7 +63,7 @@ class WheelSpeeds:
 
 @value(frozen=True, slots=True)
 class Gyro:
-    """``gyro``: angular velocity in degrees per second."""
+    """``gyro``: turn rate in degrees per second."""
 
     x: float
     y: float
@@ -66,7 +72,7 @@ class Gyro:
 
 @value(frozen=True, slots=True)
 class Acceleration:
-    """``acc``: specific force in m/s², or in g on some firmware."""
+    """``acc``: specific force in m/s²; on some firmware in g."""
 
     x: float
     y: float
@@ -93,7 +99,7 @@ class Attitude:
 
 @value(frozen=True, slots=True)
 class Battery:
-    """``bat``: voltage in V, current in A, and the count of cells."""
+    """``bat``: voltage, current and number of cells."""
 
     volts: float
     amps: float
@@ -110,7 +116,8 @@ class Distance:
 
 @value(frozen=True, slots=True)
 class Infrared:
-    """``ir``: distances of both sensors in m, and the calibration values if they were sent."""
+    """``ir``: distances that both sensors measure, and their calibration if the line contains it.
+    """
 
     distances_m: tuple[float, float]
     calibration: tuple[float, ...] = ()
@@ -118,7 +125,7 @@ class Infrared:
 
 @value(frozen=True, slots=True)
 class WheelConfiguration:
-    """``conf``: both wheel radii, gear, encoder ticks per revolution, track, control period."""
+    """``conf``: wheel radii, gear, encoder ticks per revolution, track, and period of control."""
 
     left_radius_m: float
     right_radius_m: float
@@ -129,7 +136,7 @@ class WheelConfiguration:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """All numbers except the control period, which cannot be written to the board."""
+        """All numbers that can be written to the board; the control period cannot."""
         return (
             self.left_radius_m,
             self.right_radius_m,
@@ -141,9 +148,9 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: track, and distance from the axle to the steered wheel, both in m.
+    """``confs``: the track, and the distance from the axle to the steered wheel, both in m.
 
-    By the help text, the distance comes first; some boards send the track first.
+    By the help text, the distance comes first. Some boards send the track first.
     """
 
     first_m: float
@@ -168,7 +175,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """A line of text after a keyword: a name, a version, or an answer."""
+    """A keyword followed by text: a name, a version, or an answer."""
 
     keyword: str
     text: str

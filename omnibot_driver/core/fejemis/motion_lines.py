@@ -1,13 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``rc`` lines for each board, written so that the loss of any two characters is detected.
+"""Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
-Not every number can be written in this way (`numerals.py`), but a board does not need both numbers
-of a line exactly. The front board computes the wheel's angle from the ratio of speed and turn rate.
-The drive board computes the speed of the outer wheel as the root of the sum of the squares of both
-numbers, with the sign of the speed. Among the lines that give the wanted angle or speed exactly
-enough, the module chooses the one nearest to the command. Lines whose sum may hide a lost character
-of a number are avoided (`outbound.py`).
+Only some numbers can be written in this way (``numerals.py``). But neither board needs both numbers
+of its line exactly:
+
+- The front board computes the wheel's angle from the ratio of speed and turn rate.
+- The drive board computes the speed of the outer wheel from the root of the sum of their squares.
+  The sign is that of the speed.
+
+Some lines give the wanted angle or speed exactly enough. Of these, the module takes the one that is
+nearest to the command. It also avoids lines in which a lost line end or a lost digit of the
+checksum could hide a lost character (``outbound.py``).
 """
 
 import math
@@ -21,27 +25,33 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Speed in m/s below which the front board's line for a turn contains the speed 0. Near smaller
-speeds, too few numbers can be written."""
+"""Speed in m/s below which the front board's line contains the speed 0 and only a turn.
+
+Of the numbers that can be written, too few are near such small speeds.
+"""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
-"""Tolerated relative error of the speed that a line gives."""
+"""Tolerated relative error of the outer wheel's speed."""
 ANGLE_COST: Final = 1e4
-"""Cost of an angle error of 1 rad, for the choice among several lines. For comparison, a number
-that is e (2.718) times too large has a cost of 1."""
+"""Cost of an angle error of 1 rad in the choice among several lines.
+
+For comparison: the cost is 1 for a number that is e (2.718) times as large as commanded.
+"""
 SLOWEST: Final = 30.0
-"""Largest allowed ratio of the outer wheel's speed to a nonzero speed in the drive board's line."""
+"""Largest ratio of the outer wheel's speed to the speed in the drive board's line, if not 0."""
 SCALES: Final = 4.0
-"""Largest allowed factor between a number in the front board's line and the commanded number."""
+"""Largest factor by which a number in the front board's line may differ from the commanded number.
+"""
 Candidate = tuple[float, str, str]
-"""A possible line: cost, and texts of the speed (m/s) and turn rate (degrees/s) without signs."""
+"""A possible line: its cost, and the texts of speed (m/s) and turn rate (degrees/s) without signs.
+"""
 
 
 @lru_cache(maxsize=512)
 def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes:
     """Return the front board's line, which sets the angle atan2(wheelbase · turn rate, speed).
 
-    The magnitudes of speed and turn rate do not matter, only their ratio.
+    Only the ratio of speed and turn rate matters.
     """
     speed, turn_deg = abs(speed_mps), math.degrees(abs(turn_radps))
     negative = speed_mps < 0.0 or turn_radps < 0.0
@@ -69,7 +79,7 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line, which sets the outer wheel to sqrt(speed² + turn²) in m/s.
 
-    The outer wheel's speed has the sign of ``speed_mps``.
+    The wheel's direction is the sign of ``speed_mps``.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
@@ -92,7 +102,8 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the ``robust`` line of least cost; if no line is robust, the line of least cost."""
+    """Return the ``robust`` line of the least cost; if none is robust, the line of the least cost.
+    """
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)
     return next(filter(robust, lines), _line(signs, *found[0][1:]))

@@ -1,12 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Numbers in whose texts a sum (checksum) detects the loss of any two characters.
+"""Numbers that can be sent safely: a checksum detects if any two of their characters are lost.
 
-A sum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or ``-``
-and ``6``. Each line contains the number ``2`` (the source of the command), so the numbers of this
-module do not contain ``1``. They also do not contain ``3`` or ``5``. In a line with a minus sign,
-the numbers do not contain ``6`` either. So there are gaps between the numbers; the largest gap,
-relative to the number, is between 1 and 2 times a power of ten.
+A checksum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or
+``-`` and ``6``. Each motion line already contains a ``2``, the source of the command. So the
+numbers never contain ``1``. They do not contain ``3`` or ``5`` either, and no ``6`` if the line has
+a minus sign.
+
+So there are gaps between the numbers. The largest gaps lie between 1 and 2 times a power of ten:
+between .0999 and .200, for example.
 """
 
 from bisect import bisect_left, bisect_right
@@ -16,14 +18,17 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""The power of ten of a number's first digit is at least ``SMALLEST`` and less than ``LARGEST``."""
+"""``SMALLEST``, ``LARGEST``: limits of the power of ten that belongs to a number's first digit.
+
+The power is at least ``SMALLEST`` and less than ``LARGEST``.
+"""
 
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return all usable numbers from 0.0001 to 10000 in rising order, and their texts.
+    """Return all such numbers between 0.0001 and 10000 in rising order, and their texts.
 
-    ``negative``: whether the numbers are for a text with a minus sign; they then contain no ``6``.
+    ``negative``: whether the line has a minus sign. The numbers then contain no ``6``.
     """
     digits = "024789" if negative else "0246789"
     mantissas = [
@@ -39,9 +44,9 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 
 
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
-    """Return the number of ``numerals`` nearest to a positive ``number``, with its text.
+    """Return the number of ``numerals`` that is nearest to a positive ``number``, with its text.
 
-    ``down``: return the nearest one that is not above ``number``, if there is one.
+    ``down``: take the nearest one that is not larger than ``number``, if there is one.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
@@ -66,7 +71,7 @@ def between(least: float, most: float, *, negative: bool) -> list[tuple[float, s
 
 
 def _written(mantissa: str, power: int) -> str:
-    """Return the text of a number from its three digits and the first digit's power of ten."""
+    """Return the text of a number with three digits; ``power``: the first digit's power of ten."""
     if power >= SIGNIFICANT - 1:
         return mantissa + "0" * (power - SIGNIFICANT + 1)
     if power >= 0:

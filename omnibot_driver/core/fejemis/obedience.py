@@ -1,28 +1,34 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds from heartbeats whether the drive board obeys; distinguishes a pause from an e-stop.
+"""Finds out from heartbeats whether the drive board obeys motion commands.
 
-For a pause and for its own e-stop, the driver sends ``stop`` to the board. After the release of the
-e-stop, the driver sends ``start`` until the heartbeat shows that the board obeys. A pause remains
-until the user calls start. The module knows times and rcSource (the source of commands that the
-board obeys, by its own report), not lines.
+The driver sends ``stop`` to the board for a pause and also for its own e-stop. So the heartbeat
+alone does not tell which of them is in force. After the release of an e-stop, the driver sends
+``start`` until the heartbeat shows that the board obeys. A pause remains until the user calls
+~/start.
+
+The module knows times and rcSource; it does not know lines. rcSource is a number in the heartbeat:
+the source of the commands that the board obeys.
 """
 
 import math
 from typing import Final
 
 STOPPED: Final = -1.0
-"""rcSource of a drive board that ignores all motion commands (manual, start)."""
+"""Value of rcSource while the drive board ignores all motion commands (manual, start)."""
 RELEASED_S: Final = 1.0
-"""Longest time in s for which ``start`` is repeated after the release of an e-stop."""
+"""Time in s after the release of an e-stop during which ``start`` is repeated."""
 START_AGAIN_S: Final = 0.2
 
 
 class Obedience:
-    """Obedience of the drive board; ``source``: the last rcSource, None before the first.
+    """Whether the drive board obeys, and why not.
 
-    ``estopped``: whether the driver's e-stop is latched. ``pause_said``: whether a pause was
-    requested after the last start.
+    ``source``: the last rcSource; None before the first.
+
+    ``estopped``: whether the driver's e-stop is latched.
+
+    ``pause_said``: whether the user has requested a pause since the last start.
     """
 
     def __init__(self) -> None:
@@ -31,39 +37,42 @@ class Obedience:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection; a latched e-stop stays."""
+        """Begin a new connection. A latched e-stop stays latched."""
         self.source: float | None = None
         self.pause_said = False
         self._released_at = -math.inf
         self.start_at = math.inf
-        """Time in s at which to send ``start``; infinity if ``start`` is not due."""
+        """Time in s at which to send ``start``; infinity if there is no reason to send it."""
 
     def hear(self, source: float) -> None:
-        """Take rcSource from a heartbeat of the drive board."""
+        """Receive rcSource from a heartbeat of the drive board."""
         self.source = source
         if source != STOPPED:
             self.start_at = math.inf
 
     def latch(self, *, running: bool) -> None:
-        """Latch the driver's e-stop; ``running``: whether the board obeyed until now."""
+        """Latch the driver's e-stop; ``running``: whether the board has obeyed until now."""
         if not self.estopped:
             self._resume = running
         self.estopped = True
         self.start_at = math.inf
 
     def pause(self) -> None:
-        """Record a requested pause, and cancel a ``start`` that is due after an e-stop."""
+        """Record that the user requested a pause; do not send ``start`` after an e-stop any more.
+        """
         self.pause_said = True
         self.start_at = math.inf
 
     def release(self, now: float) -> None:
-        """Release the driver's e-stop; ``start`` is due if the board obeyed before the e-stop."""
+        """Release the driver's e-stop. If the board obeyed before the e-stop, ``start`` is now due.
+        """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf
         self.estopped = False
 
     def stopped(self, now: float, *, was_paused: bool) -> bool:
-        """Return whether the drive board is stopped for another reason than the driver's e-stop."""
+        """Return whether the drive board ignores commands, and not because of the driver's e-stop.
+        """
         if self.source != STOPPED:
             return False
         if self.pause_said or was_paused:
@@ -71,7 +80,7 @@ class Obedience:
         return not self.estopped and now - self._released_at > RELEASED_S
 
     def start_due(self, now: float) -> bool:
-        """Return whether to send ``start`` now; if so, regard ``start`` as sent."""
+        """Return whether to send ``start`` now; the caller must then send it."""
         if now < self.start_at:
             return False
         again = now - self._released_at < RELEASED_S

@@ -1,18 +1,20 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Displacements of the robot, from poses and wheel speeds of the drive board.
+"""Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-A pose is absolute, but has few digits: with steps of 1 mm every 20 ms, a speed from two poses has
-steps of 0.05 m/s. The wheel speeds show the motion more finely. So a displacement is the integral
-of the speeds between two poses, corrected towards the newer pose. If this integral and the
-difference of the two poses differ by more than rounding explains, lines were lost or a wheel was
-turned quickly; then the displacement is the difference of the poses. The displacements add up to
-the pose.
+**Why both are needed.** A pose has few digits. With steps of 1 mm every 20 ms, a speed from two
+poses has steps of 0.05 m/s. The wheel speeds are finer, but do not add up exactly. So a
+displacement is the motion that the wheel speeds give between two poses, corrected towards the newer
+pose. The displacements add up to the pose.
 
-A pose is rejected if the last pose and the wheel speeds do not explain it. If the next pose agrees
-with the rejected pose, and the robot can have reached it, the next pose is accepted. If the robot
-cannot have reached it, but ``NEW_FRAME`` poses in a row agree with the pose before, the board has
-begun a new frame (command ``enc0``).
+**Large differences.** The speeds and the two poses may differ by more than rounding explains. Then
+lines were lost, or a wheel turned quickly, and the displacement is the difference of the two poses.
+If they differ by only a little more, the displacement is the mean of both.
+
+**Rejected poses.** A pose is rejected if the last pose and the wheel speeds do not explain it. The
+next pose may agree with the rejected pose. If the robot can have reached the next pose, it is
+accepted. If not, ``NEW_FRAME`` poses in a row must agree with the pose before them. Then the board
+has begun a new frame (command ``enc0``).
 """
 
 import math
@@ -23,42 +25,46 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between the pose and the integral of the speeds that one displacement
-corrects.
+"""How much of the difference between the pose and the speeds one displacement corrects: a fraction.
 
-The fraction applies if rounding alone explains the difference.
+The fraction applies if rounding explains the difference.
 """
 ROUNDINGS: Final = 1.5
-"""Largest difference, in units of the last digit sent, that is explained by rounding.
+"""Largest difference that rounding explains, in units of the last digit of the line.
 
-Each of two poses is wrong by up to half a unit, and the rotation by the heading mixes the errors of
+Each of two poses is wrong by up to half a unit. The rotation by the heading mixes the errors of
 both axes.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""``SLACK_M``, ``SLACK_RAD``: distance in m and angle in rad by which a pose may differ from the
-integral of the speeds, in addition to the effect of an acceleration."""
+"""``SLACK_M``, ``SLACK_RAD``: distance in m and angle in rad that a pose may be off.
+
+The reference is the motion that the wheel speeds give. ``SPEED_UP_MPS2`` allows a further
+difference for acceleration.
+"""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
 FRESH_S: Final = 0.1
-"""Largest allowed age in s of wheel speeds that are still used."""
+"""Age in s up to which wheel speeds are used."""
 LEAST_S: Final = 0.001
 STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""Number of rejected poses in a row from which the board has begun a new frame, if each pose agrees
-with the rejected pose before it."""
+"""How many rejected poses in a row must agree with the pose before them to show a new frame."""
 
 
 class PoseOdometry:
-    """Turns poses and speeds into displacements; ``track_m``: the board's track, in m."""
+    """Turns poses and wheel speeds into displacements.
+
+    ``track_m``: the track width that the board uses, in m.
+    """
 
     def __init__(self, track_m: float) -> None:
         self.track_m = track_m
         self.refused = 0
-        """Count of rejected poses."""
+        """How many poses were rejected."""
         self._pose: BoardPose | None = None
         self._told = Pose()
         self._restarted = False
@@ -66,35 +72,35 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection; keep the last pose, whose frame the board may still use."""
+        """Begin a new connection; keep the last pose, because the board may still use its frame."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
-        """Count of rejected poses in a row, each of which agreed with the pose before it."""
+        """How many rejected poses in a row agreed with the rejected pose before them."""
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf
 
     @property
     def moving(self) -> bool:
-        """Whether a wheel turns, according to its last speed."""
+        """Whether a wheel turns, according to the last wheel speeds."""
         speeds = self._speeds
         return speeds is not None and max(map(abs, (speeds.left_mps, speeds.right_mps))) > STILL_MPS
 
     def forget(self) -> None:
-        """Forget the last pose: the restarted board has begun a new frame."""
+        """Forget the last pose, because the board has restarted and begun a new frame."""
         self._restarted |= self._pose is not None
         self._settled_s = -math.inf
         self._pose = None
         self.begin()
 
     def speeds(self, speeds: WheelSpeeds, now: float) -> None:
-        """Take the speeds of both wheels."""
+        """Receive the speeds of both wheels."""
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
 
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement up to ``pose``; every 0.2 s, also return a PoseReading.
+        """Return the displacement up to ``pose``; every 0.2 s, return also a PoseReading.
 
-        The PoseReading is the sum of all displacements, even of those that a later check of the
+        The PoseReading is the sum of all displacements, including those that a later check of the
         driver rejects.
         """
         displacement = self.pose(pose, now)
@@ -107,9 +113,9 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
-        """Return the displacement up to ``pose``; None for a first or a rejected pose.
+        """Return the displacement up to ``pose``; None for the first pose and for a rejected pose.
 
-        After a restart of the board, the first pose gives a displacement of 0.
+        The first pose after a restart of the board gives a displacement of 0.
         """
         before = self._pose
         if before is None:

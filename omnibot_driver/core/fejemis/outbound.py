@@ -1,21 +1,23 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to the boards, written so that damage cannot turn one command into another.
+"""Adds checksums to lines for the boards, and checks whether damage to a line is detected.
 
-A sum modulo 99 does not detect two lost characters whose codes add up to 99 or 198 (`0` and `3`,
-`1` and `2`, `.` and `5`, `-` and `6`). A motion line must not contain both characters of a pair,
-see `motion_lines.py`. Two more kinds of damage are detected or not depending on the value of the
-sum, so the digits of a motion line are chosen to get a suitable sum:
+The checksum is a sum modulo 99. So it does not detect two lost characters whose codes add up to 99
+or 198: ``0`` and ``3``, ``1`` and ``2``, ``.`` and ``5``, ``-`` and ``6``. A motion line must not
+contain both characters of a pair (``motion_lines.py``).
 
-* A lost line end joins two lines. The joined line passes the check if one more character is lost,
+Two more kinds of damage may remain undetected, depending on the value of the checksum. So the
+digits of a motion line are chosen to get a safe checksum:
+
+- **A lost line end** joins two lines. The joined line is accepted if one more character is lost,
   whose code equals the sum of the second line with its prefix. So this sum must not be the code of
-  a character in numbers, nor of the ``;`` (without it, the digits of the sum would continue the
-  last number of the first line). If a line has such a sum and its digits cannot be chosen, the
-  driver first sends an empty line, which the boards ignore.
-* A lost digit of the sum leaves a sum that is correct only if a certain character is lost as well.
-  So this character must not occur in numbers.
+  a character in numbers. It must not be the code of ``;`` either: without ``;``, the digits of the
+  checksum would continue the last number of the first line. Some lines have no other possible
+  digits. Before such a line, the driver sends an empty line, which the boards ignore.
+- **A lost digit of the checksum** is undetected if one certain character is lost too. So this
+  character must not occur in numbers.
 
-Characters are never added to a line itself: a board may compare the complete line with ``stop``.
+No characters are added to a line itself, because a board may compare the whole line with ``stop``.
 """
 
 from functools import lru_cache
@@ -34,7 +36,7 @@ _COMPLEMENTS: Final = tuple(
 
 @lru_cache(maxsize=1024)
 def line(text: bytes, *, sums: bool) -> bytes:
-    """Return the bytes of one line with its line end, and with its sum in front if ``sums``."""
+    """Return the bytes of one line with its line end; ``sums``: whether to add the checksum."""
     if not sums:
         return text + b"\n"
     before = b"" if robust(text) else b"\n"
@@ -42,12 +44,12 @@ def line(text: bytes, *, sums: bool) -> bytes:
 
 
 def lines(*texts: bytes, sums: bool) -> bytes:
-    """Return the bytes of several lines in order, each as ``line`` makes it."""
+    """Return the bytes of several lines in order; ``line`` makes each of them."""
     return b"".join([line(text, sums=sums) for text in texts])
 
 
 def harmless(text: str) -> bool:
-    """Return whether the loss of any two characters changes the text's sum."""
+    """Return whether the checksum detects the loss of any two characters of the text."""
     codes = text.encode("ascii")
     return not any(
         one in codes and other in codes and (one != other or codes.count(one) > 1)
@@ -56,7 +58,10 @@ def harmless(text: str) -> bool:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether a lost character is detected even if a line end or sum digit is lost too."""
+    """Return whether the checksum detects a lost character if more is lost with it.
+
+    With the character, a line end or a digit of the checksum may be lost.
+    """
     total = sum_of(text)
     tens, ones = divmod(total, 10)
     as_second = (ord(";") + 2 * ord("0") + tens + ones + total - 1) % MODULUS

@@ -1,13 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``rc`` lines without a sum, written so that undetected damage has little effect.
+"""Writes ``rc`` lines without a checksum, so that undetected damage has little effect.
 
-An ``rc`` line has a source (``2``), a speed and a turn rate. If a space or the source is lost, each
-later number takes the place of the number before it. The drive board uses only the root of the sum
-of the squares of speed and turn rate. So the driver sends this root as the speed, and 0 as the turn
-rate. If these numbers move by one place, the line commands a stop. The remaining risk is a lost
-decimal point or a lost digit after the point; such a line is obeyed until the next line, which is
-sent with the next angle of the front wheel.
+An ``rc`` line contains a source (``2``), a speed and a turn rate. If the source or a space is lost,
+each later number takes the place of the number before it. The drive board uses only the root of the
+sum of the squares of speed and turn rate. So the driver sends this root as the speed, and 0 as the
+turn rate. If these numbers move by one place, the line is a stop.
+
+One risk remains: the line may lose its decimal point, or a digit after it. The board obeys such a
+line until the next one, which follows with the next angle of the front wheel.
 """
 
 import math
@@ -21,9 +22,9 @@ def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Return the drive board's line: the outer wheel's speed, forward or backward.
+    """Return the drive board's line: the outer wheel's speed, forward or backward, and 0.
 
-    The board computes the turn rate from the angle of the front wheel.
+    The board computes the turn from the angle of the front wheel.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:

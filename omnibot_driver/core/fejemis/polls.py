@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Polls of the values that are only shown in diagnostics, and the trigger of the sonar."""
+"""Requests the values that are only shown in diagnostics, one after the other.
+
+The module also requests each measurement of the sonar.
+"""
 
 import math
 from collections.abc import Mapping
@@ -19,15 +22,21 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
         b"cvsteeri", b"bati",
     ),
 }  # fmt: skip
-"""Requests for each board; they are sent repeatedly, in the order of the list."""
+"""Requests for each board. They are sent in this order, again and again."""
 WITH_SUMS: Final = (b"svpi", b"svjti")
-"""Requests sent only with a sum: without their last letter, they would be commands to the servo."""
+"""Requests that are sent only with a checksum.
+
+Without their last letter, they would be commands to the servo.
+"""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1
 
 
 class Polls:
-    """Polls of one board; ``told``: its last answers as text, by keyword."""
+    """The requests to one board.
+
+    ``told``: the last answers as text, by keyword.
+    """
 
     def __init__(self, role: Role) -> None:
         self.told: dict[str, str] = {}
@@ -36,7 +45,7 @@ class Polls:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the answers and start again with the first request, because the board is new."""
+        """Forget the answers and begin with the first request, because the board is new."""
         self.told.clear()
         self._turn = 0
         self._next_at = self._sonar_at = -math.inf
@@ -47,11 +56,11 @@ class Polls:
         return min(self._next_at, self._sonar_at) if self._role == "drive" else self._next_at
 
     def unknown(self, words: Mapping[str, None]) -> None:
-        """Stop sending requests that are in ``words``: the firmware does not know them."""
+        """Send the requests in ``words`` no longer, because the firmware does not know them."""
         self._unknown = {text for text in ASKED[self._role] if text.decode("ascii") in words}
 
     def due(self, now: float, *, sums: bool) -> list[bytes]:
-        """Return the lines to send now; ``sums``: whether lines to the board have a sum."""
+        """Return the lines to send now; ``sums``: whether lines to the board carry a checksum."""
         texts = []
         if self._role == "drive" and now >= self._sonar_at:
             self._sonar_at = now + SONAR_EVERY_S

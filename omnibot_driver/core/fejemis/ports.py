@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds which of the two boards (halves) is at which port, and addresses lines to them.
+"""Finds out which of the two boards (halves) is at which port, and addresses lines to them.
 
-The heartbeats identify the boards, whatever the order of the ports. Until a board is identified,
-lines that stop or switch off something go to each port where the board may be, and the board gets
-no other lines. The module knows identities, not the lines' meaning.
+The boards are identified by their heartbeats, so the ports may be swapped. A board that is not
+identified receives only lines that stop or switch off something. Such a line goes to each port
+where the board may be.
+
+The module knows identities and ports; it does not know the meaning of a line.
 """
 
 from dataclasses import replace
@@ -19,12 +21,12 @@ from omnibot_driver.core.traits import Traits
 
 ROLES: Final[tuple[Role, Role]] = ("drive", "front")
 PARAMETERS: Final = ("port", "front_port")
-"""Names of the port parameters, by channel."""
+"""Names of the parameters for the two ports, by channel."""
 SWAPPED: Final = replace(TRAITS, channels=TRAITS.channels[::-1])
 
 
 class Ports:
-    """The two boards (halves) by channel.
+    """The two boards, in the order of their ports.
 
     ``swapped``: whether the drive board is at the second port.
     """
@@ -35,7 +37,7 @@ class Ports:
 
     @property
     def traits(self) -> Traits:
-        """The robot's traits; each channel has the name of the board that was found at its port."""
+        """The robot's traits. Each channel is named after the board that was found at its port."""
         return SWAPPED if self.swapped else TRAITS
 
     def begin(self, settings: FejemisSettings) -> None:
@@ -44,14 +46,14 @@ class Ports:
             half.begin(settings.line_sums)
 
     def configure(self, settings: FejemisSettings) -> None:
-        """Apply ``settings.line_sums``: whether lines have sums."""
+        """Apply the setting ``line_sums``, which says whether lines have checksums."""
         for half in self.halves:
             if half.decoder.line_sums != settings.line_sums:
                 half.decoder.line_sums = settings.line_sums
 
     @property
     def ready(self) -> bool:
-        """Whether one drive and one front board are connected and send what driving requires."""
+        """Whether one drive board and one front board send the data that driving requires."""
         return all(half.ready for half in self.halves) and not self.trouble
 
     @property
@@ -60,14 +62,14 @@ class Ports:
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:
-        """Return the half with the role ``role``; None if neither half or both have this role."""
+        """Return the half that has the ``role``; None if neither has it, or both."""
         first, second = self.halves
         if first.role == role:
             return None if second.role == role else first
         return second if second.role == role else None
 
     def role(self, channel: int) -> Role:
-        """Return the role of the board at ``channel``; while unknown, the expected role."""
+        """Return the role of the board at ``channel``; while it is unknown, the expected role."""
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
@@ -83,7 +85,7 @@ class Ports:
 
     @property
     def trouble(self) -> str:
-        """The reason why the boards cannot be one robot, with advice; empty if they can."""
+        """Why the two boards cannot be one robot, with advice; empty if they can."""
         for name, half in zip(PARAMETERS, self.halves, strict=True):
             if half.identity is not None and half.role is None:
                 return (
@@ -101,7 +103,7 @@ class Ports:
         return ""
 
     def line(self, role: Role, *texts: bytes) -> Packets:
-        """Return lines for one board; nothing while its port is unknown."""
+        """Return a packet with lines for one board; no packet while its port is unknown."""
         half = self.half(role)
         return NO_PACKETS if half is None else self.at(self.halves.index(half), *texts)
 
@@ -113,13 +115,13 @@ class Ports:
         return sum((self.at(channel, *texts) for channel in unknown or (0, 1)), NO_PACKETS)
 
     def both(self, text: bytes) -> Packets:
-        """Return a line for each board, after a line end that ends any incomplete line."""
+        """Return a line for each board. A line end before it ends any incomplete line."""
         return tuple(
             (channel, b"\n" + data.lstrip(b"\n"))
             for channel, data in self.at(0, text) + self.at(1, text)
         )
 
     def at(self, channel: int, *texts: bytes) -> Packets:
-        """Return lines for the board at ``channel``; no packets if there are no ``texts``."""
+        """Return a packet with lines for the board at ``channel``; no packet without ``texts``."""
         data = outbound.lines(*texts, sums=self.halves[channel].sums)
         return ((channel, data),) if data else NO_PACKETS

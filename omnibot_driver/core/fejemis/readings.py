@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings and answers that only a Fejemis has, in SI units; each comes as an ``ExtraReading``."""
+"""Readings and results that only a Fejemis has, in SI units.
+
+Each of them is the content of an ``ExtraReading``.
+"""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +17,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """Requests other than motion; each value is the name of the request in texts for the user."""
+    """A request of the user other than motion. The value is its name in texts for the user."""
 
     CALIBRATE_GYRO = "gyro calibration"
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"
@@ -32,9 +35,13 @@ class SteeringReading:
 
 @value(frozen=True, slots=True)
 class OrientedImuReading:
-    """The board's orientation as a quaternion x, y, z, w, with the latest rates and forces.
+    """The board's orientation, with the turn rates and the specific force of the last IMU sample.
 
-    Rates are in rad/s, specific forces in m/s².
+    ``orientation``: quaternion x, y, z, w.
+
+    ``angular_velocity``: in rad/s.
+
+    ``specific_force``: in m/s².
     """
 
     orientation: Quaternion
@@ -53,8 +60,11 @@ class MagneticReading:
 class BatteryReading:
     """State of the battery.
 
-    ``amps``: current in A, negative while discharging, NaN if unknown. ``cells``: count of cells, 0
-    if unknown.
+    ``amps``: current in A, negative during discharge; NaN if unknown.
+
+    ``cells``: number of cells; 0 if unknown.
+
+    ``low``: whether the voltage per cell is below the limit of the settings.
     """
 
     volts: float
@@ -65,7 +75,10 @@ class BatteryReading:
 
 @value(frozen=True, slots=True)
 class RangeReading:
-    """Distance that a sensor measures; ``distance_m``: infinite if nothing is detected."""
+    """Distance that a sensor measures.
+
+    ``distance_m``: infinity if the sensor detects nothing.
+    """
 
     name: RangeName
     distance_m: float
@@ -73,7 +86,10 @@ class RangeReading:
 
 @dataclass(frozen=True, slots=True)
 class JobDone:
-    """Result of a job; ``token``: identifies the job for its caller."""
+    """Result of a job.
+
+    ``token``: the object by which the caller identifies the job.
+    """
 
     token: object
     success: bool

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests of the user other than motion: brush, lift, LED band, and jobs.
+"""Requests of the user other than motion: brush, lift, LED band, and jobs such as a calibration.
 
-The module knows when each request is allowed, not how the request is sent or confirmed.
+The module knows when each request is allowed; it does not know how it is sent or confirmed.
 """
 
 from typing import Final, Protocol
@@ -18,8 +18,10 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""Time in s from a Stop to the loading of a configuration. The driver sends this Stop if the user
-requests the loading while the robot moves."""
+"""Time in s that a moving robot gets to stop before a configuration is loaded.
+
+The driver sends Stop when the user requests the loading.
+"""
 NO_DATA: Final = "no data from the boards; check their power and cables"
 
 
@@ -40,11 +42,11 @@ class Robot(Protocol):
 
     @property
     def settings(self) -> FejemisSettings:
-        """The settings, which include the lift's run time and the delay of a power-off."""
+        """The user's settings, such as the delay of a power-off."""
 
 
 class Services:
-    """The services, with one method for each request."""
+    """The user's requests, with one method for each."""
 
     def __init__(
         self, robot: Robot, upkeep: Upkeep, obedience: Obedience, odometry: PoseOdometry, told: Told
@@ -53,29 +55,29 @@ class Services:
         self._odometry, self._told = odometry, told
 
     def set_brush(self, on: bool, now: float) -> None:
-        """Switch the brush on or off. Raises RequestRefused while the brush must not run."""
+        """Switch the brush on or off. Raises RequestRefused if the brush must not run now."""
         if on and (reason := self._why_not_turn()):
             raise RequestRefused(f"brush refused: {reason}")
         self._upkeep.machine.set_brush(on)
 
     def lift(self, volts: float, now: float) -> None:
-        """Move the lift for ``command_timeout_s`` at most; positive volts raise the wheel.
+        """Move the lift for at most ``command_timeout_s``; a positive voltage raises the wheel.
 
-        Raises CommandRefused while the lift must not run.
+        Raises CommandRefused if the lift must not run now.
         """
         if volts and (reason := self._why_not_turn()):
             raise CommandRefused(f"lift_cmd refused: {reason}")
         self._upkeep.machine.lift(volts, now, self._robot.settings.command_timeout_s)
 
     def set_led(self, red: int, green: int, blue: int, now: float) -> None:
-        """Set the colour of the LED band; each part is in 0..255."""
+        """Set the colour of the LED band. Each part is limited to 0..255."""
         red, green, blue = (max(0, min(255, part)) for part in (red, green, blue))
         self._upkeep.machine.set_colour(red, green, blue, now)
 
     def ask(self, job: Job, token: object, now: float) -> None:
-        """Begin a job, whose result comes as a JobDone.
+        """Begin a job, whose result follows as a JobDone.
 
-        Raises RequestRefused if the job is not possible now.
+        Raises RequestRefused if the job is not allowed now.
         """
         robot, moving = self._robot, self._odometry.moving
         if robot.mode is Mode.UNKNOWN:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of a Fejemis robot that come from the user, not from its two boards."""
+"""The user's settings of a Fejemis. The boards do not report them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,25 +12,28 @@ AccelerationUnit = Literal["m/s^2", "g"]
 
 
 class Written(Enum):
-    """Settings that a user may write to a board, each with its command and count of numbers."""
+    """Settings that the driver can write to a board.
+
+    Each has the board's command and the count of numbers that follow it.
+    """
 
     WHEELS = "confw", 5
     """Radii of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
     STEERING = "confs", 2
-    """Track in m, then the distance in m from the axle to the steered wheel.
+    """Track in m, then the distance from the axle to the steered wheel in m.
 
     The driver writes both numbers to both boards.
     """
     FRONT_WHEEL = "fwoffset", 2
-    """Offset of the front angle in degrees, and 1 if the angle is inverted, else 0."""
+    """Offset of the front wheel's angle in degrees, then 1 if the angle is inverted, or 0."""
     INFRARED = "irc", 4
-    """Raw values of infrared sensor 1 at 13 cm and 50 cm, then those of sensor 2."""
+    """Raw values of infrared sensor 1 at 13 cm and at 50 cm, then those of sensor 2."""
     MAGNETOMETER = "magcal", 12
     """Three offsets of the magnetometer, then a 3 × 3 matrix, row by row."""
     ACCELEROMETER = "acccal", 6
     """Three offsets of the accelerometer, then three scales."""
     STEERING_GAINS = "cssteer", 0
-    """Parameters of the steering controller, as in ucontrolbase.cpp; any count of numbers."""
+    """Parameters of the steering controller, as in ucontrolbase.cpp. Their count is not fixed."""
 
     command: str
     count: int
@@ -41,15 +44,21 @@ class Written(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FejemisSettings:
-    """Settings of the robot.
+    """The user's settings of the robot.
 
-    ``track_m``, ``wheelbase_m``: the geometry that is used until the boards report their own.
-    ``written``: values to write to the boards; all others are only read. ``line_sums``: whether
-    lines carry a sum (checksum); with ``auto``, they do if the heartbeats do. ``allow_reverse``:
-    whether a negative speed is passed on, see docs/boards/fejemis.md. ``command_timeout_s``: the
-    longest time that the lift runs after one command. ``power_off_delay_s``: time from a request to
-    switch off until the power is cut. ``low_cell_v``: voltage per cell below which a battery is
-    reported as low.
+    ``track_m``, ``wheelbase_m``: geometry that is used until the boards report their own.
+
+    ``line_sums``: whether lines carry a checksum. With ``auto``, they do if the heartbeats do.
+
+    ``allow_reverse``: whether a negative speed is sent to the boards (docs/boards/fejemis.md).
+
+    ``command_timeout_s``: longest time that the lift runs after one command.
+
+    ``power_off_delay_s``: time from the user's request until the board cuts the power.
+
+    ``low_cell_v``: voltage per cell below which the battery is reported as low.
+
+    ``written``: values to write to the boards. Other values are only read.
     """
 
     track_m: float = 0.4

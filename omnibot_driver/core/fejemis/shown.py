@@ -12,16 +12,18 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of lines unknown to the firmware that the diagnostics show: the latest ones."""
+"""Largest number of lines unknown to the firmware that are shown: the latest ones."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 
 def figures(
     ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None, trouble: str
 ) -> BoardFigures:
-    """Return counters and figures for diagnostics, over all connections.
+    """Return counters and other values for diagnostics; the counters continue over all connections.
 
-    ``source``: rcSource of the drive board. ``trouble``: why the robot must not be driven.
+    ``source``: the drive board's rcSource.
+
+    ``trouble``: why the robot must not be driven.
     """
     return BoardFigures(
         rates_hz={"IMU": 100.0, "Odometry": 50.0},

@@ -1,16 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversion of a body twist into commands for both boards.
+"""Converts a body twist into commands for both boards.
 
-The command ``rc`` carries a speed v and a turn rate w. The drive board does not obey both: it
-drives its outer wheel at the speed sqrt(v² + w²), and turns about the centre given by the
-*measured* front angle. So the driver multiplies v and w by (`|v|` + `|w|`·B/2) / sqrt(v² + w²).
-With these products, the root is equal to the wanted speed of the outer wheel.
+**Scale.** The command ``rc`` has a speed v and a turn rate w, but the drive board does not obey
+both. It drives its outer wheel at the speed sqrt(v² + w²), and turns about a centre that follows
+from the *measured* front angle. So the driver multiplies v and w by (`|v|` + `|w|`·B/2) / sqrt(v² +
+w²), where B is the track. Then the root equals the speed that the outer wheel needs.
 
-While the front wheel moves to its angle, the drive board gets a lower speed, so that the body does
-not move or turn much faster than commanded. A turn on the spot begins when the front wheel has
-reached its angle; until then the drive board is commanded to stop. The module knows geometry and
-angles, not lines.
+**Speed limit.** While the front wheel moves to its angle, the drive board gets a lower speed. So
+the body moves and turns hardly faster than commanded. For a turn on the spot, the drive board stops
+until the front wheel has reached its angle.
+
+The module knows geometry and angles; it does not know lines.
 """
 
 import math
@@ -22,23 +23,31 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Smallest target angle of the front wheel, in rad, at which a command is a turn on the spot."""
+"""Target angle of the front wheel, in rad, from which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
-"""Deviation of the front wheel from its target, in rad, up to which a turn on the spot continues.
+"""``ALIGNED_RAD``, ``STILL_ALIGNED_RAD``: deviations of the front wheel from its target, in rad.
 
-Up to ``ALIGNED_RAD`` a turn on the spot may begin, and other motion has full speed."""
+Up to ``ALIGNED_RAD``, a turn on the spot may begin, and other motion has full speed. Up to
+``STILL_ALIGNED_RAD``, a turn on the spot continues.
+"""
 GIVEN_RAD: Final = math.radians(5.0)
 """Deviation of the front wheel, in rad, whose effect on the body's motion is tolerated."""
 
 
 @value(frozen=True, slots=True)
 class Steered:
-    """A command for both boards, and the motion of the body that results.
+    """A command for both boards, and the resulting motion of the body.
 
-    ``speed_mps``, ``turn_radps``: numbers for the front board; the drive board gets both multiplied
-    by ``part``. ``angle_rad``: the front wheel's target. ``twist``: the body's motion at the
-    present front angle. ``whole``: whether ``part`` is 1, so the speed is not limited.
+    ``speed_mps``, ``turn_radps``: the numbers for the front board.
+
+    ``part``: factor, at most 1, by which both numbers are multiplied for the drive board.
+
+    ``angle_rad``: the angle that the front wheel must reach.
+
+    ``twist``: the body's motion at the present front angle.
+
+    ``whole``: whether ``part`` is 1, so that the speed is not limited.
     """
 
     speed_mps: float
@@ -51,14 +60,14 @@ class Steered:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Geometry of the robot in m: track and wheelbase, which the manual calls B and F."""
+    """Geometry of the robot in m: the track B and the wheelbase F of the manual."""
 
     track_m: float
     wheelbase_m: float
 
     @property
     def kinematics(self) -> SteeredKinematics:
-        """Kinematics with wheels of 1 m radius, so wheel rates in rad/s equal rim speeds in m/s."""
+        """Kinematics with wheels of 1 m radius: wheel rates in rad/s equal rim speeds in m/s."""
         return SteeredKinematics(1.0, self.track_m, self.wheelbase_m)
 
 
@@ -66,20 +75,22 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def scale(twist: BodyTwist, track_m: float) -> float:
-    """Return the factor by which both numbers of an ``rc`` command are multiplied; 1 at rest."""
+    """Return the factor by which both numbers of an ``rc`` command are multiplied; 1 for a stop."""
     root = math.hypot(twist.vx_mps, twist.yaw_rate_radps)
     return outer_mps(twist, track_m) / root if root else 1.0
 
 
 def outer_mps(twist: BodyTwist, track_m: float) -> float:
-    """Return the rim speed of the faster wheel in m/s, without sign."""
+    """Return the rim speed of the outer wheel in m/s, without sign."""
     return abs(twist.vx_mps) + abs(twist.yaw_rate_radps) * track_m / 2
 
 
 def steer(
     wanted: BodyTwist, geometry: Geometry, angle_rad: float | None, *, turning: bool
 ) -> Steered:
-    """Return the command for both boards; ``angle_rad``: the front angle, None while unknown.
+    """Return the command for both boards.
+
+    ``angle_rad``: the front wheel's measured angle; None while unknown.
 
     ``turning``: whether the body already turns on the spot.
     """
@@ -104,9 +115,9 @@ def steer(
 
 
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
-    """Return the body's twist from the outer wheel's speed and the front angle.
+    """Return the body's twist at a speed of the outer wheel and an angle of the front wheel.
 
-    The equations are those of the manual. A negative ``outer_mps`` means driving backward.
+    The equations are those of the manual. A negative ``outer_mps`` means backward.
     """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)
@@ -116,7 +127,7 @@ def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTw
 def told_twist(
     speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
 ) -> BodyTwist:
-    """Return the body's twist if the drive board obeys an ``rc`` line with the given numbers."""
+    """Return the body's twist if the drive board obeys an ``rc`` line with these numbers."""
     outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
     return body_twist(outer, geometry, angle_rad)
 
@@ -124,7 +135,7 @@ def told_twist(
 def _allowed(
     wanted: BodyTwist, geometry: Geometry, target_rad: float, angle_rad: float, *, turning: bool
 ) -> float:
-    """Return the speed limit of the outer rim at the given front angle, in m/s, or infinity."""
+    """Return the largest speed of the outer rim at the present front angle, in m/s, or infinity."""
     off_rad = abs(angle_rad - target_rad)
     if abs(target_rad) >= ACROSS_RAD:
         near = off_rad <= (STILL_ALIGNED_RAD if turning else ALIGNED_RAD)

@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The sum (checksum) before a line, ``;NN``, by which a board detects most damaged lines.
+"""The checksum in front of a line, ``;NN``, by which a board detects most damaged lines.
 
-NN is the sum of the codes of all characters from 0x20 on, modulo 99, plus 1. The sum does not
-detect 1 in 99 damaged lines, the loss of a ``c`` (code 99), or the loss of two characters whose
-codes add up to 99. The module knows characters, not the meaning of a line.
+NN is the sum of the codes of all characters from 0x20 on, modulo 99, plus 1. The checksum does not
+detect 1 in 99 damaged lines. It never detects the loss of a ``c`` (code 99), or of two characters
+whose codes add up to 99.
+
+The module knows characters; it does not know the meaning of a line.
 """
 
 import re
@@ -16,17 +18,17 @@ _SUMMED: Final = re.compile(rb";([0-9]{2})(.*)", re.DOTALL).fullmatch
 
 
 def sum_of(text: bytes) -> int:
-    """Return the sum, 1..99, of a line's text without its ``;NN``."""
+    """Return the checksum, 1..99, of a line's text without its ``;NN``."""
     return sum(text.translate(None, _CONTROL)) % MODULUS + 1
 
 
 def with_sum(text: bytes) -> bytes:
-    """Return the text with its sum, ``;NN``, in front; a line end is not added."""
+    """Return the text with its checksum, ``;NN``, in front; the line end is not added."""
     return b";%02d%s" % (sum_of(text), text)
 
 
 def without_sum(line: bytes) -> tuple[bytes, bool | None]:
-    """Return the text of a line, and whether its sum is right (None if the line has none)."""
+    """Return a line's text, and whether its checksum is right (None if the line has none)."""
     if not line.startswith(b";"):
         return line, None
     found = _SUMMED(line)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversion of a Teensy's time into the host's time, and timestamps for both boards' readings.
+"""Converts a Teensy's time to the host's time, and gives all readings their timestamps.
 
-A message arrives late, never early. So the clock is the straight line that lies below all arrival
-times, plotted over the Teensy's time (`core/timing/clock_fit.py`). If a Teensy's time is too far
-from the clock, the message was damaged, or the board has restarted.
+A line may arrive late, but not early. So if arrival times are plotted over the Teensy's time, the
+clock is the straight line just below them (``core/timing/clock_fit.py``). If the time in a line is
+far from this clock, the line was damaged or the board has restarted.
 """
 
 from collections.abc import Sequence
@@ -15,26 +15,32 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Longest allowed time in s by which a line may seem to arrive before it was sent; if it seems to
-arrive earlier, the board time in the line is implausible."""
+"""Longest time in s by which a line may seem to arrive before it was sent.
+
+If it seems to arrive even earlier, the board time in the line is implausible.
+"""
 LATE_S: Final = 1.0
-"""Longest plausible delay of a line in s, even if the host was busy; if the delay seems longer, the
-board time in the line is implausible."""
+"""Longest plausible delay of a line in s, even if the host was busy.
+
+If the delay seems longer, the board time in the line is implausible.
+"""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""Limit in s of the difference between two intervals: from one board time to the next, and from one
-arrival to the next. Below this limit, the two board times agree.
+"""``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: when implausible times in a row begin a new clock.
 
-If ``AGAIN`` implausible times in a row agree, over ``AGAIN_AFTER_S`` or longer, the clock begins
-again with these times. A shorter series may be lines that waited for a stalled host and arrived at
-once.
+There must be at least ``AGAIN`` of them, over at least ``AGAIN_AFTER_S``. They must agree: from one
+to the other, the board time and the arrival time advance equally, within ``AGREE_S``. A shorter
+series may be lines that waited for a stalled host and arrived at once.
 """
 SMALLEST_STEP_S: Final = 1e-6
 
 
 class TeensyClock:
-    """Clock of one board; ``restarted``: whether the last time showed a restart of the board."""
+    """Clock of one board.
+
+    ``restarted``: whether the last time of the board showed that it has restarted.
+    """
 
     def __init__(self) -> None:
         self.restarted = False
@@ -45,8 +51,10 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """``_odds``: count of implausible times in a row. ``_odd``: the first of these times, and
-        when it arrived."""
+        """``_odds``: how many implausible times came in a row.
+
+        ``_odd``: the first of these times, and when it arrived.
+        """
         self._last_s = 0.0
 
     @property
@@ -56,7 +64,7 @@ class TeensyClock:
 
     @property
     def skew_ppm(self) -> float:
-        """How much faster the board's clock runs than the host's, in ppm."""
+        """How much faster the board's clock runs than the host's, in parts per million."""
         return 0.0 if self._fit is None else (TICK_S / self._fit.slope_s - 1.0) * 1e6
 
     def host_s(self, board_s: float) -> float:
@@ -66,13 +74,14 @@ class TeensyClock:
         return self._fit.at(tick) + board_s - tick * TICK_S
 
     def board_s(self, host_s: float) -> float:
-        """Convert a time of the host to the board's time, in s (inverse of ``host_s``)."""
+        """Convert a time of the host to the board's time, in s; this is the inverse of ``host_s``.
+        """
         assert self._fit is not None
         near_s = host_s - self.host_s(self._last_s) + self._last_s
         return near_s + (host_s - self.host_s(near_s))
 
     def see(self, board_s: float, now: float) -> bool:
-        """Take the board time of a line that came at ``now``; return False if implausible."""
+        """Receive the board time of a line that came at ``now``; return whether it is plausible."""
         self.restarted = False
         if self._fit is not None:
             late_s = now - self.host_s(board_s)
@@ -89,7 +98,7 @@ class TeensyClock:
         return True
 
     def _is_new_time(self, board_s: float, now: float) -> bool:
-        """Return whether enough implausible times agree; if so, begin a new clock."""
+        """Return whether enough implausible times agree; if they do, begin a new clock."""
         if self._odd is None or abs((board_s - self._odd[0]) - (now - self._odd[1])) >= AGREE_S:
             self._odd, self._odds = (board_s, now), 1
             return False
@@ -106,14 +115,13 @@ class TeensyClock:
 
 
 class StampedReadings:
-    """The readings that one call of the board returns, with timestamps; a ``ReadingClock``.
+    """The readings that one call of the board returns, with their timestamps; a ``ReadingClock``.
 
-    The timestamps of one kind of reading increase. A computed timestamp that is later than the call
-    is replaced by the time of the call.
+    For each kind of reading, the timestamps increase. A timestamp is not later than the call.
     """
 
     skew_ppm = 0.0
-    """How much faster the drive board's clock runs than the host's, in ppm."""
+    """How much faster the drive board's clock runs than the host's, in parts per million."""
 
     def __init__(self) -> None:
         self._last: dict[type, float] = {}
@@ -127,8 +135,8 @@ class StampedReadings:
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading with the timestamp ``stamp_s``.
 
-        The timestamp is changed if it is after ``now``, or not after the last one of the same kind
-        of reading.
+        The timestamp is changed in two cases: it is after ``now``, or it is not after the last
+        timestamp of the same kind of reading.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         stamp_s = min(stamp_s, now)
@@ -140,17 +148,17 @@ class StampedReadings:
         self._stamps.append(stamp_s)
 
     def restart(self) -> None:
-        """Do nothing, because the timestamps come from the board's own times."""
+        """Do nothing, because the timestamps come from the times that the board sends."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
         """Return the timestamps of the added readings.
 
-        If their count is not that of ``readings``, return ``now`` for each of ``readings``.
+        If ``readings`` has another length, return ``now`` for each reading.
         """
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the timestamp of the first added reading; ``now`` if no reading was added."""
+        """Return the timestamp of the first added reading; ``now`` if there is none."""
         return self._stamps[0] if self._stamps else now

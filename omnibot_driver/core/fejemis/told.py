@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Notices for the user of this robot: each text is shown at most once in ``TELL_EVERY_S``.
+"""Notices for the user of a Fejemis. Each text is shown at most once in ``TELL_EVERY_S``.
 
-A notice that stops the robot is always added, but its text is empty if the same text was shown
-recently.
+A notice that stops the robot is never left out. If its text was shown recently, its text is empty.
 """
 
 import math
@@ -12,27 +11,30 @@ from typing import Final
 from omnibot_driver.core.readings import NoticeReading
 
 TELL_EVERY_S: Final = 10.0
-"""Shortest time between two equal notices, in s."""
+"""Shortest time in s between two notices with the same text."""
 
 
 class Told:
-    """Collects notices; ``notices``: the notices that the caller has not taken yet."""
+    """Collects notices.
+
+    ``notices``: the notices that the caller has not taken yet.
+    """
 
     def __init__(self) -> None:
         self.notices: list[NoticeReading] = []
         self._told_at: dict[str, float] = {}
 
     def halt(self, text: str, now: float) -> None:
-        """Add a notice that stops the robot; ``text``: the reason for the user."""
+        """Add a notice that stops the robot; ``text`` gives the reason."""
         self.notices.append(NoticeReading(self._news(text, now), halt=True))
 
     def tell(self, text: str, now: float) -> None:
-        """Add a notice of something that does not stop the robot."""
+        """Add a notice that does not stop the robot."""
         if text := self._news(text, now):
             self.notices.append(NoticeReading(text, halt=False))
 
     def remark(self, text: str) -> None:
-        """Add a notice that the user gets only once."""
+        """Add a notice that is shown only once."""
         if text not in self._told_at:
             self._told_at[text] = math.inf
             self.notices.append(NoticeReading(f"{text} (reported once)", halt=False))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The features of a Fejemis, and what to check when such a robot does not obey."""
+"""The constant properties of a Fejemis, and advice for a robot that does not obey."""
 
 from typing import Final
 
@@ -11,8 +11,7 @@ from omnibot_driver.core.traits import Traits
 
 DRIVE: Final = 0
 FRONT: Final = 1
-"""``DRIVE``, ``FRONT``: channels of the two boards as configured; heartbeats show whether the ports
-are swapped."""
+"""``DRIVE``, ``FRONT``: channels of the two boards, if the ports are not swapped."""
 
 TRAITS: Final = Traits(
     channels=("drive", "front"),

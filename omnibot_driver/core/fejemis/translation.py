@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversion of both boards' messages into readings in SI units, each with its timestamp.
+"""Converts both boards' messages into readings in SI units, each with its timestamp.
 
-The module knows units and readings; it does not act on the readings.
+The module knows units and readings; it does not know what the readings are used for.
 """
 
 import math
@@ -38,13 +38,19 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, Reading
 
 TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
-"""Shortest time between two notices of a low battery, in s."""
+"""Shortest time in s between two notices of a low battery."""
 PERIOD_S: Final = 0.03
-"""Age of the last IMU sample, in s, below which an orientation gets that sample's timestamp."""
+"""Age of the last IMU sample, in s, up to which an orientation gets the timestamp of this sample.
+"""
 
 
 class Translation:
-    """Converter of messages to readings; ``front``: state of the front wheel."""
+    """Converter of messages to readings.
+
+    ``front``: state of the front wheel.
+
+    ``stamped``: the readings with their timestamps.
+    """
 
     def __init__(self, settings: FejemisSettings) -> None:
         self._settings = settings
@@ -70,7 +76,8 @@ class Translation:
         self._imu_at = self._imu_stamp_s = -math.inf
 
     def restarted(self) -> None:
-        """Forget the odometry's frame and the IMU's sampling times: the drive board restarted."""
+        """Forget the last pose and the IMU's sampling times, because the drive board has restarted.
+        """
         self.odometry.forget()
         self._begin_imu()
 
@@ -83,7 +90,7 @@ class Translation:
         self.stamped.add(reading, now, now)
 
     def extra(self, content: object, now: float) -> None:
-        """Add a value that only this kind of robot has, with ``now`` as its timestamp."""
+        """Add a reading that only a Fejemis has, with ``now`` as its timestamp."""
         self.add(ExtraReading(content), now)
 
     def steering(self, angle_rad: float, now: float) -> None:
@@ -91,7 +98,7 @@ class Translation:
         self.extra(SteeringReading(angle_rad), now)
 
     def hear_front(self, message: Message, now: float) -> None:
-        """Convert a message of the front board other than its angle."""
+        """Convert a message of the front board. Its angle is handled elsewhere."""
         if isinstance(message, Infrared):
             first, second = message.distances_m
             self.extra(RangeReading("ir1", _seen(first)), now)
@@ -129,7 +136,7 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add the complete IMU samples; call this after a pose and at the end of a read."""
+        """Add all complete IMU samples; call this after a pose and at the end of a read."""
         for item in self._pairs.take():
             if isinstance(item, Pair):
                 self._sample(item, clock)
@@ -184,5 +191,5 @@ def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
 
 
 def _seen(distance_m: float) -> float:
-    """Return the distance in m; infinity if the sensor did not measure a positive distance."""
+    """Return the distance in m; infinity for 0 or a negative number, which reports no distance."""
     return distance_m if distance_m > 0.0 else math.inf

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keeps both boards sending and configured, and runs requests other than motion.
+"""Keeps both boards sending and configured, and runs the user's requests other than motion.
 
-The module combines subscriptions, polls, configuration, jobs, brush, lift and lights. It collects
-the lines that these parts have to send; it passes answers on to these parts, without using the
-answers itself.
+The module combines the parts for subscriptions, polls, configuration, jobs, brush, lift and lights.
+It collects their lines, and passes messages to them.
 """
 
 from typing import Final
@@ -24,9 +23,13 @@ GEOMETRIES_DIFFER_M: Final = 0.002
 
 
 class Upkeep:
-    """Upkeep of both boards; ``machine``: brush, lift and lights; ``jobs``: the running job.
+    """Upkeep of both boards.
 
-    ``configurations`` and ``polls`` have one entry for each board's role.
+    ``machine``: brush, lift and lights of the front board.
+
+    ``jobs``: the running job.
+
+    ``configurations``, ``polls``: one entry for each board, by its role.
     """
 
     def __init__(self, ports: Ports, settings: FejemisSettings) -> None:
@@ -36,7 +39,7 @@ class Upkeep:
         self.polls = {role: Polls(role) for role in ROLES}
 
     def configure(self, settings: FejemisSettings) -> None:
-        """Use new settings; values for the boards are written while the robot is at rest."""
+        """Use new settings. They are written to the boards while the robot stands still."""
         self._settings = settings
         for configuration in self.configurations.values():
             configuration.configure(settings.written)
@@ -49,7 +52,10 @@ class Upkeep:
             self._begin(role)
 
     def restarted(self, role: Role) -> None:
-        """Configure a restarted board again, switch brush and lift off, and fail a running job."""
+        """Configure a restarted board again, and end what the restart has interrupted.
+
+        Brush and lift are switched off, and the running job ends as failed.
+        """
         self._begin(role)
         self.machine.begin()
         self.jobs.restarted(role)
@@ -60,7 +66,10 @@ class Upkeep:
 
     @property
     def geometry(self) -> Geometry:
-        """Track and wheelbase in m, as used by the drive board; until known, from the settings."""
+        """Track and wheelbase in m, as the drive board uses them.
+
+        Until the board has reported them, they come from the settings.
+        """
         nominal = Geometry(self._settings.track_m, self._settings.wheelbase_m)
         return self.configurations["drive"].geometry or nominal
 
@@ -106,7 +115,7 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """The reason why a new board must not drive the robot yet; empty once it is configured."""
+        """Why a newly connected board must not drive the robot yet; empty once it is configured."""
         for configuration in self.configurations.values():
             if configuration.pending:
                 return (
@@ -117,7 +126,7 @@ class Upkeep:
 
     @property
     def advice(self) -> str | None:
-        """Advice on what the user should set or update; None if nothing is wrong."""
+        """Advice on what the user should set or update; None if there is nothing to advise."""
         for configuration in self.configurations.values():
             if configuration.failed:
                 names = ", ".join(setting.command for setting in configuration.failed)

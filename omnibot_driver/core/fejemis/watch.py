@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Timeouts: a silent board, or an angle or a pose that is too old to drive.
+"""Checks timeouts: a board is silent, or the last front angle or pose is too old to drive.
 
-The module knows when lines came, not what they contain.
+The module knows when lines came; it does not know what they contain.
 """
 
 import math
@@ -14,19 +14,21 @@ from omnibot_driver.core.fejemis.ports import PARAMETERS, Ports
 from omnibot_driver.core.fejemis.told import Told
 
 NO_POSE_S: Final = 0.25
-"""Age of the pose in s after which the robot is stopped."""
+"""Age of the last pose in s above which the robot is stopped."""
 NO_ANGLE_S: Final = 0.25
 """Time in s without a front angle after which brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
-"""Silence in s after which the board at a newly opened port is reported as missing."""
+"""Silence in s after which the user is notified that the board at an opened port is missing."""
 SLACK_S: Final = 1e-6
 
 
 class Watch:
     """The timeouts.
 
-    ``blind``: whether the front angle is too old. ``unposed``: whether the pose is too old.
+    ``blind``: whether the front wheel's angle is too old, or its sensor is faulty.
+
+    ``unposed``: whether the last pose is too old.
     """
 
     def __init__(self, ports: Ports, front: FrontWheel, told: Told) -> None:
@@ -40,17 +42,18 @@ class Watch:
         self._patient_until = -math.inf
 
     def stalled(self) -> None:
-        """Record a stall of the driver, which must not be regarded as silence of the boards."""
+        """Record a stall of the driver, so that it is not regarded as silence of the boards."""
         self._stalled = True
 
     def open(self, now: float) -> None:
-        """Record that the ports are open at ``now``; only the first call counts."""
+        """Record that the ports have been open since ``now``; later calls do not change this time.
+        """
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:
-        """Check all timeouts, and add notices of new ones.
+        """Check all timeouts, and add notices of the new ones.
 
-        Return whether a board has ceased to send the stream that driving requires (``NEEDED``).
+        Return whether a board no longer sends the stream that driving requires (``NEEDED``).
         """
         if self._stalled:
             self._stalled, self._patient_until = False, now + SILENT_S
@@ -60,7 +63,7 @@ class Watch:
 
     @property
     def wake_at(self) -> float:
-        """Time at which an angle or a pose becomes too old, in s."""
+        """Time in s at which the last angle or pose becomes too old."""
         times = [math.inf]
         drive = self._ports.half("drive")
         if not self.blind:
@@ -71,7 +74,7 @@ class Watch:
 
     @property
     def front_unheard_at(self) -> float:
-        """Time in s from which brush and lift must be off if the front board remains silent."""
+        """Time in s at which brush and lift must be off, unless a front angle arrives before."""
         front = self._ports.half("front")
         return -math.inf if front is None else front.came_at("fwl") + NO_ANGLE_S + SLACK_S
 
