@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tools for a robot's users: they talk to a running driver or read its bags."""
+"""Tools for the robot's users. They communicate with a running driver, or read its bags."""

@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find drivers, whatever their boards are, by the topics that every driver publishes."""
+"""Finds running drivers of any board by the topics that every driver publishes."""
 
 from collections.abc import Iterable
 from typing import Any, Final
 
 SIGNS: Final = {"state": "std_msgs/msg/String", "estop_active": "std_msgs/msg/Bool"}
-"""Topics that every driver publishes under its own name, and the types of these topics."""
+"""The topics that every driver publishes in its own namespace, with their types."""
 
 
 def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the full names of the drivers; ``topics``: pairs of the name and type of a topic."""
+    """Return the full names of the drivers; ``topics``: name and type of each topic."""
     pairs = set(topics)
     names = {topic.rpartition("/")[0] for topic, _kind in pairs}
     return sorted(
@@ -21,7 +21,7 @@ def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def running_drivers(node: Any) -> list[str]:
-    """Return the full names of the drivers that publish now, as far as this rclpy node knows."""
+    """Return the full names of the drivers that publish now, as far as the rclpy ``node`` knows."""
     found = node.get_topic_names_and_types()
     return [
         name

@@ -1,13 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Import libraries that only the tools need, or say how to install them."""
+"""Imports a library that only the tools need, or says how to install it."""
 
 from importlib import import_module
 from types import ModuleType
 
 
 class ToolError(Exception):
-    """An error that ends a tool; its message is a sentence with a remedy."""
+    """An error that ends a tool. Its message is a sentence that says what to do."""
 
 
 def need(module: str) -> ModuleType:

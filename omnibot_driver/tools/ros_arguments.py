@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Separate ROS's arguments from the program's own on a command line. Needs no ROS."""
+"""Separates the arguments for ROS from those for the program. Does not need ROS."""
 
 from collections.abc import Sequence
 
 
 def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the program's own arguments, and those of ROS.
+    """Return the arguments for the program, and those for ROS.
 
-    ROS's arguments stand between ``--ros-args`` and ``--`` (or the end), and include both markers.
+    Those for ROS are between ``--ros-args`` and ``--``, or the end. They include both markers.
     """
     own: list[str] = []
     ros: list[str] = []

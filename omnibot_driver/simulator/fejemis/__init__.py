@@ -2,8 +2,8 @@
 
 """The two simulated Teensys of the Fejemis, written from the manual and public host programs.
 
-This package shares no code with the driver, so that tests can show where either of them
-misinterprets the manual. ``SimulatedFejemis`` is pure: it reads no clock and no port.
+The package shares no code with the driver, so tests can show where either of them misinterprets the
+manual. ``SimulatedFejemis`` reads no clock and no port.
 """
 
 from omnibot_driver.simulator.fejemis.board import CHANNELS, SimulatedFejemis

@@ -1,14 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pair of simulated Teensys and their robot, which advance in steps of a millisecond.
+"""The two simulated Teensys and their robot, which advance in steps of a millisecond.
 
-The module is pure: it takes bytes, advances by ticks of ``tick_s``, and returns bytes; the same
-settings and input give the same output. It knows which Teensy is at which port, and when a fault
-occurs. It must not know commands.
+The module takes bytes, advances by ticks of ``tick_s``, and returns bytes. The same settings and
+input give the same output. The module knows which Teensy is at which port, and when a fault occurs.
+It must not know commands.
 
-Assumptions where the manual says nothing: an ``rc`` never expires; a Teensy that restarts switches
-its motors off and forgets its subscriptions; the front wheel stays where it is until an ``rc``
-comes.
+The manual does not say some things, so the module assumes:
+
+- An ``rc`` command stays in effect until the next one.
+- A Teensy that restarts switches its motors off and forgets its subscriptions.
+- The front wheel stays where it is until an ``rc`` command comes.
 """
 
 from collections.abc import Mapping
@@ -28,7 +30,11 @@ STEPS_PER_TICK = 2
 class SimulatedFejemis:
     """A simulated Fejemis with the common interface of simulated boards.
 
-    drive, front: the two Teensys. vehicle: the robot. tick: number of ticks since construction.
+    ``drive``, ``front``: the two Teensys.
+
+    ``vehicle``: the robot that they move.
+
+    ``tick``: number of ticks since construction.
     """
 
     channels = CHANNELS
@@ -68,8 +74,8 @@ class SimulatedFejemis:
     def befall(self, half: str, what: str) -> None:
         """Apply the fault ``what`` to one Teensy now.
 
-        The fault is a name in ``FAULTS`` or, for the front Teensy only, in ``SENSOR_FAULTS``.
-        Raises KeyError for an unknown fault.
+        ``what`` is a name in ``FAULTS``; for the front Teensy, it may also be one in
+        ``SENSOR_FAULTS``. Raises KeyError for an unknown fault.
         """
         allowed(half)[what](self.half(half))
 
@@ -78,7 +84,7 @@ class SimulatedFejemis:
         self._at_port[channel].receive(data)
 
     def advance(self) -> list[Packet]:
-        """Advance by one tick; return the bytes that each port sends in this tick."""
+        """Advance by one tick; return the bytes that each port sends during this tick."""
         self.tick += 1
         sent: list[bytes] = [b"", b""]
         for _ in range(STEPS_PER_TICK):
@@ -96,14 +102,14 @@ class SimulatedFejemis:
         return [(channel, data) for channel, data in enumerate(sent) if data]
 
     def reboot(self) -> None:
-        """Cycle the power of both Teensys; the robot stays where it is."""
+        """Switch both Teensys off and on again. The robot stays where it is."""
         for half in (self.drive, self.front):
             half.powered = True
             half.reboot()
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """Facts about the robot and its boards, by name."""
+        """Facts about the robot and its boards, by name, for tests and users of the simulator."""
         truth, drive, front, vehicle = self.truth, self.drive, self.front, self.vehicle
         return {
             "x_m": truth.x_m,

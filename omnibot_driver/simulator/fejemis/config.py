@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Contents of the configuration memory of each Teensy, with the factory values."""
+"""What each Teensy stores in its configuration memory, with the factory values."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,11 @@ Vector = tuple[float, float, float]
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
-"""Factory parameters of the steering controller, in the order use, Kp, useI, taui, ilimit, 1,
-useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp, useULim, Ulim: the manual's P-Lead controller,
-with tp = alpha * tau_d."""
+"""Factory parameters of the steering controller: the manual's P-Lead controller.
+
+The order is use, Kp, useI, taui, ilimit, 1, useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp,
+useULim, Ulim. tp is alpha * tau_d.
+"""
 
 WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
 
@@ -20,8 +22,9 @@ WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
 class DriveConfig:
     """Configuration of the drive Teensy.
 
-    wheel_base_m: distance between the driving wheels, for odometry. confs_m: B and F of the turning
-    control.
+    ``wheel_base_m``: distance between the driving wheels, which the odometry uses.
+
+    ``confs_m``: B and F, which the turning control uses.
     """
 
     number: int
@@ -42,8 +45,12 @@ class DriveConfig:
 class FrontConfig:
     """Configuration of the front Teensy.
 
-    confs_m: wheelbase and steer base. ir: A1, B1, A2, B2, the readings of the two infrared sensors
-    at 13 cm (A) and 50 cm (B). steering: parameters in the order of ``cpsteer``.
+    ``confs_m``: B and F, as on the drive Teensy. The steering uses only F.
+
+    ``ir``: raw readings of the two infrared sensors, in the order A1, B1, A2, B2. A is the reading
+    at 13 cm, B the reading at 50 cm.
+
+    ``steering``: parameters of the steering controller, in the order of ``cpsteer``.
     """
 
     number: int

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two distance sensors of the drive Teensy, which face a wall across the x axis.
+"""The two distance sensors of the drive Teensy. They face a wall across the x axis.
 
-The time-of-flight sensor always measures; the sonar measures only when triggered. This module knows
-only the robot's pose.
+The time-of-flight sensor always measures. The sonar measures only when it is triggered. The module
+knows only the robot's pose.
 """
 
 from math import cos
@@ -18,7 +18,7 @@ SONAR_FAR_M = 4.0
 class Distances:
     """The two distance sensors.
 
-    sonar_m: the last measurement of the sonar, in m; 0 if the wall was out of range.
+    ``sonar_m``: last measurement of the sonar in m; 0 if the wall was out of range.
     """
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
@@ -32,7 +32,7 @@ class Distances:
 
     @property
     def tof_m(self) -> float:
-        """Distance by time of flight, in m; the sensor's range if the wall is further away."""
+        """Distance in m by time of flight; the sensor's range if the wall is further away."""
         return min(TOF_FAR_M, max(0.0, self._wall_m()))
 
     def _wall_m(self) -> float:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The drive Teensy: turning control of two wheels, odometry, IMU, battery, distance sensors.
+"""The drive Teensy: control of the driving wheels, odometry, IMU, battery, distance sensors.
 
-This module knows the drive half of the manual and the robot. It must not know the front Teensy: the
-angle of the front wheel comes only with a command.
+This module knows the drive half of the manual and the robot. It must not know the front Teensy: it
+learns the front wheel's angle only from a command.
 """
 
 from collections.abc import Callable
@@ -25,9 +25,13 @@ STOPPED, FREE = -1, 10
 class DriveTeensy(Teensy[DriveConfig]):
     """The simulated drive Teensy.
 
-    source: rcSource of the heartbeat, -1 while stopped. reference: v in m/s and w in rad/s of the
-    last ``rc``. told_angle_deg: angle of the front wheel in the last ``fwl``. off_at_s: when the
-    power is cut, or None.
+    ``source``: the rcSource of the heartbeat, -1 while the Teensy is stopped.
+
+    ``reference``: speed in m/s and turn rate in rad/s of the last ``rc`` command.
+
+    ``told_angle_deg``: angle of the front wheel in the last ``fwl`` command.
+
+    ``off_at_s``: time at which the Teensy cuts the power; None if no power-off is requested.
     """
 
     version = 110
@@ -54,8 +58,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         )
 
     def boot(self) -> None:
-        """Reset reference, wheel speeds and pose, cancel a requested power-off, restart the
-        sensors."""
+        """Reset speeds, pose and sensors, and cancel a requested power-off."""
         self.off_at_s = None
         self.source = FREE
         self.reference = (0.0, 0.0)
@@ -68,13 +71,14 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.imu.boot()
 
     def started(self) -> None:
-        """Reset the pose at the end of a boot, so wheel turns during the boot are not counted."""
+        """Reset the pose at the end of a boot, so that wheel turns during the boot do not move it.
+        """
         self._reset_pose()
 
     # Each cycle
 
     def cycle(self) -> None:
-        """Run one cycle: power, odometry, IMU, turning control."""
+        """Run one control cycle: power, odometry, IMU and control of the wheels."""
         self.vehicle.powered = True
         if self.off_at_s is not None and self._told_s >= self.off_at_s:
             self.powered = self.vehicle.powered = False
@@ -101,7 +105,7 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     @property
     def ticks(self) -> tuple[int, int]:
-        """Ticks of the left and the right encoder since the boot or the last ``enc0``."""
+        """Ticks of the left and the right encoder since the boot or the last ``enc0`` command."""
         left, right = self._raw_ticks()
         return left - self._ticks_at_boot[0], right - self._ticks_at_boot[1]
 
@@ -125,7 +129,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return, by item of the help text, the function that returns the item's line."""
+        """Return the functions that write the lines, by the name of the line in the help text."""
         return super().items() | {
             "hbt": self._heartbeat,
             "adc": lambda: f"adc {self.settings.volts * 100:.0f} 2050 812 790 0",
@@ -180,10 +184,9 @@ class DriveTeensy(Teensy[DriveConfig]):
         return "mago " + " ".join(f"{x:.4f}" for x in (*config.mag_offset_ut, *config.mag_matrix))
 
     def velocity(self) -> tuple[float, float]:
-        """Return the speed of the left and the right wheel in m/s.
+        """Return the speeds of the left and the right wheel in m/s.
 
-        The speeds are not quantised, because the firmware measures the time between two ticks of an
-        encoder.
+        The firmware measures the time between two encoder ticks, so the speeds are not quantised.
         """
         (left, right), (left_m, right_m) = self.vehicle.radps, self.config.radii_m
         return left * left_m, right * right_m
@@ -209,7 +212,8 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """Return the functions that execute the commands in the help text, by name."""
+        """Return the functions that execute the commands, by the command's name in the help text.
+        """
         return super().commands_table() | {
             "rc": self._remote_control,
             "fwl": self._front_wheel,
@@ -287,5 +291,5 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     @property
     def turn_dps(self) -> float:
-        """Turn rate of the last ``rc``, in deg/s."""
+        """Turn rate of the last ``rc`` command, in degrees per second."""
         return degrees(self.reference[1])

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Faults that can occur in one of the two Teensys at any time, by name.
+"""The faults that can occur in each of the two Teensys, by name.
 
-This module knows the meaning of each name. It must not know when a fault occurs.
+This module knows what each fault does. It must not know when a fault occurs.
 """
 
 from collections.abc import Callable
@@ -35,7 +35,7 @@ FAULTS: dict[str, Callable[[Half], None]] = {
     "sums-begin": _set(sums=True),
     "sums-end": _set(sums=False),
 }
-"""Faults of either Teensy, by name."""
+"""Faults that either Teensy can have, by name."""
 
 SENSOR_FAULTS: dict[str, Callable[[Half], None]] = {
     "sensor-well": _set(diagnosis=HEALTHY, error_flags=0, frozen=False, absent=False),
@@ -54,7 +54,7 @@ SENSOR_FAULTS: dict[str, Callable[[Half], None]] = {
     "loops-unfinished": _diagnosis(1 << 1),
     "supply-5v": _diagnosis(1 << 0),
 }
-"""Faults of the angle sensor, which only the front Teensy has, by name."""
+"""Faults of the angle sensor, by name. Only the front Teensy can have them."""
 
 
 def allowed(half: str) -> dict[str, Callable[[Half], None]]:

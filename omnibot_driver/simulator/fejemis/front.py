@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The front Teensy: steering, its angle sensor, brush, lift, LEDs and infrared sensors.
+"""The front Teensy: the steered wheel and its angle sensor, brush, lift, LEDs, infrared sensors.
 
 This module knows the front half of the manual and the robot. It must not know the drive Teensy.
 """
@@ -27,12 +27,20 @@ LED_DEFAULT = (0, 20, 0)
 class FrontTeensy(Teensy[FrontConfig]):
     """The simulated front Teensy.
 
-    wanted_deg: target angle of the steered wheel, None before the first ``rc``. leds: RGB of each
-    LED.
+    ``wanted_deg``: angle that the steered wheel must reach; None before the first ``rc`` command.
 
-    The caller may set the following faults of the angle sensor. diagnosis: diagnosis bits without
-    the frame counter. error_flags: error flags. frozen: the sensor repeats its last angle. absent:
-    the angle reads zero, and the diagnosis says that the magneto core loops have not finished.
+    ``leds``: red, green and blue of each LED.
+
+    The caller may set these faults of the angle sensor:
+
+    ``diagnosis``: the diagnosis bits without the frame counter.
+
+    ``error_flags``: the error flags.
+
+    ``frozen``: whether the sensor repeats its last angle.
+
+    ``absent``: whether the sensor is missing. The angle is then 0, and the diagnosis says that the
+    magneto core loops have not finished.
     """
 
     version = 100
@@ -55,7 +63,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         )
 
     def boot(self) -> None:
-        """Reset the state; the wheel stays where it is, brush and lift are off."""
+        """Reset the state. The wheel stays where it is; brush and lift are off."""
         self.wanted_deg: float | None = None
         self._error_deg = self._lead_deg = 0.0
         self.vehicle.servo.command = 0.0
@@ -72,7 +80,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # Each cycle
 
     def cycle(self) -> None:
-        """Measure the angle, stop the lift when its time is over, and steer."""
+        """Measure the angle, stop the lift when its run time is over, and steer."""
         self._measured_deg = self._measure()
         if self.hung:
             return
@@ -90,7 +98,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         return -seen_deg if self.config.angle_inverted else seen_deg
 
     def _steer(self) -> None:
-        """Set the servo's velocity with the P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
+        """Set the speed of the servo with the P-Lead controller ``Kp (tz s + 1) / (tp s + 1)``."""
         servo, gains = self.vehicle.servo, self.config.steering
         if self._servo_raw is not None:
             servo.command = self._servo_raw
@@ -112,7 +120,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return, by item of the help text, the function that returns the item's line."""
+        """Return the functions that write the lines, by the name of the line in the help text."""
         return super().items() | {
             "hbt": lambda: (
                 f"hbt {self.clock_text(4)} {self.config.number} {self.version} 0.00 1 0.011"
@@ -170,7 +178,8 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """Return the functions that execute the commands in the help text, by name."""
+        """Return the functions that execute the commands, by the command's name in the help text.
+        """
         return super().commands_table() | {
             "brush": self._set_brush,
             "ledb": self._set_band,
@@ -197,7 +206,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         }
 
     def _remote_control(self, rest: str) -> None:
-        """Set the target angle ``theta = atan2(S w, v)``, limited to ±90°."""
+        """Set the angle that the wheel must reach, ``theta = atan2(F w, v)``, limited to ±90°."""
         _, v, turn_dps = wire.padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)
         if v < 0.0 and self.firmware.reverse == "mirrored":

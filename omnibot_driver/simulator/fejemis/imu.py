@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The IMU on the drive Teensy: gyro, accelerometer, magnetometer, orientation, calibration.
+"""The IMU on the drive Teensy: gyro, accelerometer, magnetometer, orientation and calibration.
 
-This module knows the true motion of the body. It must not know the lines of the protocol.
+This module knows the true motion of the robot. It must not know the lines of the protocol.
 """
 
 from collections.abc import Iterator
@@ -16,15 +16,17 @@ from omnibot_driver.simulator.fejemis.vehicle import Vehicle
 
 GRAVITY_MPS2 = 9.80665
 EARTH_UT = (17.0, 0.0, -47.0)
-"""Magnetic field of the earth in µT: north is along x, and most of the field points down."""
+"""Magnetic field of the earth in µT. North is along x, and the field points mostly down."""
 CALIBRATION_S = 1.0
 
 
 class Imu:
     """The simulated IMU.
 
-    orientation: roll, pitch and yaw in rad. calibrated: the result of a calibration that has just
-    ended, to be stored in the configuration; otherwise None.
+    ``orientation``: roll, pitch and yaw in rad.
+
+    ``calibrated``: new offsets from a calibration that has just ended, for the configuration;
+    otherwise None.
     """
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
@@ -36,12 +38,12 @@ class Imu:
         self._samples: list[Vector] = []
 
     def boot(self) -> None:
-        """Reset the orientation and cancel a calibration in progress."""
+        """Reset the orientation, and cancel the running calibration."""
         self.orientation = (0.0, 0.0, 0.0)
         self._kind, self._samples = "", []
 
     def cycle(self, step_s: float, config: DriveConfig) -> None:
-        """Integrate the yaw over one step, and continue a calibration in progress."""
+        """Integrate the yaw over one step, and continue the running calibration."""
         truth = self._vehicle.truth
         bias_dps = self._settings.gyro_bias_dps[2] - config.gyro_offset_dps[2]
         roll, pitch, yaw = self.orientation
@@ -51,11 +53,11 @@ class Imu:
             self._calibrate(step_s)
 
     def calibrate_gyro(self) -> None:
-        """Begin to average the gyro for 1 s, even if the robot moves."""
+        """Begin to average the gyro for 1 s, even while the robot moves."""
         self._kind, self._left_s, self._samples = "gyro", CALIBRATION_S, []
 
     def calibrate_accelerometer(self) -> None:
-        """Begin to average the accelerometer for 1 s, with the board assumed to be level."""
+        """Begin to average the accelerometer for 1 s. The board is assumed to be level."""
         self._kind, self._left_s, self._samples = "accel", CALIBRATION_S, []
 
     def _calibrate(self, step_s: float) -> None:
@@ -71,11 +73,11 @@ class Imu:
         self._kind = ""
 
     def gyro(self, config: DriveConfig) -> Iterator[float]:
-        """Return the turn rates in deg/s, minus the configured offsets."""
+        """Return the turn rates in degrees per second, minus the configured offsets."""
         return _minus(self._raw_gyro(), config.gyro_offset_dps)
 
     def accel(self, config: DriveConfig) -> Iterator[float]:
-        """Return the specific force in m/s², corrected by the configured calibration."""
+        """Return the specific force in m/s², with the configured offsets and scales applied."""
         raw, offset = self._raw_accel(), config.accel_offset_mps2
         return (
             (axis - off) * scale
@@ -83,13 +85,13 @@ class Imu:
         )
 
     def mag_raw(self) -> Vector:
-        """Return the magnetic field in µT, uncalibrated, in the axes of the board."""
+        """Return the magnetic field in µT in the axes of the board, without calibration."""
         yaw = self._vehicle.truth.yaw_rad
         north, _, up = EARTH_UT
         return (north * cos(yaw), -north * sin(yaw), up)
 
     def mag(self, config: DriveConfig) -> Iterator[float]:
-        """Return the magnetic field in µT, corrected by the configured calibration."""
+        """Return the magnetic field in µT, with the configured offsets and matrix applied."""
         shifted = list(_minus(self.mag_raw(), config.mag_offset_ut))
         rows = [config.mag_matrix[at : at + 3] for at in (0, 3, 6)]
         return (sum(a * b for a, b in zip(row, shifted, strict=True)) for row in rows)

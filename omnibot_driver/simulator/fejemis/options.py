@@ -2,7 +2,7 @@
 
 """Command line options of a simulated Fejemis, except its seed and the faults of its lines.
 
-This module knows the names, values and effects of options. It must not know what runs the boards.
+This module knows the options and their effects. It must not know what runs the boards.
 """
 
 import argparse
@@ -103,7 +103,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def from_arguments(arguments: argparse.Namespace) -> SimulatedFejemis:
-    """Return the pair of boards that the parsed options describe."""
+    """Return the simulated Fejemis that the parsed options describe."""
     names = [name.replace("-", "_") for name, _ in _SWITCHES]
     return SimulatedFejemis(
         FejemisSettings(

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of the simulated pair of Teensys and its robot: sizes, firmware, deliberate errors.
+"""Settings of the two simulated Teensys and their robot: sizes, firmware, planned faults.
 
-``Firmware`` has one switch for each difference between the manual, the public host programs and
-related firmware, and for what the manual leaves open.
+The manual, the public host programs and related firmware differ, and the manual leaves some things
+open. ``Firmware`` has one switch for each such point.
 """
 
 from dataclasses import dataclass, field
@@ -17,25 +17,38 @@ WHEEL_BASE_M = 0.40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Firmware:
-    """Variant of the firmware, one switch for each difference.
+    """Variant of the firmware. Each switch decides one point on which the sources differ.
 
-    sums: lines carry the checksum ``;NN`` and are checked, as with the public host programs. If
-        False, as in the manual, a line that begins with ``;`` is an unknown command.
-    reverse: how the steering handles an angle beyond 90° at a negative speed. mirrored: the wheel
-        takes the angle of the same curve driven forward; clamped: the wheel stays at 90°.
-    timed_velocity: ``vel`` begins with the time.
-    acceleration_in_g: ``acc`` is in g, not m/s².
-    tilt: ``pose`` has a fifth number.
-    carriage_return: lines end with ``\\r\\n``.
-    start_resumes: after ``start`` the last ``rc`` is in effect again, even if sent while stopped.
-    confirms: a command after ``!`` is confirmed, as in newer related firmware.
-    shows_source: the heartbeat of the drive Teensy has the source of the last ``rc``; otherwise
-        only 10 or -1.
-    single_precision: times are float32, so after an hour they have steps of 0.2 ms.
-    says_start: a boot ends with the line ``# Starting main loop``. If this line is damaged, the
-        boot looks to the host like that of a firmware without the line.
-    exact_words: a command without numbers is recognised only if its line has nothing else, not even
-        a space; related firmware compares ``stop`` in this way.
+    ``sums``: lines carry the checksum ``;NN`` and are checked, as with the public host programs. If
+    False, as in the manual, a line that begins with ``;`` is an unknown command.
+
+    ``reverse``: what the steering does with an angle beyond 90° at a negative speed. With
+    ``mirrored``, the wheel takes the angle of the same curve driven forward. With ``clamped``, it
+    stays at 90°.
+
+    ``timed_velocity``: ``vel`` begins with the time.
+
+    ``acceleration_in_g``: ``acc`` is in g, not in m/s².
+
+    ``tilt``: ``pose`` has a fifth number.
+
+    ``carriage_return``: lines end with a carriage return and a line feed.
+
+    ``start_resumes``: after ``start``, the last ``rc`` command is in effect again, even if it came
+    while the Teensy was stopped.
+
+    ``confirms``: a command after ``!`` is confirmed, as in newer related firmware.
+
+    ``shows_source``: the heartbeat of the drive Teensy shows the source of the last ``rc`` command.
+    If False, it shows only 10 or -1.
+
+    ``single_precision``: times are float32, so after an hour they advance in steps of 0.2 ms.
+
+    ``says_start``: a boot ends with the line ``# Starting main loop``. If False, a boot looks to
+    the host as if this line was lost.
+
+    ``exact_words``: a command without numbers is recognised only if its line contains nothing else,
+    not even a space. Related firmware compares ``stop`` in this way.
     """
 
     sums: bool = True
@@ -54,9 +67,13 @@ class Firmware:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """A planned fault of the Teensy ``half``, which occurs ``at_s`` seconds after construction.
+    """A planned fault of one Teensy.
 
-    ``what`` is the fault's name in ``faults``.
+    ``at_s``: when the fault occurs, in s after construction.
+
+    ``half``: the Teensy, ``drive`` or ``front``.
+
+    ``what``: name of the fault in ``faults.py``.
     """
 
     at_s: float
@@ -66,21 +83,45 @@ class Fault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FejemisSettings:
-    """Settings of the pair of Teensys, its robot and its surroundings.
+    """Settings of the two Teensys, their robot and its surroundings.
 
-    wheel_radius_scale, track_scale: true value divided by the configured one. slip: standard
-    deviation in m of the distance of a wheel after 1 m. motor_lag_s: time constant of the speed of
-    a driving wheel. steer_base_m: distance from the axle to the steered wheel, the manual's S, F or
-    f. servo_degps: speed of the servo at its full velocity value 1000, chosen so that the manual's
-    controller crosses over at 12 rad/s; servo_lag_s: time constant of the servo's speed.
-    sensor_zero_deg: zero offset of the angle sensor, which the factory configuration corrects.
-    angle_noise_deg, gyro_noise_dps, accel_noise_mps2: standard deviations. gyro_bias_dps,
-    accel_bias_mps2: biases that a calibration must find. clock_ppm: errors of the two crystals,
-    drive first. boot_s: duration of a boot. uptime_s: how long the boards have run at construction;
-    if longer than boot_s, they have booted. swapped: the drive Teensy is at the second port. ids:
-    the boards' numbers in heartbeats, drive first. lose_inbound: probability that a byte to a board
-    is lost. front_m: distance from the start to a wall in front. faults: planned faults, in any
-    order.
+    ``wheel_radius_scale``, ``track_scale``: true size divided by the configured size.
+
+    ``slip``: standard deviation, in m, of the distance that a wheel rolls in 1 m.
+
+    ``motor_lag_s``: time constant of a driving wheel's speed.
+
+    ``ticks``: encoder ticks per revolution of the motor.
+
+    ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
+
+    ``servo_degps``: speed of the servo at its full command, 1000. With this speed, the manual's
+    controller crosses over at 12 rad/s.
+
+    ``servo_lag_s``: time constant of the servo's speed.
+
+    ``sensor_zero_deg``: zero offset of the angle sensor. The factory configuration corrects it.
+
+    ``angle_noise_deg``, ``gyro_noise_dps``, ``accel_noise_mps2``: standard deviations of the noise.
+
+    ``gyro_bias_dps``, ``accel_bias_mps2``: biases that a calibration must find.
+
+    ``clock_ppm``: errors of the two crystals, first that of the drive Teensy.
+
+    ``boot_s``: duration of a boot.
+
+    ``uptime_s``: how long the Teensys have run at construction. If this is longer than ``boot_s``,
+    they have booted.
+
+    ``swapped``: whether the drive Teensy is at the second port.
+
+    ``ids``: the numbers of the Teensys in their heartbeats, first that of the drive Teensy.
+
+    ``lose_inbound``: probability that a byte to a Teensy is lost.
+
+    ``front_m``: distance from the start to a wall in front.
+
+    ``faults``: planned faults, in any order.
     """
 
     firmware: Firmware = field(default_factory=Firmware)

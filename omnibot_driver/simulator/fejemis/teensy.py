@@ -2,8 +2,8 @@
 
 """The common part of both Teensys: lines, clock, subscriptions, identity, configuration memory.
 
-A control cycle takes a millisecond by the Teensy's own crystal. This module knows the software
-structure that the manual describes. It must not know what either Teensy measures or moves.
+A control cycle takes a millisecond of the Teensy's own clock. This module knows the parts of the
+manual that both Teensys share. It must not know what either Teensy measures or moves.
 """
 
 import struct
@@ -33,7 +33,7 @@ WITHOUT_NUMBERS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A line that a Teensy executed ``at_s`` seconds after construction."""
+    """A command that a Teensy executed ``at_s`` seconds after construction."""
 
     at_s: float
     text: str
@@ -42,13 +42,21 @@ class Obeyed:
 class Teensy(Generic[C]):
     """The common part of the drive and the front Teensy.
 
-    commands: the lines that the Teensy executed, newest last. received: all bytes that reached the
-    Teensy.
+    ``commands``: the lines that the Teensy has executed, the newest last.
 
-    The caller may change the following attributes at any time. sums: whether lines carry checksums.
-    silent: the Teensy obeys, but sends nothing. hung: the Teensy neither obeys nor sends, and the
-    motors keep its last outputs. unplugged: the cable is out, but the Teensy keeps running.
-    powered: False once the power is cut.
+    ``received``: all bytes that have reached the Teensy.
+
+    The caller may change these attributes at any time:
+
+    ``sums``: whether lines carry checksums.
+
+    ``silent``: whether the Teensy obeys, but sends nothing.
+
+    ``hung``: whether the Teensy neither obeys nor sends. The motors keep its last outputs.
+
+    ``unplugged``: whether the cable is unplugged. The Teensy continues to run.
+
+    ``powered``: whether the Teensy has power.
     """
 
     version = 0
@@ -62,7 +70,7 @@ class Teensy(Generic[C]):
         self.commands: deque[Obeyed] = deque(maxlen=100_000)
         self.received = bytearray()
         self.unhandled = 0
-        """Number of lines that the Teensy did not recognise."""
+        """How many lines the Teensy did not recognise."""
         self.inbound = FaultyLine(
             LineFaults(lose=settings.lose_inbound), f"fejemis inbound {settings.seed} {place}"
         )
@@ -82,7 +90,7 @@ class Teensy(Generic[C]):
     # What each kind of Teensy extends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return, by key of a subscription, the function that returns the item's line."""
+        """Return the functions that write the lines, by the name of the line in a subscription."""
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
             "id": lambda: f"id {self.config.name} {self.config.number}",
@@ -91,7 +99,7 @@ class Teensy(Generic[C]):
     def commands_table(self) -> dict[str, Callable[[str], None]]:
         """Return the functions that execute the commands, by the first word of a line.
 
-        Each function takes the rest of the line.
+        Each function receives the rest of the line.
         """
         return {
             "sub": self._subscribe,
@@ -104,10 +112,10 @@ class Teensy(Generic[C]):
         }
 
     def boot(self) -> None:
-        """Reset the state, as after power-up."""
+        """Reset the state, as after switching on."""
 
     def started(self) -> None:
-        """Adjust the state at the end of a boot; called once for each boot."""
+        """Adjust the state at the end of each boot."""
 
     def cycle(self) -> None:
         """Run one control cycle."""
@@ -116,18 +124,18 @@ class Teensy(Generic[C]):
 
     @property
     def clock_s(self) -> float:
-        """Time since the boot in s, by the Teensy's own crystal."""
+        """Time since the boot in s, by the Teensy's own clock."""
         return self._clock_s
 
     def clock_text(self, digits: int) -> str:
-        """Return the Teensy's clock as it is written in lines, with ``digits`` decimals."""
+        """Return the time of the Teensy's clock as text, with ``digits`` decimals."""
         time_s = self._clock_s
         if self.firmware.single_precision:
             (time_s,) = struct.unpack("f", struct.pack("f", time_s))
         return f"{time_s:.{digits}f}"
 
     def reboot(self) -> None:
-        """Power-cycle the Teensy; configuration that was not saved is lost."""
+        """Switch the Teensy off and on again. Configuration that was not saved is lost."""
         self._restart(0.0)
 
     def _restart(self, uptime_s: float) -> None:
@@ -154,7 +162,7 @@ class Teensy(Generic[C]):
             self._arrived += self._reader.feed(data)
 
     def step(self, now_s: float) -> bytes:
-        """Advance by one millisecond, which ends at ``now_s``; return the bytes sent."""
+        """Advance by one millisecond, which ends at ``now_s``; return the bytes that are sent."""
         if not self.powered:
             return b""
         self._told_s = now_s
@@ -245,7 +253,7 @@ class Teensy(Generic[C]):
 
     @property
     def subscriptions(self) -> dict[str, int]:
-        """Period of each subscription in ms, by key."""
+        """Period of each subscription in ms, by the name of its line."""
         return {key: self._periods_ms[key] for key in self._due_ms}
 
     def _leave(self) -> None:

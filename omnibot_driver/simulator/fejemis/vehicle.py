@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot that the two Teensys move: driving wheels, the steered wheel's servo, lift, brush.
+"""The robot that the two Teensys move: driving wheels, servo of the steered wheel, lift, brush.
 
-This module knows speeds and angles, and the resulting pose. It must not know the boards or their
-lines.
+This module knows speeds and angles, and the pose that results from them. It must not know the
+Teensys or their lines.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ STANDS_MPS = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class TrueState:
-    """True pose and motion of the robot: m, rad (unwrapped), m/s, rad/s."""
+    """True pose and motion of the robot in m, rad, m/s and rad/s. The yaw counts full turns."""
 
     x_m: float
     y_m: float
@@ -31,9 +31,13 @@ class TrueState:
 
 
 class Servo:
-    """The steering servo: an integrator with a lag, which takes a new velocity value every 25 ms.
+    """The servo that turns the steered wheel. It takes a new command every 25 ms.
 
-    command: velocity value, -1000 to 1000. angle_deg: angle of the wheel, positive to the left.
+    Its speed follows the command with a lag.
+
+    ``command``: wanted speed, -1000 to 1000.
+
+    ``angle_deg``: angle of the wheel, positive to the left.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -76,10 +80,16 @@ class Lift:
 class Vehicle:
     """The robot with its true state.
 
-    truth: pose and motion. turns: revolutions of the left and the right wheel since construction.
-    wanted_radps: target speeds of the two wheel controllers. powered: whether the controllers drive
-    the wheels; without power the wheels coast to a stop. held: whether each wheel is blocked by
-    hand.
+    ``truth``: pose and motion.
+
+    ``turns``: revolutions of the left and the right wheel since construction.
+
+    ``wanted_radps``: speeds that the controllers of the two wheels must reach.
+
+    ``powered``: whether the controllers drive the wheels. Without power, the wheels coast to a
+    stop.
+
+    ``held``: for each wheel, whether it is blocked by hand.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -152,10 +162,10 @@ class Vehicle:
 def wheel_speeds(
     speed: float, turn_radps: float, angle_deg: float, base_m: float, steer_m: float
 ) -> tuple[float, float]:
-    """Return the speed of the left and the right wheel in m/s, by the manual's turning control.
+    """Return the speeds of the left and the right wheel in m/s, by the manual's turning control.
 
-    The outer wheel gets ``v2 = sqrt(v² + w²)`` with the sign of ``v``, the inner one ``v1 = v2 - v2
-    B / d`` with ``d = f / tan(theta) + B / 2``.
+    The outer wheel gets ``v2 = sqrt(v² + w²)`` with the sign of ``v``. The inner wheel gets ``v1 =
+    v2 - v2 B / d`` with ``d = f / tan(theta) + B / 2``.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0

@@ -1,19 +1,19 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Codec of text lines as a Teensy reads and writes them, by the manual and public programs.
+"""Reads and writes lines of text as a Teensy does, by the manual and public programs.
 
-In firmware with checksums a line begins with ``;NN``: 1 plus the sum, modulo 99, of all later
-characters from the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. This
-module must not know the meaning of a command.
+With checksums, a line begins with ``;NN``: 1 plus the sum, modulo 99, of all later characters from
+the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. This module must not know
+the meaning of a command.
 """
 
 import re
 from enum import Enum
 
 BUFFER = 200
-"""Number of characters that the line buffer holds.
+"""How many characters the line buffer holds.
 
-Each time a longer line fills the buffer, all characters in the buffer are discarded.
+If a line is longer, the characters in the full buffer are discarded.
 """
 
 _NUMBER = re.compile(r"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
@@ -21,7 +21,7 @@ _PREFIX = re.compile(r";(\d\d)")
 
 
 class Check(Enum):
-    """Result of checking the checksum of a line."""
+    """Result of the check of a line's checksum."""
 
     GOOD = "good"
     WRONG = "wrong"
@@ -29,19 +29,19 @@ class Check(Enum):
 
 
 def sum_of(text: str) -> int:
-    """Return the checksum of a text, 1 to 99."""
+    """Return the checksum of a text, from 1 to 99."""
     return sum(ord(character) for character in text if character >= " ") % 99 + 1
 
 
 def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
-    """Encode one line, with its checksum and its end."""
+    """Return the bytes of one line; ``sums``, ``carriage_return``: whether to add these."""
     prefix = f";{sum_of(text):02d}" if sums else ""
     end = "\r\n" if carriage_return else "\n"
     return f"{prefix}{text}{end}".encode("latin-1")
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Return the result of the check, the line without ``;NN``, and the correct checksum."""
+    """Return the result of the check, the line without ``;NN``, and its correct checksum."""
     found = _PREFIX.match(text)
     if found is None:
         return Check.ABSENT, text, 0
@@ -51,9 +51,7 @@ def checked(text: str) -> tuple[Check, str, int]:
 
 
 def numbers(text: str) -> list[float]:
-    """Return the numbers that repeated calls of ``strtof`` find.
-
-    The first text that is not a number ends the search.
+    """Return the numbers at the beginning of the text, as repeated calls of ``strtof`` find them.
     """
     found, at = [], 0
     while match := _NUMBER.match(text, at):
@@ -63,14 +61,14 @@ def numbers(text: str) -> list[float]:
 
 
 def padded(text: str, count: int) -> list[float]:
-    """Return ``count`` numbers; missing numbers are zero, as with ``strtof``."""
+    """Return ``count`` numbers; those that are missing are 0, as with ``strtof``."""
     return (numbers(text) + [0.0] * count)[:count]
 
 
 class LineReader:
     """Splits characters into lines.
 
-    If the buffer is full, the next character first clears the buffer.
+    If the buffer is full, the next character replaces all characters in it.
     """
 
     def __init__(self) -> None:
