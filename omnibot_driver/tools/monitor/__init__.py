@@ -1,7 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Show a running driver on a terminal, with keys that start, stop and steer the robot.
+"""Shows a running driver on a terminal, with keys that start, stop and steer the robot.
 
 The monitor uses the driver's topics and services, as any ROS program does. It must not know the
-protocol on the wire.
+protocol on the line to the board.
 """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Run the monitor: ``ros2 run omnibot_driver monitor``."""
+"""Command line of the monitor: ``ros2 run omnibot_driver monitor``."""
 
 import argparse
 import io
@@ -25,7 +25,7 @@ LOOK_EVERY_S: Final = 0.05
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the monitor; return 0, 1 after an error printed on stderr, or 2 on wrong usage."""
+    """Run the monitor; return 0, or 1 after an error printed on stderr, or 2 on wrong usage."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options, ros_arguments = _parse(arguments)
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -117,8 +117,8 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
 def _find(feed: "Feed", timeout_s: float) -> None:
     """Wait until the driver publishes its state.
 
-    Raises ToolError if no state was received after ``timeout_s``. If other drivers are running, the
-    message names them.
+    Raises ToolError if no state arrives within ``timeout_s``. The message names other drivers that
+    run.
     """
     if _comes_about(lambda: bool(feed.view().state), timeout_s):
         return
@@ -144,10 +144,11 @@ def _find(feed: "Feed", timeout_s: float) -> None:
 
 
 def _gather(feed: "Feed", timeout_s: float) -> View:
-    """Wait until messages are complete and rates are measured; return the view.
+    """Wait until the view is complete, and return it.
 
-    Messages are complete if one was received on each topic that the driver publishes in its present
-    state. The monitor waits up to ``timeout_s`` for them, and measures rates over ``WINDOW_S``.
+    The view is complete if each topic that the driver publishes in its present state has sent a
+    message. The monitor waits for this until ``timeout_s`` is over. It measures rates over
+    ``WINDOW_S``.
     """
     began_s = time.monotonic()
     _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)

@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The dashboard. Knows terminals and keys; a ``Robot`` provides the figures and the actions."""
+"""The monitor's screen.
+
+The module knows terminals and keys; it does not know ROS. A ``Robot`` provides the values to show,
+and carries out what the keys request.
+"""
 
 import asyncio
 import signal
@@ -24,7 +28,7 @@ from omnibot_driver.tools.monitor.teleop import LEVELS, DeadMan
 REFRESH_S: Final = 0.2
 PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
 MOST_IN_FULL: Final = 4
-"""Largest number of verdicts shown in full; if there are more, each verdict is cut to one line."""
+"""How many verdicts are shown in full. If there are more, each verdict is cut to one line."""
 GREEN, YELLOW, RED, GREY, CYAN = "#98e024", "#f4bf4f", "#ff5f57", "#a0a0a0", "#58d1eb"
 COLOURS: Final = {
     Level.OK: GREEN,
@@ -36,9 +40,9 @@ STATES: Final = {"nominal": GREEN, "imu_only": YELLOW, "paused": YELLOW}
 
 
 class Robot(Protocol):
-    """What the screen needs of a robot: figures to show, and actions for the keys.
+    """What the screen needs from a robot: values to show, and actions for the keys.
 
-    Each call returns at once.
+    Each method returns at once.
     """
 
     dead_man: DeadMan | None
@@ -63,7 +67,8 @@ class Robot(Protocol):
 
 
 class Release(ModalScreen[bool]):
-    """A question whether to release the e-stop: y releases the e-stop, every other key does not."""
+    """The question whether to release the e-stop: y releases the e-stop, every other key does not.
+    """
 
     def compose(self) -> ComposeResult:
         """Build the question."""
@@ -74,7 +79,7 @@ class Release(ModalScreen[bool]):
         )
 
     def on_key(self, event: events.Key) -> None:
-        """Take the key as the answer to the question."""
+        """Use the key as the answer to the question."""
         event.stop()
         self.dismiss(event.key == "y")
 
@@ -124,7 +129,7 @@ class Monitor(App[None]):
         yield Footer()
 
     def on_mount(self) -> None:
-        """Begin to redraw regularly, and to handle signals."""
+        """Begin to draw the screen regularly, and to handle signals."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.exit)
@@ -138,14 +143,14 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        ``suspend`` ends the thread that reads keys, before Textual starts a new one. Otherwise
+        ``suspend`` ends the thread that reads keys, before Textual starts a new one. Without this,
         two threads would read keys.
         """
         with self.suspend():
             pass
 
     def refresh_view(self) -> None:
-        """Show the present view."""
+        """Draw the screen with the robot's present values."""
         view = self._robot.view()
         if view.lacks != self._lacks:
             self._lacks = view.lacks
@@ -194,7 +199,7 @@ class Monitor(App[None]):
     # Keys
 
     def on_key(self, event: events.Key) -> None:
-        """Use this key to steer, if it is a steering key."""
+        """Steer the robot, or change its speed, if the key does this."""
         dead_man = self._robot.dead_man
         if dead_man is None:
             return
@@ -204,7 +209,7 @@ class Monitor(App[None]):
             dead_man.change_speed(1 if event.key == "plus" else -1)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Hide and disable the keys of actions that the robot's board does not support."""
+        """Hide the keys of actions that the robot's board does not support."""
         return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:
@@ -213,13 +218,13 @@ class Monitor(App[None]):
             self._robot.dead_man.stop()
 
     def action_estop(self) -> None:
-        """Latch the e-stop at once, whatever else is on the screen."""
+        """Latch the e-stop at once, even while the question about its release is shown."""
         self._robot.estop()
         if isinstance(self.screen, Release):
             self.screen.dismiss(False)
 
     def action_release(self) -> None:
-        """Release the e-stop after a question."""
+        """Ask the user whether to release the e-stop, and release it if the answer is yes."""
         self.push_screen(Release(), lambda sure: self._robot.release() if sure else None)
 
     def action_start(self) -> None:

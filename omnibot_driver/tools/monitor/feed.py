@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Connect the monitor to the driver: feed a model from topics, send requests and ``cmd_vel``.
+"""Connects the monitor to the driver: stores received messages in a model, and sends requests.
 
-Callbacks run on a separate executor thread, so the screen does not delay them.
+Messages are received in a separate thread, so the screen does not delay them.
 """
 
 import os
@@ -49,15 +49,17 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 INSIST_EVERY_S: Final = 0.2
 PARAMETERS: Final = ("port", "max_linear_speed", "max_angular_speed")
 IMU_PARAMETER: Final = "imu_frame"
-"""Name of a parameter that exists only if the driver's board has an IMU."""
+"""Name of a parameter that the driver has only if its board has an IMU."""
 
 
 class Feed:
-    """The connection to the driver ``name`` in ``namespace``, until ``close`` is called.
+    """The connection to the driver ``name`` in ``namespace``. It lasts until ``close`` is called.
 
-    With ``dead_man``, a dead man's switch, ``cmd_vel`` is published as long as a key is held. Any
-    thread may call ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``; the view
-    shows their result. Raises ToolError for invalid names.
+    ``dead_man``: the dead man's switch. With it, the monitor publishes ``cmd_vel`` while a key is
+    held; without it, never.
+
+    Any thread may call ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``. Their
+    result appears in the view. Raises ToolError for invalid names.
     """
 
     def __init__(
@@ -95,7 +97,7 @@ class Feed:
         self._spinner.start()
 
     def close(self) -> None:
-        """Stop the robot if this monitor has steered it, and leave ROS."""
+        """Stop the robot if this monitor has steered it, and end the connection."""
         if self.dead_man:
             self.dead_man.stop()
         self._ending.set()
@@ -117,7 +119,8 @@ class Feed:
         return running_drivers(self._node)
 
     def namesakes(self) -> str:
-        """Return a warning if several drivers share this driver's name, else an empty string."""
+        """Return a warning if several drivers have this driver's name; otherwise an empty string.
+        """
         count = self._node.count_publishers(f"{self.driver}/state")
         if count < 2:
             return ""
@@ -127,7 +130,10 @@ class Feed:
         )
 
     def diagnoses(self) -> bool:
-        """Whether the driver publishes diagnostics (a driver that replays a recording does not)."""
+        """Return whether the driver publishes diagnostics.
+
+        A driver that replays a recording does not.
+        """
         return any(
             f"{info.node_namespace.rstrip('/')}/{info.node_name}" == self.driver
             for info in self._node.get_publishers_info_by_topic(DIAGNOSTICS_TOPIC)
@@ -136,7 +142,7 @@ class Feed:
     # Actions of the user
 
     def estop(self) -> None:
-        """Latch the e-stop by topic and by service, and repeat until the driver confirms it."""
+        """Latch the e-stop by topic and by service; repeat both until the driver confirms it."""
         if self.dead_man:
             self.dead_man.stop()
         self._model.estop_asked = True
@@ -188,7 +194,10 @@ class Feed:
         self._learned = False
 
     def _learn(self) -> None:
-        """Read the parameter names after each change of state: a different driver may run now."""
+        """Read the driver's parameter names after each change of state.
+
+        After such a change, another driver may run under the same name.
+        """
         if not self._learned and self._list.service_is_ready():
             self._learned = True
             listing = self._list.call_async(ListParameters.Request())
@@ -198,7 +207,7 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """Return the abilities that this driver's board lacks; empty until they are known."""
+        """Return what this driver's board does not have; empty while this is unknown."""
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():
             offers = {}
@@ -279,7 +288,7 @@ class Feed:
             self._model.estop_asked = False
 
     def say(self, text: str) -> None:
-        """Show a message in the line for replies to the user's actions."""
+        """Show a text in the screen's line for replies to the user."""
         with self._lock:
             self._model.said = text
 

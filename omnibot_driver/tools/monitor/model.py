@@ -2,8 +2,8 @@
 
 """The monitor's model of the robot: the latest values, their rates, and the robot's path.
 
-Must not know ROS, terminals or the clock. Values are kept as received, including NaN and infinity:
-the user should see that they are invalid.
+The model stores values as received, even NaN and infinity, because the user should see that they
+are invalid. It must not know ROS, terminals or the clock.
 """
 
 import math
@@ -22,9 +22,9 @@ IMU_TOPIC: Final = "imu/data_raw"
 ODOM_TOPIC: Final = "odom"
 DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
-"""Time in which a command is valid, in s: the driver's ``cmd_vel_timeout``."""
+"""Time in s for which a command is valid: the default of the driver's ``cmd_vel_timeout``."""
 SILENT_S: Final = 3.0
-"""Age, in s, above which diagnostics are outdated; the driver publishes them every second.
+"""Age in s above which diagnostics are outdated. The driver publishes them every second.
 
 A driver that has sent nothing for this time is regarded as silent.
 """
@@ -32,16 +32,23 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""Largest speed, in m/s, at which a change of the pose is regarded as motion of the robot.
+"""``JUMP_M``, ``JUMP_MPS``: how far the pose may move between two messages, in m and in m/s.
 
-In addition, each pose may differ from the previous one by ``JUMP_M``. A larger change shows that
-the odometry was reset; the monitor then begins a new path.
+The sum of both is allowed: the distance, and the speed multiplied by the time. If the pose moves
+further, the odometry was reset, and the monitor begins a new path.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The rate and age of a topic; ``age_s``: time since its last message, None if not recent."""
+    """How often messages arrive on a topic.
+
+    ``hz``: the present rate.
+
+    ``age_s``: time in s since the last message; None if no message came recently.
+
+    ``history``: how many messages came in each second of the last minute.
+    """
 
     hz: float
     age_s: float | None
@@ -50,10 +57,17 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """The values to show at one moment; unknown or outdated ones are None or empty.
+    """The values to show at one moment. A value that is unknown or outdated is None or empty.
 
-    ``steers``: whether another node receives the monitor's commands; ``lacks``: those of ``imu``,
-    ``start`` and ``pause`` that the robot's board does not have.
+    ``estop_asked``: whether the user has requested the e-stop, and the driver has not confirmed it.
+
+    ``silent_s``: time in s since the driver's last message.
+
+    ``steers``: whether another node receives the monitor's commands.
+
+    ``said``: the reply to the user's last action.
+
+    ``lacks``: what the robot's board does not have, of ``imu``, ``start`` and ``pause``.
     """
 
     driver: str
@@ -76,21 +90,23 @@ class View:
 
     @property
     def silent(self) -> bool:
-        """Whether the driver has stopped sending."""
+        """Whether the driver no longer sends messages."""
         return self.silent_s > SILENT_S
 
     @property
     def link(self) -> str:
-        """The link status from the diagnostics, with the port."""
+        """The status of the link to the board, with the port; empty while there are no diagnostics.
+        """
         for status in self.statuses:
             if status.name == "Link":
                 return f"{status.message}, {status.values.get('Port', '')}".rstrip(", ")
         return ""
 
     def missing(self, diagnostics: bool) -> list[str]:
-        """Return the topics that the driver should publish in its present state, but does not.
+        """Return the topics on which messages are missing: the driver should publish there.
 
-        ``diagnostics``: whether the driver should publish /diagnostics.
+        It should publish a topic if its present state requires the topic. ``diagnostics``: whether
+        it should publish /diagnostics.
         """
         wanted = {
             "state": bool(self.state),
@@ -121,7 +137,7 @@ class View:
 
 
 class Model:
-    """Collects received values and returns them as a View. Times are of one clock, in s."""
+    """Stores received values, and returns them as a View. All times are of one clock, in s."""
 
     def __init__(self, driver: str, now_s: float) -> None:
         self.said = ""
@@ -155,7 +171,7 @@ class Model:
         self._force, self._rate, self._heard_s = force_mps2, rate_radps, now_s
 
     def odom(self, pose: Pose, twist: BodyTwist | None, now_s: float) -> None:
-        """Store a message of ``odom``; the twist is None where it is not known."""
+        """Store a message of ``odom``; ``twist`` is None if the driver did not measure it."""
         self._odom.arrived(now_s)
         self._follow(pose, now_s)
         self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
@@ -163,18 +179,18 @@ class Model:
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
         """Store a message of ``cmd_vel``.
 
-        Another node sends it, so it does not show that the driver runs.
+        Another node has sent it. So it does not show that the driver runs.
         """
         self._commanded = twist, now_s
 
     def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:
-        """Store the driver's statuses, which came in a message of ``/diagnostics``."""
+        """Store the driver's statuses from a message of ``/diagnostics``."""
         self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
 
     def view(
         self, now_s: float, *, steers: bool = False, lacks: frozenset[str] = frozenset()
     ) -> View:
-        """Return the values to show at this time."""
+        """Return the values to show now."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
         imu, odom = (
             Flow(rate.hz(now_s), rate.age_s(now_s), rate.history(now_s))
@@ -213,5 +229,5 @@ class Model:
 
 
 def level(byte: int) -> Level:
-    """Return the level of a diagnostic_msgs/DiagnosticStatus; an unknown value counts as ERROR."""
+    """Return the level of a diagnostic_msgs/DiagnosticStatus; ERROR for an unknown value."""
     return Level(byte) if byte in tuple(Level) else Level.ERROR

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Draw pictures from characters: a path in Braille, a row of bars. Does not use colours or ROS."""
+"""Draws pictures with characters: a path in Braille, a row of bars.
+
+The module knows characters; it does not know colours or ROS.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -12,17 +15,20 @@ from omnibot_driver.core.geometry.se2 import Pose
 
 BRAILLE: Final = 0x2800
 DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-"""Bits of the dots of a Braille cell: four rows of two."""
+"""Bits of the dots in a Braille character: four rows of two."""
 BARS: Final = " ▁▂▃▄▅▆▇"
 ARROWS: Final = "→↗↑↖←↙↓↘"
 SMALLEST_M: Final = 0.5
-"""Least width or height of a path's picture, in m, so that noise at rest does not fill it."""
+"""Smallest width or height, in m, that a path's picture shows.
+
+With this limit, the noise of a robot at rest does not fill the picture.
+"""
 LARGEST_M: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture: rows of equal length, and the width of the picture in m."""
+    """A picture: rows of equal length, and the width in m that a row shows."""
 
     rows: list[str]
     width_m: float
@@ -31,9 +37,10 @@ class Picture:
 def draw_path(
     points: Iterable[tuple[float, float]], columns: int, rows: int, robot: Pose | None = None
 ) -> Picture:
-    """Draw the path from above, x to the right, y up, as large as possible; the robot is an arrow.
+    """Draw a path from above, as large as possible; x is to the right, y is up.
 
-    Points that are not finite, or a million metres away, are left out.
+    An arrow shows the ``robot``. Points that are not finite, or a million metres away, are left
+    out.
     """
     columns, rows = max(1, columns), max(1, rows)
     seen = [point for point in points if _drawable(*point)]
@@ -71,8 +78,10 @@ def draw_path(
 
 
 def sparkline(values: Sequence[float], columns: int) -> str:
-    """Return the newest values as bars from zero to the largest value, the newest at the right
-    end."""
+    """Return the newest values as bars, with the newest at the right end.
+
+    The largest of these values has the highest bar, and 0 has no bar.
+    """
     shown = values[-columns:] if columns > 0 else []
     peak = max(shown, default=0.0) or 1.0
     bars = "".join(BARS[math.ceil(value / peak * (len(BARS) - 1))] for value in shown)

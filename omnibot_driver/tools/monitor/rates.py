@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measure how often messages arrive. Must not know what arrives, nor read a clock."""
+"""Measures how often messages arrive. It must not know the messages, and does not read a clock."""
 
 from collections import deque
 from typing import Final
@@ -12,7 +12,7 @@ HISTORY_S: Final = 60
 class Rate:
     """Counts messages since ``began_s``.
 
-    Times are in s, of one clock, and never decrease.
+    All times are of one clock, in s. They must not decrease.
     """
 
     def __init__(self, began_s: float) -> None:
@@ -30,18 +30,19 @@ class Rate:
         self._seconds[-1] += 1
 
     def hz(self, now_s: float) -> float:
-        """Return the rate over the last ``WINDOW_S``, or since ``began_s`` if that is later."""
+        """Return the rate over the last ``WINDOW_S``, or since ``began_s`` if this is shorter."""
         self._forget(now_s)
         span_s = min(WINDOW_S, now_s - self._began_s)
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0
 
     def age_s(self, now_s: float) -> float | None:
-        """Return the time since the last message, in s; None if no message came in the window."""
+        """Return the time since the last message, in s; None if none came in the last ``WINDOW_S``.
+        """
         self._forget(now_s)
         return now_s - self._recent_s[-1] if self._recent_s else None
 
     def history(self, now_s: float) -> tuple[int, ...]:
-        """Return the number of arrivals in each full second of the last minute."""
+        """Return how many messages came in each full second of the last minute."""
         self._forget(now_s)
         return tuple(self._seconds)[:-1]
 

@@ -1,9 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steer by keys, with a dead man's switch. Knows keys and times only.
+"""Steers the robot by keys, with a dead man's switch.
 
-A terminal reports that a key is pressed, repeats it while it is held, and does not report its
-release. So a key moves the robot for a short time only, and holding the key renews that time.
+A terminal reports that a key is pressed, and repeats this report while the key is held. It does not
+report the release of a key. So a pressed key moves the robot only for a short time, and a held key
+renews this time.
+
+The module knows keys and times; it does not know ROS or terminals.
 """
 
 import math
@@ -12,23 +15,24 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 FIRST_S: Final = 0.6
-"""Time for which a newly pressed key moves the robot, in s.
+"""Time in s for which a newly pressed key moves the robot.
 
 Most keyboards begin to repeat a held key after 0.25 s to 0.6 s.
 """
 REPEAT_S: Final = 0.3
-"""Time for which a repeated key moves the robot, in s; several repetitions may be lost or late."""
+"""Time in s for which a repeated key moves the robot. Several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
-"""Time without a call of ``command``, in s, after which the program is regarded as suspended.
+"""Time in s without a call of ``command`` that shows that the program was suspended.
 
-After a suspension, older keys are discarded.
+Keys from before or during the suspension are discarded.
 """
 DEAF_S: Final = 0.3
-"""Time after a suspension, in s, in which keys do not steer, because earlier keys still arrive."""
+"""Time in s after a suspension during which keys do not steer, because earlier keys still arrive.
+"""
 ZEROS: Final = 5
-"""Number of zero commands after a motion.
+"""How many zero commands follow a motion.
 
-Then the monitor publishes nothing, because other nodes may want to drive.
+After them the monitor publishes nothing, because other nodes may want to drive.
 """
 LEVELS: Final = 10
 NOTHING: Final = ("", -math.inf)
@@ -42,19 +46,19 @@ MOTIONS: Final = {
     "j": (0, 0, 1),
     "l": (0, 0, -1),
 }
-"""For each key, the signs of its motion: forward, to the left, and turning to the left."""
+"""For each key: the signs of its motion forward, to the left, and in turning to the left."""
 
 
 class DeadMan:
-    """Turns pressed keys into commands; ``command`` must be called regularly.
+    """Turns pressed keys into commands. The caller calls ``command`` regularly.
 
-    Another thread may call ``press``: it stores key and time together, in one assignment.
+    ``press`` may be called by another thread. It stores key and time together, in one assignment.
     """
 
     def __init__(self) -> None:
         self.level = 3
         self.fastest = (0.5, 0.5)
-        """Fastest linear and angular speed, in m/s and rad/s, at the highest level."""
+        """Linear speed in m/s and angular speed in rad/s at the highest level."""
         self.has_driven = False
         self._held = NOTHING
         self._zeros = 0
@@ -62,7 +66,7 @@ class DeadMan:
         self._deaf_until_s = -math.inf
 
     def press(self, key: str, now_s: float) -> bool:
-        """Use a pressed key; return whether it is a steering key.
+        """Handle a pressed key; return whether it is a steering key.
 
         A key that was pressed during a suspension does not move the robot.
         """
@@ -77,11 +81,12 @@ class DeadMan:
         return True
 
     def stop(self) -> None:
-        """Command a standstill, whatever key is held."""
+        """Command zero velocity, even while a key is held."""
         self._held = NOTHING
 
     def change_speed(self, steps: int) -> None:
-        """Change the speed level by ``steps``; level 10 is the fastest speed, level 1 a tenth."""
+        """Change the speed level by ``steps``; level 10 is full speed, and level 1 a tenth of it.
+        """
         self.level = min(max(self.level + steps, 1), LEVELS)
 
     @property
@@ -91,7 +96,7 @@ class DeadMan:
         return part * self.fastest[0], part * self.fastest[1]
 
     def command(self, now_s: float) -> BodyTwist | None:
-        """Return the command to publish now: a motion, then a few zeros, then None."""
+        """Return the command to publish now: first a motion, then a few zeros, then None."""
         self._notice_sleep(now_s)
         self._asked_s = now_s
         key, until_s = self._held

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Format a view of the robot as text and as JSON. Must not know ROS, or where a text is shown."""
+"""Formats a view of the robot as text and as JSON.
+
+The module knows text; it must not know ROS, or where a text is shown.
+"""
 
 import json
 import math
@@ -32,7 +35,7 @@ def clean(text: str) -> str:
 
 
 def number(value: float | None, places: int = 2) -> str:
-    """Return the number in seven columns, or a dash for None."""
+    """Return the number as text in seven columns; a dash for None."""
     if value is None:
         return "–".rjust(WIDTH)
     if 999.9 < abs(value) < math.inf:
@@ -41,12 +44,12 @@ def number(value: float | None, places: int = 2) -> str:
 
 
 def numbers(values: Iterable[float] | None) -> str:
-    """Return three numbers as text, or three dashes."""
+    """Return three numbers as text; three dashes for None."""
     return " ".join(number(value) for value in (values or (None, None, None)))
 
 
 def title(view: View) -> str:
-    """Return the title line: driver, state and link."""
+    """Return the first line of the screen: driver, state and link."""
     if view.silent:
         return f"{view.driver}  nothing heard for {view.silent_s:.0f} s (was {view.state})"
     return clean(f"{view.driver}  {view.state}  {view.link}".rstrip())
@@ -81,9 +84,9 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """Return lines of text, each with its level.
+    """Return the driver's statuses as lines of text, each with its level.
 
-    Each status that is not OK has a line of its own; all OK statuses share one line.
+    Each status that is not OK has a line of its own. All OK statuses share one line.
     """
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
@@ -95,7 +98,8 @@ def verdicts(view: View) -> list[tuple[Level, str]]:
 
 
 def counts(view: View) -> str:
-    """Return the driver's counts of faults since its start; zero counts are omitted."""
+    """Return how many faults the driver has counted since its start, as text without zero counts.
+    """
     values = {(s.name, key): value for s in view.statuses for key, value in s.values.items()}
     happened = [
         f"{word} {values[name, key]}"
@@ -108,15 +112,17 @@ def counts(view: View) -> str:
 
 
 def report(view: View) -> str:
-    """Return the complete view as text, for a terminal, a log or a pipe."""
+    """Return the whole view as text, for a terminal, a log or a pipe."""
     statuses = [clean(f"{s.name:<10}{s.level.name:<6}{s.message}") for s in view.statuses]
     lines = [title(view), estop(view), "", *figures(view), "", *statuses, counts(view)]
     return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
 
 
 def as_json(view: View, troubles: Iterable[str]) -> str:
-    """Return the view as JSON. JSON cannot express NaN: a non-finite value is null, and
-    ``troubles`` names it."""
+    """Return the view as JSON.
+
+    JSON has no NaN and no infinity. So such a value is null, and ``troubles`` names it.
+    """
     inertial = {
         "imu": {
             "linear_acceleration_mps2": _finite(view.force_mps2),
@@ -142,7 +148,6 @@ def as_json(view: View, troubles: Iterable[str]) -> str:
 
 
 def _flows(view: View) -> dict[str, Flow]:
-    """Return the topics whose rates are shown."""
     flows = {IMU_TOPIC: view.imu, ODOM_TOPIC: view.odom}
     return {
         name: flow for name, flow in flows.items() if name != IMU_TOPIC or "imu" not in view.lacks

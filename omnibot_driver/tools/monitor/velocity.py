@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Receive ``cmd_vel`` of any node, and publish commands of a dead man's switch. Knows only ROS."""
+"""Receives ``cmd_vel`` from any node, and publishes the commands of a dead man's switch."""
 
 import time
 from collections.abc import Callable
@@ -17,17 +17,20 @@ from omnibot_driver.tools.monitor.teleop import HALT, DeadMan
 
 TOPIC: Final = "cmd_vel"
 ANY: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""A QoS profile that receives from reliable and best-effort publishers."""
+"""QoS profile that receives from reliable and from best-effort publishers."""
 LOOK_EVERY_S: Final = 0.5
 DRIVE_EVERY_S: Final = 0.05
 ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """The topic ``cmd_vel``, with the message type to which the driver subscribes.
+    """The topic ``cmd_vel``, with the message type that the driver uses.
 
-    A topic cannot have two types in one process, so subscription and publisher share the type.
-    ``heard`` receives each command. Without ``dead_man`` nothing is published.
+    A topic cannot have two types in one process. So subscription and publisher use the same type.
+
+    ``heard``: receives each command on the topic.
+
+    ``dead_man``: the dead man's switch; without one, nothing is published.
     """
 
     def __init__(
@@ -39,7 +42,7 @@ class VelocityTopic:
     ) -> None:
         self.dead_man = dead_man
         self.steers = False
-        """Whether another node receives the ``cmd_vel`` that this object publishes."""
+        """Whether another node receives the commands that this object publishes."""
         self._node, self._driver, self._heard = node, driver, heard
         self._subscription: Any = None
         self._publisher: Any = None
@@ -49,7 +52,7 @@ class VelocityTopic:
             node.create_timer(DRIVE_EVERY_S, self._tick, clock=steady)
 
     def close(self) -> None:
-        """Stop a robot that this program has steered. The node must no longer be spinning."""
+        """Stop the robot if this program has steered it. The node must no longer spin."""
         if self.dead_man and self.dead_man.has_driven and self._publisher:
             self._say(HALT)
             self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_WITHIN_S))
@@ -93,5 +96,5 @@ class VelocityTopic:
 
 
 def body_twist(twist: Any) -> BodyTwist:
-    """Return the body twist of a message as received, even if it is NaN."""
+    """Return the body twist in a message, unchanged, even if it contains NaN."""
     return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)
