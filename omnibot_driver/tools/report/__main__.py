@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Report on a drive in words and pictures: ``python -m omnibot_driver.tools.report BAG``."""
+"""Command line of the report: ``python -m omnibot_driver.tools.report BAG``."""
 
 import argparse
 import os
@@ -22,7 +22,7 @@ WRONG: Final = 3
 
 
 def arguments(given: list[str] | None) -> argparse.Namespace:
-    """Parse the command line; exits with 2 and a message on wrong usage."""
+    """Parse the command line. Exits with code 2 and a message on wrong usage."""
     parser = argparse.ArgumentParser(
         prog="report",
         description="Report on a drive: a page with pictures, and a verdict in words.",
@@ -55,7 +55,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
 
 @contextmanager
 def _progress(what: str, unit: str) -> Iterator["Progress"]:
-    """Show a progress bar on a terminal, nothing elsewhere."""
+    """Show a progress bar if stderr is a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -119,9 +119,9 @@ def _report(wanted: argparse.Namespace) -> int:
 
 
 def main(given: list[str] | None = None) -> int:
-    """Write the report; return 0, or 3 if something is wrong with the drive.
+    """Write the report; return 0, or 3 if the report finds something wrong.
 
-    Return 1 if a report is impossible, 2 on wrong usage.
+    Return 1 if there is nothing to report on, and 2 on wrong usage.
     """
     try:
         return _report(arguments(given))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Read a rosbag2 without ROS: a bag's folder or one file, sqlite3 or mcap, also compressed."""
+"""Reads a rosbag2 without ROS: its folder or one file, sqlite3 or mcap, also compressed."""
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
@@ -22,17 +22,17 @@ from omnibot_driver.tools.report.robots import choose, find
 
 STORAGES: Final = (".mcap", ".db3")
 NEWS_EVERY: Final = 2000
-"""Number of messages between two reports of progress."""
+"""How many messages are read between two reports of progress."""
 
 Progress = Callable[[int, int], None]
-"""A function that receives the number of messages read so far, and the number of all messages."""
+"""A function that receives how many messages have been read, and how many there are."""
 
 
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
     """Return the log of one robot in a bag.
 
-    Raises ToolError if the bag has no readable message of the robot, or if it has several robots
-    and ``namespace`` is None.
+    Raises ToolError if the bag has no readable message of the robot, or if it contains several
+    robots and ``namespace`` is None.
     """
     with ExitStack() as stack:
         readers, troubles = _open(path, stack)
@@ -67,7 +67,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
 def _messages(
     reader: Reader, topics: Collection[str], troubles: list[str]
 ) -> Iterator[tuple[Connection, int, bytes]]:
-    """Yield the messages of the bag, as far as the bag is readable; note errors in ``troubles``."""
+    """Yield the messages up to the first error in the bag; add such an error to ``troubles``."""
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return
@@ -84,7 +84,7 @@ def _messages(
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
-    """Return readers of all files that can be opened, and a text for each defect of the bag."""
+    """Return readers of all files that can be opened, and a text about each defect of the bag."""
     if not path.exists():
         raise ToolError(f"there is no {path}: give the folder of a bag, or its .mcap or .db3 file")
     files, troubles = [path], []
@@ -116,7 +116,7 @@ def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
 
 
 def _open_file(file: Path, stack: ExitStack, troubles: list[str]) -> Reader:
-    """Open a file of a bag; if it is broken or has a journal, open a repaired copy instead."""
+    """Open a file of a bag. A broken file, or one with a journal, is first repaired in a copy."""
     broken = file.suffix == ".mcap" and salvage.breaks_off(file)
     whole = file
     if broken or salvage.has_journal(file):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Common drawing functions of the report's pictures: colours, axes, long lines."""
+"""Drawing functions that all pictures of the report share: colours, axes, long lines."""
 
 from typing import Final
 
@@ -21,7 +21,7 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""Number of points above which a line is drawn as its envelope."""
+"""How many points a line may have. A longer line is drawn as its envelope."""
 
 
 def new_figure(height_in: float) -> Figure:
@@ -30,7 +30,7 @@ def new_figure(height_in: float) -> Figure:
 
 
 def dress(axes: Axes, label: str, title: str = "") -> None:
-    """Add grid, frame, label and title to a picture."""
+    """Add grid, frame, label and title to the axes."""
     axes.set_ylabel(label)
     axes.grid(True, color="#E3E6EA", linewidth=0.7)
     axes.set_axisbelow(True)
@@ -40,22 +40,23 @@ def dress(axes: Axes, label: str, title: str = "") -> None:
 
 
 def legend(axes: Axes) -> None:
-    """Draw the legend in the upper right corner of a drawing."""
+    """Draw the legend in the upper right corner of the axes."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", ncols=4, frameon=False, fontsize=9, borderaxespad=0.1)
 
 
 def legend_below(axes: Axes) -> None:
-    """Put the legend below the drawing."""
+    """Draw the legend below the axes."""
     if axes.get_legend_handles_labels()[0]:
         place = (0.5, -0.14)
         axes.legend(loc="upper center", bbox_to_anchor=place, ncols=3, frameon=False, fontsize=9)
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return a shorter line: the minimum and maximum of each of its stretches, in order.
+    """Return a shorter line that has the same extremes.
 
-    Lines of at most ``POINTS`` points are returned unchanged.
+    The line is divided into pieces. The minimum and the maximum of each piece are kept, in their
+    order. A line of at most ``POINTS`` points is returned unchanged.
     """
     if len(times_s) <= POINTS:
         return times_s, values
@@ -68,7 +69,7 @@ def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
 
 
 def line(axes: Axes, times_s: Array, values: Array, colour: str, label: str, **more: float) -> None:
-    """Draw a line that breaks at gaps."""
+    """Draw a line that is interrupted where the data has a gap."""
     times_s, values = envelope(times_s, values)
     if len(times_s) > 1:
         steps_s = np.diff(times_s)
@@ -78,7 +79,7 @@ def line(axes: Axes, times_s: Array, values: Array, colour: str, label: str, **m
 
 
 def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> None:
-    """Draw points; if there are too many, only every n-th point and the extremes."""
+    """Draw points. If there are too many, draw only every n-th point and the extremes."""
     every = -(-len(times_s) // POINTS) or 1
     extremes_s, extremes = envelope(times_s, values)
     times_s = np.concatenate([times_s[::every], extremes_s])
@@ -87,7 +88,10 @@ def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> 
 
 
 def shade(axes: Axes, log: Log) -> None:
-    """Shade times with a latched e-stop in red, and each state other than running in its colour."""
+    """Shade the times in which the e-stop was latched or the driver was not in a running state.
+
+    The e-stop is red. Each state has its own colour.
+    """
     for span in log.latched:
         axes.axvspan(span.begin_s, span.end_s, color=RED, alpha=0.18, linewidth=0)
     for span in log.states:
@@ -97,6 +101,6 @@ def shade(axes: Axes, log: Log) -> None:
 
 
 def time_axis(axes: Axes, log: Log) -> None:
-    """Label the time axis for the whole log."""
+    """Set the time axis to the whole log, and label it."""
     axes.set_xlim(0.0, max(log.duration_s, 1e-3))
     axes.set_xlabel("time in s")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge what the driver reported: its state, the e-stop, /diagnostics."""
+"""Judges what the driver reported: its states, the e-stop, and /diagnostics."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -12,14 +12,13 @@ from omnibot_driver.tools.report.log import Log, Span, Status
 
 LEVELS: Final = ("OK", "WARN", "ERROR", "STALE")
 FIRST_SECONDS: Final = 3.0
-"""Time, in s, in which a driver that was just started may still be connecting."""
+"""Time in s at the beginning of a log in which the driver may still be connecting."""
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time, in s, after which a disconnected driver is regarded as ended.
+"""Time in s after a disconnection that shows whether the driver has ended.
 
-The time begins with the disconnection. A driver that still publishes /diagnostics afterwards has
-not ended.
+A driver that still publishes /diagnostics after this time has not ended.
 """
 
 
@@ -64,7 +63,7 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """Return the spans in which the board was out of reach, whether the port was open or not."""
+    """Return the spans in which the board was out of reach, with the port open or closed."""
     lost: list[Span] = []
     for state in states:
         if state.what in OUT_OF_REACH and state.end_s > FIRST_SECONDS:
@@ -76,7 +75,7 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Whether diagnostics still showed this state more than ``SILENT_S`` after it began."""
+    """Return whether diagnostics showed this state more than ``SILENT_S`` after it began."""
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
         for status in log.diagnostics
@@ -103,7 +102,7 @@ def _estop(log: Log) -> Iterator[Finding]:
 
 
 def _diagnostics(log: Log) -> Iterator[Finding]:
-    """Report the worst message of each status, and how often this message was sent."""
+    """Report the worst message of each status, and how often it was sent."""
     if log.diagnostics and not log.alone:
         ports = ", ".join(sorted({status.hardware_id for status in log.diagnostics}))
         yield Finding(
@@ -135,7 +134,7 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 def _told_elsewhere(status: Status) -> bool:
     """Return whether another finding already reports this status.
 
-    Examples are the status of a latched e-stop, and that of a paused board.
+    Examples are a latched e-stop and a paused board.
     """
     if status.name.endswith("Commands"):
         return "e-stop" in status.message

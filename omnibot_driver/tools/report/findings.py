@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The findings of a report: each has a level, a sentence with a measured value, and advice."""
+"""The findings of a report. Each has a level, a sentence with a measured value, and advice."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +10,9 @@ from enum import IntEnum
 class Level(IntEnum):
     """The level of a finding.
 
-    NOTE: worth knowing, no action needed. BAD: the robot or the recording cannot be trusted.
+    ``NOTE``: the reader should know this, but need not act.
+
+    ``BAD``: the robot or the recording cannot be trusted.
     """
 
     GOOD = 0
@@ -21,7 +23,10 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One sentence with a measured value; ``advice`` is empty if no action is needed."""
+    """One sentence with a measured value.
+
+    ``advice``: what the reader should do; empty if nothing.
+    """
 
     level: Level
     subject: str
@@ -30,7 +35,7 @@ class Finding:
 
 
 def headline(findings: Iterable[Finding]) -> str:
-    """Return a summary of all findings in one line."""
+    """Return one line that summarises all findings."""
     levels = [finding.level for finding in findings]
     bad, warn = levels.count(Level.BAD), levels.count(Level.WARN)
     if bad:

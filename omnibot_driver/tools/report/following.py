@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge whether the robot followed its commands: compare commanded and measured motion."""
+"""Judges whether the robot followed its commands, by comparing commanded and measured motion."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,20 +17,27 @@ TOLERANCE: Final = 0.1
 TOLD: Final = 0.05
 """Speed of a wheel's rim, in m/s, above which the robot is regarded as commanded or as moving.
 
-At lower commanded speeds, friction may hold the robot.
+If a lower speed is commanded, friction may prevent the motion.
 """
 STANDS: Final = 0.2
-"""Ratio of measured to commanded speed below which the robot is regarded as not moving."""
+"""Ratio of measured to commanded speed below which the robot is regarded as standing still."""
 SUSTAINED_S: Final = 1.0
 AFTER_STOP_S: Final = 1.5
-"""Time after an e-stop or the last command, in s, within which the robot must come to rest."""
+"""Time in s after an e-stop or the last command within which the robot must come to rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A command topic and the measurements of its effect.
+    """A command topic, and measurements of the motion that it commands.
 
-    ``weights``: factors that convert the values on the axes to the speed of a wheel's rim, in m/s.
+    ``axes``, ``units``: names and units of the values.
+
+    ``weights``: factors that convert the values to the speed of a wheel's rim in m/s.
+
+    ``scales``: parameter of the driver that the user must change if the values on an axis are
+    wrong.
+
+    ``commands``, ``measured``: the messages of the command topic, and the measurements.
     """
 
     topic: str
@@ -43,7 +50,7 @@ class Pair:
 
 
 def twists(log: Log) -> Pair:
-    """Return the pair of cmd_vel and the twist of odom, with finite values only."""
+    """Return the pair of cmd_vel and the twist in odom. Both contain only finite values."""
     odom = _sampled(log.odom)
     linear, angular = _scales(log)
     scales = linear, linear, angular
@@ -59,10 +66,10 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """Return the names of the parameters that the user must change if speeds are wrong.
+    """Return the names of the parameters that scale linear and angular speed.
 
-    The first name is that of the linear scale, the second that of the angular scale. For two wheels
-    they are the scales of the odometry, otherwise those of the commands.
+    The user must change them if the measured speeds are wrong. On a robot with two wheels, they
+    scale the odometry. On other robots, they scale the commands.
     """
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
@@ -70,7 +77,7 @@ def _scales(log: Log) -> tuple[str, str]:
 
 
 def pairs(log: Log) -> list[Pair]:
-    """Return the pairs of commands and measurements in the log, with finite values only."""
+    """Return the pairs of commands and measurements in the log. They contain only finite values."""
     count = len(log.wheels)
     wheels = Pair(
         "wheel_cmd",
@@ -85,15 +92,15 @@ def pairs(log: Log) -> list[Pair]:
 
 
 def wheel_name(joint: str) -> str:
-    """Return the name of a joint's wheel for people, such as "wheel A" or "left wheel"."""
+    """Return the name of a wheel for the reader, such as "wheel A" or "left wheel"."""
     words = joint.removesuffix("_joint").split("_")
     return " ".join(word.upper() if len(word) == 1 else word for word in words)
 
 
 def shown(log: Log) -> list[Pair]:
-    """Return the pairs of commands and measurements to show.
+    """Return the pairs of commands and measurements to draw.
 
-    If the log has no commands, return one pair, with the measurements of odom.
+    If the log has no commands, return one pair with the measurements of odom.
     """
     return pairs(log) or [twists(log)]
 
@@ -104,9 +111,14 @@ def _sampled(series: Series) -> Series:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The robot's response to commands: its delay and, for each axis, its gain and rms error.
+    """How the robot responded to commands.
 
-    A gain is the ratio of measured to commanded motion, NaN if not known.
+    ``lag_s``: delay of the motion.
+
+    ``gains``: for each axis, the ratio of measured to commanded motion; NaN if unknown.
+
+    ``error``: for each axis, the rms difference between the measured motion and the commanded
+    motion times the gain.
     """
 
     lag_s: float
@@ -115,9 +127,10 @@ class Answer:
 
 
 def answer(pair: Pair, usable: Mask) -> Answer | None:
-    """Return the robot's response to its commands, or None if no command was active.
+    """Return how the robot responded to its commands; None if no motion was commanded.
 
-    The delay of the response is the one that fits best. ``usable``: the measurements to use.
+    The delay is the one at which commands and measurements fit best. ``usable``: which measurements
+    to use.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -141,9 +154,9 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge the commands: whether they were valid, uninterrupted, and followed by the robot.
+    """Judge the commands: whether they were valid, had no pauses, and were followed by the robot.
 
-    Also report motion without a command.
+    Motion without a command is reported too.
     """
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(
@@ -182,7 +195,8 @@ def judge(log: Log) -> Iterator[Finding]:
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
     """Return the commanded and the measured speed of a wheel's rim in m/s, and their times in s.
 
-    The times are those of the first pair's measurements.
+    The measurements, and the times, are those of the first pair. If several topics command the
+    robot, the fastest command is used.
     """
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
@@ -197,10 +211,10 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Return which of these times lie in a span in which the driver did not carry out commands.
+    """Return at which of these times the driver did not carry out commands.
 
-    These are the spans with a state other than running, and those with a latched e-stop, each
-    extended by ``COMMAND_TIMEOUT_S``.
+    These are the times with a state that is not running, or with a latched e-stop.
+    ``COMMAND_TIMEOUT_S`` after their end is included.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [
@@ -210,7 +224,7 @@ def _stopped(log: Log, at_s: Array) -> Mask:
 
 
 def _sustained(times_s: Array, rows: Mask) -> list[Span]:
-    """Return the spans of time in which ``rows`` is true for ``SUSTAINED_S`` or longer."""
+    """Return the spans of time in which ``rows`` is true for at least ``SUSTAINED_S``."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
     return [item for item in spans if item.length_s >= SUSTAINED_S]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Collect all findings of a log, the most severe first."""
+"""Collects the findings on a log, the most severe first."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,10 @@ WITHOUT = {
 
 
 def judge(log: Log) -> list[Finding]:
-    """Return all findings, the most severe first; within a level they keep the order of judging."""
+    """Return all findings, the most severe first.
+
+    Findings of the same level are in the order in which they were made.
+    """
     return sorted(_all(log), key=lambda finding: -finding.level)
 
 
@@ -54,9 +57,9 @@ def _all(log: Log) -> Iterator[Finding]:
 
 
 def _has_no_imu(log: Log) -> bool:
-    """Return whether diagnostics were received and show a board without an IMU.
+    """Return whether the diagnostics show that the board has no IMU.
 
-    If the board has an IMU, the driver's Stream status counts the IMU's frames.
+    If the board has an IMU, the driver's Stream status counts its frames.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     return bool(streams) and not any("IMU" in key for item in streams for key in item.values)

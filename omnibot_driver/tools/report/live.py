@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Record the messages of a running robot as a log. Knows ROS, not how logs are judged."""
+"""Records the messages of a running robot as a log.
+
+The module knows ROS; it does not know how a log is judged.
+"""
 
 import time
 from collections.abc import Callable
@@ -20,24 +23,24 @@ from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, Recorder
 from omnibot_driver.tools.report.robots import Topics, choose, find
 
 LOOK_ROUND_S: Final = 2.0
-"""Time to look for robots, in s.
+"""Time in s for which the program searches for robots.
 
-The search does not end when a robot is found, because there may be others.
+The search continues after the first robot, because there may be others.
 """
 DISCOVERY_S: Final = 5.0
 DEPTH: Final = 1000
 COMMANDS: Final = ("cmd_vel", "wheel_cmd")
 
 Progress = Callable[[int, int], None]
-"""A function that receives the seconds listened so far, and the seconds to listen in all."""
+"""A function that receives how many seconds are over, and how many seconds the recording takes."""
 
 
 def listen(
     seconds: float, namespace: str | None, progress: Progress, asked_to_end: Callable[[], bool]
 ) -> Log:
-    """Return the log of one robot's messages for ``seconds``.
+    """Record the messages of one robot for ``seconds``, and return them as a log.
 
-    Raises ToolError if no robot is found.
+    Raises ToolError if no robot is found or no message arrives.
     """
     rclpy.init(
         args=["--ros-args", "--disable-external-lib-logs"],
@@ -73,9 +76,10 @@ def _discover(
     namespace: str | None,
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
-    """Find the robot; return its namespace, its topics, all types, and whether it is the only one.
+    """Find the robot; return its namespace, its topics, message types, and whether it is alone.
 
-    The types are the message types of all topics, by the topic's name.
+    The message types are those of all topics in ROS, by the name of the topic. The robot is alone
+    if no other robot runs.
     """
     began_s = time.monotonic()
     while True:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The messages received from one robot, as columns. Times are seconds since the log began."""
+"""The messages from one robot, as columns. Times are in seconds since the beginning of the log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,16 +13,20 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 COMMAND_TIMEOUT_S: Final = 0.5
-"""The driver's default of ``cmd_vel_timeout``, in s; an older command has no effect."""
+"""Time in s after which a command has no effect: the driver's default of ``cmd_vel_timeout``."""
 SETTLING_S: Final = 0.2
-"""Time before and after a change of state, in s, in which a gap in a stream is normal."""
+"""Time in s before and after a change of state in which a gap between messages is normal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
     """The messages of one topic in the order of arrival, one row for each message.
 
-    ``arrived_s``: times of arrival; ``stamp_s``: timestamps; ``values``: the values.
+    ``arrived_s``: when each message arrived.
+
+    ``stamp_s``: the timestamp in each message.
+
+    ``values``: the values, one column for each number in a message.
     """
 
     arrived_s: Array
@@ -34,17 +38,17 @@ class Series:
 
     @property
     def finite(self) -> Mask:
-        """Mask of the rows without NaN and infinity."""
+        """For each row, whether it contains neither NaN nor infinity."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     def only(self, rows: Mask) -> "Series":
-        """Return the series with the selected rows only."""
+        """Return a series that contains only the selected rows."""
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
-        """Return the newest row at each of these times.
+        """Return for each of these times the last row that has arrived.
 
-        A row that is older than the timeout is replaced by zeros.
+        If this row is older than the timeout, or missing, the result is zeros.
         """
         held = np.zeros((len(at_s), self.values.shape[1]))
         if len(self):
@@ -56,9 +60,9 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A span of time from ``begin_s`` to ``end_s``, and the state ``what`` during this time.
+    """A span of time.
 
-    ``what`` is empty if the span is not that of a state.
+    ``what``: the state during this time; empty if the span does not belong to a state.
     """
 
     begin_s: float
@@ -72,7 +76,10 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One status of a /diagnostics message; ``level`` has the values of diagnostic_msgs."""
+    """One status of a /diagnostics message.
+
+    ``level``: the level, as numbered in diagnostic_msgs.
+    """
 
     at_s: float
     hardware_id: str
@@ -84,14 +91,28 @@ class Status:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Log:
-    """The messages of one robot; ``start_ns``: the time of day at which the log began.
+    """The messages of one robot. All values are in SI units.
 
-    ``troubles``: what could not be read. ``alone``: whether this is the only robot, so that all of
-    the shared /diagnostics are this robot's.
+    ``start_ns``: the time of day at which the log begins.
 
-    Values, in SI units: ``imu`` angular velocity and specific force (6); ``odom`` x, y, yaw, and
-    the twist (6); ``joint_states`` and ``wheel_cmd`` rates of the ``wheels``, which are names of
-    joints; ``cmd_vel`` the twist (3).
+    ``imu``: angular velocity and specific force, 6 columns.
+
+    ``odom``: x, y, yaw, and the twist, 6 columns.
+
+    ``joint_states``, ``wheel_cmd``: rates of the wheels, one column for each name in ``wheels``.
+
+    ``cmd_vel``: the twist, 3 columns.
+
+    ``wheels``: names of the wheels' joints.
+
+    ``states``, ``estops``: the states of the driver and of the e-stop, each as a span of time.
+
+    ``absent``: topics without a message.
+
+    ``troubles``: what could not be read.
+
+    ``alone``: whether there is no other robot. Then everything in /diagnostics belongs to this
+    robot.
     """
 
     robot: str
@@ -112,20 +133,22 @@ class Log:
 
     @property
     def latched(self) -> list[Span]:
-        """Spans in which the e-stop was latched."""
+        """The spans of time in which the e-stop was latched."""
         return [span for span in self.estops if span.what == "latched"]
 
     def within(self, spans: list[Span], at_s: Array) -> Mask:
-        """Return which of these times lie in a span."""
+        """Return for each of these times whether it lies in one of the spans."""
         inside = np.zeros(len(at_s), dtype=bool)
         for span in spans:
             inside |= (at_s >= span.begin_s) & (at_s < span.end_s)
         return inside
 
     def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
-        """Whether the driver's state explains a gap in a stream from ``begin_s`` to ``end_s``.
+        """Return whether the driver's state explains a gap between messages of a topic.
 
-        ``running``: states in which the driver publishes the stream.
+        ``begin_s``, ``end_s``: begin and end of the gap.
+
+        ``running``: the states in which the driver publishes the topic.
         """
         begin_s, end_s = begin_s - SETTLING_S, end_s + SETTLING_S
         touched = [span for span in self.states if span.begin_s < end_s and span.end_s > begin_s]

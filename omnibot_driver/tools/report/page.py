@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Write the report as files: pictures, and one HTML page that contains them."""
+"""Writes the report as files: pictures, and one HTML page that contains them."""
 
 import base64
 import html
@@ -96,9 +96,9 @@ img{width:100%;height:auto;display:block}
 
 
 def write(log: Log, findings: Sequence[Finding], source: str, folder: Path) -> Path:
-    """Write a PNG of each picture and report.html into the folder; return the path of report.html.
+    """Write pictures and report.html into the folder; return the path of report.html.
 
-    The folder is created if necessary.
+    Each picture is a PNG file. The folder is created if it does not exist.
     """
     folder.mkdir(parents=True, exist_ok=True)
     sections = []

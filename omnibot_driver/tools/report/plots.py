@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Draw pictures of a log: each function returns one figure, and needs neither a screen nor ROS."""
+"""Draws the pictures of a log. Each function returns one figure, without a screen or ROS."""
 
 from collections.abc import Iterable, Iterator
 from itertools import cycle, zip_longest
@@ -34,19 +34,19 @@ from omnibot_driver.tools.report.drawing import (
 from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Series, Span, Status
 
 HOLE_S: Final = 1.0
-"""Gap in the odometry, in s, beyond which the path is interrupted."""
+"""Length of a gap in the odometry, in s, above which the drawn path is interrupted."""
 LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""Largest value on the axis of a plot of times, as a multiple of their 99 % quantile.
+"""How far the axis of a plot of times reaches, as a multiple of the 99 % quantile of the values.
 
 Larger values are drawn at the edge of the plot.
 """
 
 
 def path(log: Log) -> Figure:
-    """Draw the path from above, coloured by time, and x, y and yaw over time."""
+    """Draw the path from above, coloured by time; beside it, draw x, y and yaw over time."""
     figure = new_figure(5.2)
     left, right = np.ravel(np.asarray(figure.subfigures(1, 2, width_ratios=(1.2, 1.0))))
     above = left.subplots()
@@ -90,7 +90,7 @@ def path(log: Log) -> Figure:
 
 
 def velocities(log: Log) -> Figure:
-    """Draw measured and commanded velocities for every pair in the log, one plot for each axis."""
+    """Draw commanded and measured velocities, one plot for each axis."""
     found = following.shown(log)
     rows = sum(len(pair.axes) for pair in found)
     figure = new_figure(1.9 * rows)
@@ -116,7 +116,7 @@ def velocities(log: Log) -> Figure:
 
 
 def inertia(log: Log) -> Figure:
-    """Draw angular velocity, and specific force minus its medians, in the sensor's axes."""
+    """Draw the IMU's angular velocity, and its specific force minus the median of each axis."""
     figure = new_figure(5.0)
     rows = figure.subplots(2, 1, sharex=True)
     imu = log.imu.only(log.imu.finite)
@@ -138,7 +138,7 @@ def inertia(log: Log) -> Figure:
 
 
 def spectra(log: Log) -> Figure:
-    """Draw the amplitude spectral densities of the IMU's readings, at rest and in motion."""
+    """Draw the amplitude spectral density of the IMU's readings, at rest and in motion."""
     figure = new_figure(4.2)
     columns = figure.subplots(1, 2)
     imu = log.imu.only(log.imu.finite & np.isfinite(log.imu.stamp_s))
@@ -166,10 +166,10 @@ def spectra(log: Log) -> Figure:
 
 
 def timing(log: Log) -> Figure:
-    """Draw the intervals between timestamps, and the delays of arrival.
+    """Draw how evenly messages are timed: the steps between timestamps, and the delays of arrival.
 
-    The median is subtracted from the intervals, and the smallest delay from the delays.
-    Both are drawn over time and as histograms.
+    The median step and the smallest delay are subtracted. Both plots show values over time, with a
+    histogram beside them.
     """
     figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")
@@ -206,7 +206,7 @@ def timing(log: Log) -> Figure:
 
 
 def timeline(log: Log) -> Figure:
-    """Draw state, e-stop, commands, gaps, and every status of /diagnostics, as bands over time."""
+    """Draw state, e-stop, commands, gaps, and each status of /diagnostics as bands over time."""
     gaps = [
         (f"gaps in {stream.name}", rhythm.measure(log, series, stream))
         for stream, series in ((rhythm.IMU, log.imu), (rhythm.ODOMETRY, log.odom))
@@ -251,9 +251,9 @@ def timeline(log: Log) -> Figure:
 
 
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
-    """Yield a span and a colour for each status.
+    """Yield a span and a colour for each message of a status.
 
-    The span of a status lasts until the next status, or 1 s if the next status is late.
+    The span ends at the next message, or after 1 s if the next message is late.
     """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0
@@ -270,7 +270,7 @@ def _name_states(axes: Axes, log: Log) -> None:
 
 
 def _stretches(series: Series) -> list[Span]:
-    """Return the spans of time in which a command was active."""
+    """Return the spans of time in which a command was in effect."""
     if not len(series):
         return []
     times_s = series.arrived_s

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Convert messages to columns; messages of rosbags and of rclpy have the same fields."""
+"""Converts messages to columns. Messages may come from a bag or from rclpy, with the same fields.
+"""
 
 import math
 from array import array
@@ -17,7 +18,7 @@ from omnibot_driver.tools.report.log import Log, Series, Span, Status
 
 NO_STAMP: Final = -1
 WHEEL: Final = "wheel"
-"""Part of the name of every driven wheel's joint; the names of other joints do not contain it."""
+"""Part of the name of each wheel's joint. The names of other joints do not contain it."""
 DIAGNOSTICS: Final = "/diagnostics"
 
 Row = tuple[float, ...]
@@ -48,9 +49,12 @@ def _wheels(message: Any) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """The role of a topic: number of values in a row, and a function to read each message type.
+    """How the messages of a topic are converted.
 
-    A ``width`` of None means the number of the robot's wheels, which ``joint_states`` names.
+    ``width``: how many values a row has. None means as many as the robot has wheels, which
+    ``joint_states`` tells.
+
+    ``read``: for each message type, the function that returns the row.
     """
 
     width: int | None
@@ -81,7 +85,7 @@ class _Column:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
         self.rows: list[Row] = []
-        """Rows of values; the width of a complete row may become known only at the end."""
+        """The rows, if their width becomes known only at the end."""
 
     def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
@@ -94,7 +98,7 @@ class _Column:
         self.stamp_ns.append(stamp_ns or NO_STAMP)
 
     def series(self, start_ns: int, wheels: int) -> Series:
-        """Return the column as a series; ``wheels``: the number of wheels, 0 if not known."""
+        """Return the column as a series; ``wheels``: the count of wheels, 0 if unknown."""
         arrived_ns, stamp_ns = (
             np.array(column, dtype=np.int64) for column in (self.arrived_ns, self.stamp_ns)
         )
@@ -111,7 +115,7 @@ class _Column:
 
 
 class Recorder:
-    """Collects one robot's messages: call ``hear`` for each, then ``log``."""
+    """Collects one robot's messages. The caller calls ``hear`` for each message, then ``log``."""
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
@@ -121,7 +125,12 @@ class Recorder:
         self.count = 0
 
     def hear(self, role: str, kind: str, arrived_ns: int, message: Any) -> None:
-        """Record a message of the type ``kind`` that arrived on the topic with this role."""
+        """Record a message that arrived on a topic.
+
+        ``role``: name of the topic without the robot's namespace, such as ``odom``.
+
+        ``kind``: message type of the topic.
+        """
         if role in self._columns:
             column = self._columns[role]
             joints = role == "joint_states"
@@ -134,13 +143,14 @@ class Recorder:
         self.count += 1
 
     def _rates(self, message: Any) -> Row:
-        """Return the wheel rates, in the order in which the first message names the wheels."""
+        """Return the rates of the wheels, in the order of the first message."""
         self._wheels = self._wheels or tuple(name for name in message.name if WHEEL in name)
         rates = dict(zip(message.name, message.velocity, strict=False))
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
-        """Return a log of all messages in the order of arrival; at least one must exist."""
+        """Return a log of all messages, in the order of arrival. At least one message must exist.
+        """
         times = [
             *(time for column in self._columns.values() for time in column.arrived_ns),
             *(time for events in self._events.values() for time, _ in events),
@@ -176,9 +186,9 @@ class Recorder:
     def _spans(
         self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
     ) -> tuple[Span, ...]:
-        """Return the spans of time in which the values received on a topic stayed the same.
+        """Return the spans of time in which the value on a topic stayed the same.
 
-        ``name``: a function that returns the text of a value, for its span.
+        ``name``: returns the text that a span gets for its value.
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

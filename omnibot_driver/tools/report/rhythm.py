@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge a stream's timing: its rate, evenness of its timestamps, missing messages, delays."""
+"""Judges a topic's timing: rate, even timestamps, missing messages, and delays of arrival."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -17,20 +17,21 @@ from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Series, Span
 
 GAP: Final = 1.5
-"""Interval between two timestamps, in periods, above which a message is missing."""
+"""Step between two timestamps, in periods, above which a message may be missing."""
 LONG_GAP_S: Final = 0.5
 MANY_LOST: Final = 0.01
 RATE_TOLERANCE: Final = 0.05
 UNEVEN: Final = 0.1
-"""Standard deviation of timestamp steps, in periods, above which the steps are uneven."""
+"""Standard deviation of the steps between timestamps, in periods, above which they are uneven."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Longest time, in s, in which short steps may compensate a jump of the timestamps.
+"""Longest time in s in which short steps can compensate a long step of the timestamps.
 
-If the timestamps are not right again after this time, messages are missing.
+After a long step, later steps may be short, so that the timestamps are right again. If this takes
+longer, messages are missing.
 """
 
 
@@ -38,8 +39,14 @@ If the timestamps are not right again after this time, messages are missing.
 class Stream:
     """The expected timing of a topic.
 
-    ``lost``, ``rates``: keys in the driver's diagnostics, for the counts of lost messages, and for
-    the expected rate. The first key of ``rates`` that has a value is used.
+    ``rate_hz``: the expected rate.
+
+    ``running``: the driver's states in which it publishes the topic.
+
+    ``lost``: keys of the driver's counts of lost messages in its diagnostics.
+
+    ``rates``: keys of the expected rate in the driver's diagnostics. The first key that has a value
+    is used.
     """
 
     name: str
@@ -49,7 +56,8 @@ class Stream:
     rates: tuple[str, ...]
 
     def promised(self, log: Log) -> "Stream":
-        """Return this stream with the last expected rate that the driver's diagnostics contain."""
+        """Return this stream with the expected rate from the driver's diagnostics, if there is one.
+        """
         if not log.alone:
             return self
         for key in self.rates:
@@ -74,21 +82,29 @@ ODOMETRY: Final = Stream(
     lost=("Odometry frames lost", "Odometry readings refused"),
     rates=(PUBLISHED_ODOMETRY, "Odometry rate (Hz)"),
 )
-"""The stream of the odometry.
+"""The expected timing of the odometry.
 
-The rate of an OmniBot is used if the driver's diagnostics in the log contain no rate.
+If the driver's diagnostics contain no rate, the rate of an OmniBot is used.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class FrameSchedule:
-    """The timing of a stream.
+    """The measured timing of a topic.
 
-    ``steps_s``: steps between successive timestamps, from ``at_s`` on; ``period_s``: their median.
-    ``gap_at_s``, ``gap_s``, ``missing``: beginning and length of each gap, and number of messages
-    missing in it, without the gaps that the driver's state explains. ``leap_at_s``, ``leap_s``:
-    beginning and length of each wide step that later short steps compensate, so that no message is
-    missing. ``late_s``: arrival after the timestamp, at ``arrived_s``.
+    ``steps_s``: steps between successive timestamps. ``at_s``: the timestamp before each step.
+
+    ``period_s``: the median step.
+
+    ``gap_at_s``, ``gap_s``: begin and length of each gap, without gaps that the driver's state
+    explains. The last gap may be the time from the last message to the end of the log.
+
+    ``missing``: how many messages are missing in each gap.
+
+    ``leap_at_s``, ``leap_s``: begin and length of each long step that short steps compensate. No
+    message is missing there.
+
+    ``late_s``: time from the timestamp to the arrival of each message. ``arrived_s``: the arrival.
     """
 
     at_s: Array
@@ -104,7 +120,7 @@ class FrameSchedule:
 
 
 def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
-    """Measure the timing by timestamps; messages without a timestamp are left out."""
+    """Return the timing by the timestamps. Messages without a timestamp are left out."""
     stream = stream.promised(log)
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
@@ -140,7 +156,7 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 
 
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
-    """Return the gap from the last message to the end of the log, or None.
+    """Return the gap from the last message to the end of the log.
 
     Return None if this time is shorter than ``LONG_GAP_S``, or if the driver's state explains it.
     """
@@ -151,10 +167,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each wide step, the end of the row of steps that may compensate it.
+    """Return for each long step where the steps end that may compensate it.
 
-    A row begins with a wide step. It ends before the next wide step, and has at most ``most``
-    steps. ``wide``: indices of the wide steps.
+    They end before the next long step, and after at most ``most`` steps. ``wide``: indices of the
+    long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
@@ -162,7 +178,7 @@ def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
 
 
 def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
-    """Judge the timing of a stream: its rate, uneven timestamps, gaps, and delays of arrival."""
+    """Judge the timing of a topic: rate, uneven timestamps, gaps, and delays of arrival."""
     stream = stream.promised(log)
     rhythm = measure(log, series, stream)
     unstamped = int(np.isnan(series.stamp_s).sum())
@@ -295,11 +311,11 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 
 
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
-    """Return by how much this robot's counts ``keys`` in /diagnostics grew; None if not known.
+    """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    The growth is not known if the log has too few of these counts, or if several robots share
-    /diagnostics. If a count falls, another driver has begun to count at zero, and its count is
-    added.
+    The growth is unknown if no count has two values in the log, or if several robots share
+    /diagnostics. If a count becomes smaller, a driver has started again and counts from zero. The
+    new count is then added.
     """
     if not log.alone:
         return None

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find robots by the names and types of topics alone."""
+"""Finds robots by the names and message types of topics."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Final
@@ -10,14 +10,17 @@ from omnibot_driver.tools.needs import ToolError
 from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, SERIES
 
 PROOF: Final = ("imu/data_raw", "odom", "state")
-"""Topics that identify a robot: its namespace must have at least one of them."""
+"""Topics that identify a robot. A namespace with at least one of them belongs to a robot."""
 
 Topics = dict[str, str]
-"""The role of each topic, by the name of the topic."""
+"""For each topic of a robot: its role, which is the topic's name without namespace."""
 
 
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
-    """Return the robots' topics by namespace ("/" for none), from pairs of topic and type."""
+    """Return for each robot's namespace ("/" for none) its topics.
+
+    ``topics``: name and message type of each topic.
+    """
     pairs = set(topics)
     drivers = drivers_among(pairs)
     robots: dict[str, Topics] = {}
@@ -33,11 +36,11 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that a topic's name allows, each with two values.
+    """Return the roles that a topic may have by its name.
 
-    The first value is the namespace of the robot. The second is whether the topic fits the role:
-    the role must use the message type ``kind``. For topics below the name of a driver's node, such
-    as ``state``, ``drivers`` must contain this node.
+    For each role, the first value is the namespace of the robot. The second value is whether the
+    topic fits the role. It fits if ``kind`` is the right message type. A topic below the name of a
+    driver's node, such as ``state``, also needs this node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -53,8 +56,11 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
     """Return the namespace and the topics of one robot.
 
-    ``wanted``: the robot's namespace; if it is None, there must be only one robot. ``where``: where
-    the robots were found, for the message. Raises ToolError if the robot cannot be chosen.
+    ``wanted``: namespace of the robot. If it is None, there must be only one robot.
+
+    ``where``: where the robots were found, for the message.
+
+    Raises ToolError if no robot can be chosen.
     """
     names = ", ".join(robots)
     if not robots:

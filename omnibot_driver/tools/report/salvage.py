@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Repair files of bags whose recording was never finished; only a copy is changed.
+"""Repairs copies of bag files whose recording was not finished.
 
-An mcap (mcap.dev/spec) is a sequence of records. A record is an operation of one byte, the length
-of the content as a number of eight bytes, and the content. An index follows; the records can also
-be read without it. The latest changes of an sqlite3 database are in a separate file beside it.
+An mcap file (mcap.dev/spec) is a sequence of records, followed by an index. A record has one byte
+for its kind, eight bytes for its length, and its content. So the records can be read without the
+index. The latest changes of an sqlite3 database are in a journal: a separate file beside it.
 """
 
 import shutil
@@ -18,19 +18,19 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 HEAD: Final = struct.Struct("<BQ")
 NO_RECORD, FOOTER, DATA_END = 0x00, 0x02, 0x0F
 END: Final = HEAD.pack(DATA_END, 4) + bytes(4) + HEAD.pack(FOOTER, 20) + bytes(20) + MAGIC
-"""The end of an mcap with an empty index."""
+"""The end of an mcap file that has an empty index."""
 JOURNALS: Final = ("-wal", "-journal")
 
 
 def breaks_off(file: Path) -> bool:
-    """Whether this mcap lacks its end."""
+    """Return whether this mcap file lacks its end."""
     with file.open("rb") as source:
         source.seek(max(0, file.stat().st_size - len(MAGIC)))
         return source.read() not in (MAGIC, b"")
 
 
 def cut_to_records(file: Path, folder: Path) -> Path:
-    """Return a copy of this mcap that contains all complete records, and a proper end."""
+    """Return a copy of this mcap file that has all complete records and a valid end."""
     copy = Path(shutil.copy(file, folder))
     size = copy.stat().st_size
     with copy.open("r+b") as target:
@@ -47,12 +47,12 @@ def cut_to_records(file: Path, folder: Path) -> Path:
 
 
 def has_journal(file: Path) -> bool:
-    """Whether this sqlite3 database has changes that are still in its journal."""
+    """Return whether this sqlite3 database has a journal with its latest changes."""
     return any(journal.exists() for journal in _journals(file))
 
 
 def with_journal(file: Path, folder: Path) -> Path:
-    """Return a copy of this sqlite3 database that includes its journal."""
+    """Return a copy of this sqlite3 database that includes the changes in its journal."""
     copy = Path(shutil.copy(file, folder))
     for journal in filter(Path.exists, _journals(file)):
         shutil.copy(journal, folder)

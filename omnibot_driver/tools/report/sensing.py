@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge the IMU: gravity and bias at rest, turning and vibration in motion."""
+"""Judges the IMU: gravity and bias at rest, turns and vibration in motion."""
 
 import math
 from collections.abc import Iterator
@@ -19,39 +19,43 @@ from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 
 SLIGHT_ERROR: Final = 0.03
-"""Relative error of measured gravity up to which the accelerometer is judged good."""
+"""Relative error of measured gravity below which the accelerometer is judged good."""
 REST_S: Final = 0.5
-"""Time before and after any motion, in s, in which the robot is not regarded as at rest."""
+"""Time in s before and after a motion in which the robot is not regarded as at rest."""
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
-"""Rate, in rad/s, above which the robot is taken to turn if odometry is missing.
+"""Rate in rad/s above which the robot is regarded as turning, if there is no odometry.
 
-A constant rate above this value might also be a bias, but so large a bias is rare.
+A constant rate above this value might be a bias, but such a large bias is rare.
 """
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
-"""Fraction of an odometry step that gyro readings must cover, so that both can be compared."""
+"""Fraction of the time between two odometry messages that gyro readings must cover.
+
+Otherwise this time is left out when the turns by gyro and by odometry are compared.
+"""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
-"""Frequency, in Hz, up to which the report regards a vibration as caused by driving."""
+"""Frequency in Hz up to which motion is regarded as caused by driving, not by vibration."""
 SEGMENT: Final = 256
 
 
 def rate_hz(imu: Series) -> float:
-    """Return the median rate of the IMU, in Hz, by its timestamps."""
+    """Return the rate of the IMU in Hz, from the median step of its timestamps."""
     if len(imu) < 2:
         return math.nan
     return float(np.round(1.0 / np.median(np.diff(imu.stamp_s)), 1))
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """Return at which readings the robot was at rest.
+    """Return for each reading whether the robot was at rest.
 
-    The odometry decides this or, if there is none, blocks of IMU readings.
+    The odometry decides. If there is none, the mean and the spread of each block of IMU readings
+    decide.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
@@ -79,14 +83,19 @@ def at_rest(log: Log, imu: Series) -> Mask:
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Amplitude spectral densities per √Hz at n frequencies: columns 0-2 gyro, 3-5 force."""
+    """Amplitude spectral densities per √Hz at n frequencies. Columns 0 to 2 are gyro, 3 to 5 force.
+    """
 
     frequency_hz: Array
     density: Array
 
 
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
-    """Return Welch's mean spectrum over stretches without a gap; None if all are too short."""
+    """Return Welch's mean spectrum of the selected ``rows``; None if there is too little data.
+
+    The mean is over all pieces of the log in which no reading is missing and all rows are selected.
+    Short pieces are left out.
+    """
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
     changes = np.flatnonzero(np.diff(rows.astype(np.int8))) + 1
@@ -146,7 +155,7 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def longest_same(values: Array) -> int:
-    """Return the largest number of successive equal rows."""
+    """Return how many equal rows follow each other at most."""
     changes = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1)) + 1
     return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())
 
@@ -202,10 +211,10 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 
 
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
-    """Return the ratio of turns by gyro to turns by odometry, and the whole angle turned, in rad.
+    """Return the ratio of turns by gyro to turns by odometry, and how far the robot turned, in rad.
 
-    The whole angle is the sum of the sizes of all turns by odometry. Both values are computed from
-    those steps of the odometry that are not gaps, and during which gyro readings were received.
+    The second value adds all turns by odometry, to the left and to the right. Gaps of the odometry
+    are left out, and so are steps without gyro readings.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge the odometry of a drive: distance, speed, and whether pose and twist agree."""
+"""Judges the odometry of a drive: distance, speed, and whether pose and twist agree."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,25 +12,25 @@ from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 
 MOVING: Final = (0.005, 0.005, 0.01)
-"""Speeds of x, y and yaw, in m/s, m/s and rad/s, above which the robot is regarded as moving."""
+"""Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""Largest difference, in rad, between a pose and the pose that the twist leads to.
+"""``LEAP_M``, ``LEAP_RAD``: how far a pose may be from where the twist leads, in m and in rad.
 
-``LEAP_M`` is the same in m. A larger difference is a leap: the driver never corrects odom by more
-than this in one step, because fastest_linear_speed limits its corrections.
+A larger difference is a leap. The driver's own corrections of odom are smaller in each step,
+because fastest_linear_speed limits them.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Length of a step, in s, from which on the step is a gap.
+"""Length in s from which a step between two messages is a gap.
 
-A gap is not a leap, unless it ends at zero: the twist does not show the motion in a gap.
+The twist does not show the motion during a gap. So a gap is a leap only if it ends at zero.
 """
 
 
 def moving(odom: Series) -> Mask:
-    """Return a mask of the messages whose twist shows that the robot moved."""
+    """Return for each message whether its twist shows motion."""
     return np.asarray((np.abs(odom.values[:, 3:]) > MOVING).any(axis=1))
 
 
@@ -38,10 +38,13 @@ def moving(odom: Series) -> Mask:
 class Steps:
     """The steps from each message of odom to the next.
 
-    ``way_m``, ``turned_rad``: distance and turn, both 0 for a leap. ``off_m``, ``off_rad``:
-    difference between the pose and the pose that the twist leads to. ``leap``: whether this
-    difference is too large; after a gap, only a leap to zero counts. ``reset``: whether the step is
-    a leap to zero.
+    ``way_m``, ``turned_rad``: distance and turn of the step; 0 for a leap.
+
+    ``off_m``, ``off_rad``: difference between the pose and where the twist leads.
+
+    ``leap``: whether this difference is too large. A gap is a leap only if it ends at zero.
+
+    ``reset``: whether the step is a leap to zero.
     """
 
     way_m: Array
@@ -55,7 +58,7 @@ class Steps:
 def steps(odom: Series) -> Steps:
     """Return the steps between successive messages.
 
-    ``odom`` must have at least two messages, all finite.
+    ``odom`` must have at least two messages, and all must be finite.
     """
     steps_s = np.diff(odom.stamp_s)
     x, y, yaw = odom.values[:, :3].T
