@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` look for it.
+"""What colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` find it.
 
-With ``OMNIBOT_DRIVER_COMPILE=1`` in the environment the core's inbound half is compiled with mypyc.
-If that fails, for whatever reason, the package is installed as plain Python, and the reason is
-printed.
+If the environment contains ``OMNIBOT_DRIVER_COMPILE=1``, mypyc compiles the modules of the core
+that process received bytes. If this fails, the reason is printed, and the package is installed as
+plain Python.
 """
 
 import os
@@ -26,15 +26,18 @@ COMPILED_OF_OMNIBOT = (
     *("cost_model", "decoder", "fast_path", "frame_schedule", "gaps", "late_reads", "lower_bound"),
     *("misconfiguration", "modes", "schedule", "sequence", "single_imu", "translation", "trellis"),
 )
-"""Modules that process received bytes. Some modules are not compiled: those that decide whether a
-robot moves, so that they run as they were debugged; base classes; and frames, which are created
-faster without mypyc's dataclasses."""
+"""``COMPILED``, ``COMPILED_OF_OMNIBOT``: the modules that mypyc compiles.
+
+They process received bytes. These modules are not compiled: those that decide whether a robot
+moves, so that they run as they were debugged; base classes; and frames, because they are created
+faster without mypyc's dataclasses.
+"""
 
 
 class CompileCore(build_ext):
-    """The build step that compiles the core completely or not at all.
+    """The build step that compiles the core, completely or not at all.
 
-    A half-compiled core must not be installed.
+    A core that is compiled only in part is never installed.
     """
 
     def run(self) -> None:
@@ -81,30 +84,30 @@ class CompileCore(build_ext):
 
 
 class InstallAnew(install_lib):
-    """The install step that removes what an earlier installation compiled.
+    """The install step that first removes the compiled modules of an earlier installation.
 
-    colcon leaves an earlier installation in place, and Python prefers its compiled modules.
+    colcon leaves them in place, and Python would use them instead of the new sources.
     """
 
     def install(self) -> list[str]:
-        """Install after removing compiled modules of an earlier installation."""
+        """Remove the compiled modules of an earlier installation, then install."""
         remove_compiled(self.install_dir)
         return super().install()
 
 
 def compiled_in(folder: str) -> list[Path]:
-    """Return the modules that mypyc compiled, and the files that the compiled modules share."""
+    """Return the modules that mypyc compiled, and the files that they share."""
     return [*Path(folder).glob(f"{NAME}__mypyc.*"), *Path(folder, CORE).rglob("*.so")]
 
 
 def remove_compiled(folder: str) -> None:
-    """Remove the compiled modules, so that Python runs the sources beside them."""
+    """Remove the compiled modules, so that Python runs the sources."""
     for path in compiled_in(folder):
         path.unlink()
 
 
 def compiling() -> dict[str, object]:
-    """Return arguments for setuptools; ``CompileCore`` finds the modules to compile."""
+    """Return the arguments for setuptools. ``CompileCore`` finds the modules to compile."""
     commands = {"build_ext": CompileCore, "install_lib": InstallAnew}
     if os.environ.get("OMNIBOT_DRIVER_COMPILE", "0") in ("", "0"):
         return {"cmdclass": commands}

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Sphinx settings for `make docs`, and for rosdoc2, which executes this file with its own defaults.
+"""Settings of Sphinx for `make docs`. rosdoc2 also executes this file, with its own defaults.
 
-The site is built from the complete repository, so that each link leads to the same place as on
-GitHub.
+The site is built from the whole repository, so that each link leads to the same place as on GitHub.
 """
 
 project = "omnibot_driver"

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Write the parts of the documents that come from the code.
+"""Writes the parts of the documents that come from the code.
 
-`make docs` runs this script. A test compares the files with the script's output. The output depends
-on the code alone, so the test shows which files to regenerate after a change of the code.
+``make docs`` runs this script. A test compares the files with the script's output. The output
+depends only on the code, so the test shows which files must be written again after a change.
 """
 
 import textwrap
@@ -43,7 +43,8 @@ TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 
 
 def parameter_file(board: str) -> str:
-    """Return config/<board>.yaml: every parameter with its default, and its range in a comment."""
+    """Return config/<board>.yaml: each parameter with its default, and with a comment on its range.
+    """
     lines = [
         f"# All parameters of the board {board}, with their defaults. Load the file with",
         f"#   ros2 run omnibot_driver driver --ros-args --params-file {board}.yaml",
@@ -71,7 +72,7 @@ def parameter_file(board: str) -> str:
 
 
 def parameters_page() -> str:
-    """Return docs/parameters.md: tables of all parameters, board by board."""
+    """Return docs/parameters.md: tables of all parameters, one board after the other."""
     lines = PARAMETERS_INTRODUCTION.splitlines()
     for board in boards.PROFILES:
         lines += ["", f"## The board `{board}`"]
@@ -110,7 +111,7 @@ def _yaml(value: Value) -> str:
 
 
 def architecture() -> str:
-    """Return docs/internals/architecture.md with the mode table of the code."""
+    """Return docs/internals/architecture.md, with the table of modes from the code."""
     lines = ["| | " + " | ".join(mode.value for mode in Mode) + " |", "|---|---|---|---|---|"]
     for happening, after in TRANSITIONS.items():
         cells = [after[mode].value if mode in after else "refused" for mode in Mode]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Draw the board's modes as a picture (SVG) from the mode table."""
+"""Draws the modes of an OmniBot as an SVG picture, from the table of modes in the code."""
 
 import math
 import textwrap
@@ -29,7 +29,7 @@ Point = tuple[float, float]
 
 
 def svg() -> str:
-    """Return the picture: arrows show what changes the mode, boxes show what does not."""
+    """Return the picture. Arrows show what changes the mode, and boxes show what does not."""
     pairs = [(before, after) for before in Mode for after in Mode if before is not after]
     return "\n".join(
         [
@@ -49,7 +49,7 @@ def _happenings(before: Mode, after: Mode) -> list[str]:
 
 
 def _curve(before: Mode, after: Mode) -> tuple[Point, Point, Point]:
-    """Return start, control point and end of an arrow between two boxes, bent to the left."""
+    """Return start, control point and end of an arrow between two boxes; it bends to the left."""
     (x0, y0), (x1, y1) = PLACES[before], PLACES[after]
     length = math.hypot(x1 - x0, y1 - y0)
     left = ((y1 - y0) / length, -(x1 - x0) / length)
@@ -91,9 +91,9 @@ def _arrow(before: Mode, after: Mode) -> list[str]:
 
 
 def _label(before: Mode, after: Mode) -> list[str]:
-    """Return an arrow's label: at the middle of a horizontal arrow, near the start of any other.
+    """Return the label of an arrow: at the middle of a horizontal arrow, else near the start.
 
-    In these positions no two labels overlap.
+    At these places no two labels overlap.
     """
     lying = PLACES[before][1] == PLACES[after][1]
     x, y = _at(_curve(before, after), 0.5 if lying else 0.3)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Launch file that publishes the robot's description and fixed frames, and optionally starts RViz.
+"""Launch file that publishes the robot's description and fixed frames; it can also start RViz.
 
-The joints keep their names whatever ``frame_prefix`` is: robot_state_publisher and the driver put
-the prefix before the names of frames only.
+robot_state_publisher and the driver put ``frame_prefix`` before the names of frames only. The names
+of joints stay the same.
 """
 
 from launch import LaunchDescription
@@ -22,7 +22,7 @@ from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return robot_state_publisher, RViz and their arguments."""
+    """Return robot_state_publisher, RViz, and the launch arguments."""
     board = PythonExpression(["'", LaunchConfiguration("board"), "' or 'omnibot'"])
     description = Command(
         [

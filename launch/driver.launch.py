@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Launch file that starts the driver with a parameter file; launch arguments override the file."""
+"""Launch file that starts the driver with a parameter file.
+
+A launch argument has precedence over the same parameter in the file.
+"""
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -21,7 +24,7 @@ OVERRIDES = {
 
 
 def driver_node(context: LaunchContext) -> list[Node]:
-    """Return the driver node; for an empty launch argument it uses the parameter file's value."""
+    """Return the driver's node. Empty launch arguments leave the values in the parameter file."""
     file = LaunchConfiguration("params_file").perform(context)
     if not file:
         board = LaunchConfiguration("board").perform(context) or "omnibot"

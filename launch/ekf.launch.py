@@ -2,11 +2,12 @@
 
 """Launch file that starts the driver, the description and robot_localization's filter.
 
-The filter combines odometry with the gyro or, on a board that has one, with the compass. The filter
-publishes the transform from odom to base_link, so the driver does not. The description is needed
-because it has the mounting of the sensors; for example, OmniBot's IMU is upside down. The
-arguments are those of driver.launch.py and description.launch.py. A board without parameters for
-the filter is refused.
+The filter combines the odometry with the gyro, or with the compass on a board that has one. It
+publishes the transform from odom to base_link, so the driver does not. The filter needs the
+description, which says how the sensors are mounted: OmniBot's IMU, for example, is upside down.
+
+The launch arguments include those of driver.launch.py and description.launch.py. A board without
+parameters for the filter is refused.
 """
 
 from pathlib import Path
@@ -41,7 +42,7 @@ def include(name: str, arguments: dict[str, Any]) -> IncludeLaunchDescription:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return driver, description and filter, with their arguments."""
+    """Return driver, description, filter, and the launch arguments."""
     prefix = LaunchConfiguration("frame_prefix")
     frames = {
         parameter: ParameterValue([prefix, frame], value_type=str)

@@ -2,7 +2,7 @@
 
 """Launch file that starts the driver with a simulated board inside it.
 
-It takes the arguments of driver.launch.py.
+The launch arguments are those of driver.launch.py.
 """
 
 from launch import LaunchDescription
@@ -13,7 +13,7 @@ from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the driver on a simulated board, with the launch argument ``port``."""
+    """Return the driver with a simulated board, and the launch argument ``port``."""
     return LaunchDescription(
         [
             DeclareLaunchArgument(

@@ -1,7 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The demo: simulated board and driver as separate processes, and a robot that drives a square.
+"""The demo: a robot with a simulated board drives a square.
 
-Like any ROS program, the demo uses the driver through the driver's topics. It uses the simulator
-through the simulator's console. The demo must not know the bytes on the wire.
+Simulator and driver run as separate processes. The demo uses the driver's topics, as any ROS
+program does, and the simulator's console. It must not know the bytes on the line to the board.
 """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The demo's command line: ``python -m omnibot_driver.demo``."""
+"""Command line of the demo: ``python -m omnibot_driver.demo``."""
 
 import argparse
 import io
@@ -24,7 +24,7 @@ from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
 from omnibot_driver.simulator.common.options import DEFAULT_BOARD
 
 ENVIRONMENT: Final = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-"""Defaults that keep the demo away from ROS domain 0, where a real robot may be."""
+"""Defaults that keep the demo out of ROS domain 0, where a real robot may be."""
 STOPPING_S: Final = 3.0
 ROW_EVERY_S: Final = 1.0
 
@@ -32,7 +32,8 @@ ROW_EVERY_S: Final = 1.0
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
     """Run the demo with this board for ``seconds``, or until ``asked_to_end`` returns True.
 
-    Raises ParameterError for an unknown board, DemoFailed, and ImportError without ROS.
+    Raises ParameterError for an unknown board, DemoFailed if the demo cannot continue, and
+    ImportError without ROS.
     """
     capability = capabilities.of(board)
     namespace = f"/demo_{os.getpid()}"
@@ -115,7 +116,7 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo until its time is over, or until SIGINT or SIGTERM.
 
-    Returns the exit code: 0 at the end, 1 on failure, 2 on wrong usage.
+    Return 0 at the end, 1 after a failure, and 2 on wrong usage.
     """
     parser = argparse.ArgumentParser(
         prog="demo",

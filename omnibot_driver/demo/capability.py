@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the demo must know of a board; it is read from the board's profile before anything starts.
+"""What the demo must know about a board. The board's profile contains it, so nothing has to run.
 
-This module must not name any board, and must not use ROS or processes.
+This module must not name a board, and must not use ROS or processes.
 """
 
 from dataclasses import dataclass
@@ -16,13 +16,20 @@ from omnibot_driver.simulator.common import options
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capability:
-    """The abilities of a board that drives by ``cmd_vel`` and has ``odom``.
+    """What a board that accepts ``cmd_vel`` can do.
 
-    ``title``: the board's name in the sentence "A simulated ... drives". ``imu``: whether the board
-    has ``imu/data_raw``. ``sideways``: whether the board can move along y, as well as along x.
-    ``ports``: for each address that the simulator prints, the name of the driver's parameter; empty
-    if another address determines this one. ``real``: arguments that a driver needs for the real
-    robot; ``page``: the board's document.
+    ``title``: name of the board, for the sentence "A simulated ... drives".
+
+    ``imu``: whether the driver publishes ``imu/data_raw``.
+
+    ``sideways``: whether the robot can drive along its y axis.
+
+    ``ports``: the driver's parameter for each address that the simulator prints. It is empty if
+    another address determines this one.
+
+    ``real``: arguments of the driver for the real robot.
+
+    ``page``: the board's document.
     """
 
     title: str
@@ -34,7 +41,7 @@ class Capability:
 
 
 def of(name: str) -> Capability:
-    """Return the abilities of the board with this name.
+    """Return what the board with this name can do.
 
     Raises ParameterError for an unknown board, and for a board that does not accept ``cmd_vel``.
     """
@@ -57,6 +64,9 @@ def of(name: str) -> Capability:
 
 
 def port_arguments(name: str, ports: dict[str, str]) -> str:
-    """Return the arguments after ``--ros-args`` for this board; ``ports``: values by parameter."""
+    """Return the arguments after ``--ros-args`` for this board.
+
+    ``ports``: values of the port parameters, by parameter.
+    """
     board = {} if name == options.DEFAULT_BOARD else {"board": name}
     return " ".join(f"-p {key}:={value}" for key, value in {**board, **ports}.items())

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The tool ``monitor`` on the demo's terminal, if possible. Knows processes, but not ROS."""
+"""Runs the tool ``monitor`` on the demo's terminal, if possible.
+
+The module knows processes; it does not know ROS.
+"""
 
 import subprocess
 import sys
@@ -13,8 +16,9 @@ from omnibot_driver.tools.monitor.screen import has_screen
 class Dashboard:
     """The tool ``monitor`` on this terminal, until the user quits it or ``close`` is called.
 
-    The monitor shows the driver in ``namespace`` as soon as the driver runs. ``possible``: whether
-    the terminal and the installed libraries allow the monitor to run.
+    The monitor waits for the driver in ``namespace``, and then shows it.
+
+    ``possible``: whether the terminal and the installed libraries allow the monitor to run.
     """
 
     def __init__(self, namespace: str) -> None:
@@ -32,7 +36,7 @@ class Dashboard:
         return self._process is not None and self._process.poll() is not None
 
     def close(self) -> None:
-        """End the monitor and give the terminal back."""
+        """End the monitor, so that the demo can use the terminal again."""
         if self._process is None:
             return
         self._process.terminate()

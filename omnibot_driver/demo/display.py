@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Output of the demo: rows, a picture, texts. Knows terminals; must not know ROS or processes."""
+"""Prints the demo's rows, texts and picture.
+
+The module knows terminals; it must not know ROS or processes.
+"""
 
 import math
 import sys
@@ -26,7 +29,12 @@ With the real robot: lift its wheels off the ground first ({page}), then run
 def status_row(
     state: str, rates_hz: tuple[int | None, int], leg: int, pose: Pose, *velocities: BodyTwist
 ) -> str:
-    """Return a table row below HEADING; ``velocities``: commanded, then measured twist."""
+    """Return a row of the table under HEADING.
+
+    ``rates_hz``: rates of the IMU, None without one, and of the odometry.
+
+    ``velocities``: the commanded twist, then the measured one.
+    """
     imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
     for twist in velocities:
@@ -50,9 +58,11 @@ def introduce(
     exports: str,
     seconds: float,
 ) -> None:
-    """Print what the demo does, and the commands that the user can try.
+    """Print what the demo does, and commands that the user can try.
 
-    ``options`` are the arguments of the simulator and of the driver.
+    ``options``: the arguments of the simulator and of the driver.
+
+    ``exports``: environment variables that the user must set in another terminal.
     """
     imu = f"\n  ros2 topic hz {namespace}/imu/data_raw" * capability.imu
     turning = (
@@ -77,10 +87,17 @@ Where ROS 2 Jazzy is installed, watch and intervene from another terminal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """The results of a drive: distance, message rates, the pose by odometry, and the true pose.
+    """The results of a drive.
 
-    ``imu_hz`` is None without an IMU. ``real``: the driver's arguments for the real robot;
-    ``page``: the document of the robot's board.
+    ``pose``, ``true_pose``: the robot's pose at the end, by odometry and as simulated.
+
+    ``points``: the driven path.
+
+    ``imu_hz``, ``odom_hz``: rates of the received messages; ``imu_hz`` is None without an IMU.
+
+    ``real``: arguments of the driver for the real robot.
+
+    ``page``: the document of the board.
     """
 
     seconds: float
@@ -96,7 +113,8 @@ class Drive:
 
 
 def report(drive: Drive) -> None:
-    """Print the results and the error of the pose; on a terminal, also a picture of the path."""
+    """Print the results and the error of the pose; on a terminal, print also a picture of the path.
+    """
     pose, true_pose = drive.pose, drive.true_pose
     error_mm = 1000 * math.dist((pose.x_m, pose.y_m), (true_pose.x_m, true_pose.y_m))
     error_deg = abs(_degrees(pose.yaw_rad - true_pose.yaw_rad))

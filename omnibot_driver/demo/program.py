@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A module of this package as a separate process. Must not know what the process does."""
+"""Runs a module of this package as a separate process. It must not know what the process does."""
 
 import ctypes
 import os
@@ -15,13 +15,14 @@ PATIENCE_S: Final = 15.0
 
 
 class DemoFailed(Exception):
-    """The demo cannot continue; the exception's message says why."""
+    """The demo cannot continue. The message says why."""
 
 
 class Program:
-    """A module of this package as a child process, which never outlives its parent.
+    """A module of this package as a child process, which ends at the latest with its parent.
 
-    Signals from the terminal do not reach the child process; ``end`` ends it.
+    Signals from the terminal do not reach the child process, so ctrl-C does not end it. ``end``
+    does.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:
@@ -47,7 +48,7 @@ class Program:
             self._process.wait()
 
     def failure(self, what: str) -> DemoFailed:
-        """Return an exception whose message is ``what`` and the last output of the child."""
+        """Return an exception. Its message contains ``what`` and the last output of the process."""
         self._log.seek(0)
         lines = self._log.read().splitlines()[-10:] or ["(nothing)"]
         return DemoFailed("\n  ".join([f"{what}. Last output of the {self._name}:", *lines]))
@@ -58,7 +59,10 @@ class Program:
             raise self.failure(f"the {self._name} ended with code {code}")
 
     def ask(self, question: str = "") -> str:
-        """Send a question to the console; return its next line. Raises DemoFailed if none comes."""
+        """Send a question to the console; return the next line from it.
+
+        Raises DemoFailed if no line comes.
+        """
         stdin, stdout = self._process.stdin, self._process.stdout
         if stdin is None or stdout is None:
             raise ValueError(f"the {self._name} has no console")
@@ -75,6 +79,6 @@ class Program:
 
 
 def end_with_parent() -> None:
-    """Have the kernel end this new process when its parent ends."""
+    """Make the kernel end this new process when its parent ends."""
     pr_set_pdeathsig = 1
     ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)

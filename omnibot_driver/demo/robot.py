@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot as a ROS program sees it. Must not know who started it, or how it is displayed."""
+"""The robot, as a ROS program uses it. It must not know who started the robot, or how it is shown.
+"""
 
 import math
 import time
@@ -23,16 +24,23 @@ from omnibot_driver.demo.square import HALT, steer, steer_ahead
 from omnibot_driver.tools.monitor.rates import Rate
 
 REMEMBERED = 1000
-"""Number of path points that are kept; enough for some laps."""
+"""How many points of the path are kept: enough for some laps."""
 ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
-"""Message rates in Hz that every board exceeds once its driver has been running for a while."""
+"""Message rates in Hz that every board exceeds when its driver has run for a while."""
 
 
 class Robot:
-    """The robot as a ROS program uses it: it subscribes to topics and publishes ``cmd_vel``.
+    """The robot, as a ROS program uses it: through its topics.
 
-    After every second odometry message it publishes a velocity, which is zero unless ``driving``.
-    ``imu``: whether the robot has an IMU. ``sideways``: whether it can drive along its y axis.
+    After every second odometry message, the object publishes a velocity on ``cmd_vel``.
+
+    ``driving``: whether this velocity drives the square. Otherwise it is zero.
+
+    ``imu``: in the constructor, whether the robot has an IMU; afterwards, the rate of its messages.
+
+    ``sideways``: whether the robot can drive along its y axis.
+
+    ``leg``: how many sides of the square are complete.
     """
 
     def __init__(self, namespace: str, *, imu: bool = True, sideways: bool = True) -> None:
@@ -61,16 +69,19 @@ class Robot:
         self._executor.add_node(node)
 
     def close(self) -> None:
-        """End the executor and the ROS context; at exit, a remaining executor reports errors."""
+        """End the connection to ROS.
+
+        The executor is ended too, because it would report errors at the program's exit.
+        """
         self._executor.shutdown(timeout_sec=0.0)
         rclpy.try_shutdown()
 
     def spin_once(self) -> None:
-        """Handle the next message, if one comes within 50 ms."""
+        """Handle the next message, or return after 50 ms without one."""
         self._executor.spin_once(timeout_sec=0.05)
 
     def missing(self) -> list[str]:
-        """Return what is missing before the robot can drive: topics, or the nominal state."""
+        """Return what is still missing before the robot can drive: topics, or the state nominal."""
         now_s = time.monotonic()
         topics = [("imu/data_raw", self.imu, ENOUGH_IMU_HZ), ("odom", self.odom, ENOUGH_ODOM_HZ)]
         missing = [
@@ -81,18 +92,15 @@ class Robot:
         return missing if self._state == "nominal" else [*missing, f"nominal state ({self._state})"]
 
     def watched(self) -> bool:
-        """Return whether another program listens to the odometry too."""
+        """Return whether another program also receives the odometry."""
         return self._node.count_subscribers("odom") > 1
 
     def stands(self) -> bool:
-        """Return whether the robot is at rest and not driven.
-
-        The last five odometry messages must have shown this.
-        """
+        """Return whether the robot is at rest, by its last five odometry messages."""
         return self._stood_for >= 5
 
     def row(self) -> str:
-        """Return a row of text with the robot's present state, rates, pose and velocities."""
+        """Return a row of text with the present state, rates, pose and velocities."""
         now_s = time.monotonic()
         imu_hz = None if self.imu is None else round(self.imu.hz(now_s))
         rates_hz = (imu_hz, round(self.odom.hz(now_s)))

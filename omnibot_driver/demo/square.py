@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steer the robot around the square: a pure function of the robot's pose and the present leg."""
+"""Steers the robot around the square, from its pose and its present side of the square.
+
+A side is called a leg. Leg 0 leads along +x of the odometry frame, leg 1 along +y, leg 2 along -x,
+leg 3 along -y, and leg 4 along +x again.
+"""
 
 import math
 from typing import Final
@@ -15,20 +19,19 @@ CREEP_MPS: Final = 0.05
 YAW_RATE_RADPS: Final = 0.5
 QUARTER_RAD: Final = math.pi / 2
 CORNER_M: Final = 0.01
-"""Distance from a corner, in m, at which the corner is reached."""
+"""Distance from a corner, in m, within which the corner is reached."""
 GAIN_PER_S: Final = 3.0
 """Gain from distance to speed, and from angle error to yaw rate, in 1/s."""
 ON_COURSE_RAD: Final = 0.3
-"""Course error, in rad, above which a robot turns on the spot before it drives on."""
+"""Error of the heading, in rad, above which the robot turns on the spot before it drives on."""
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the present leg, and the velocity along it in the robot's own axes.
+    """Return the present leg, and the robot's velocity in its own axes.
 
-    A leg is a side of the square. Leg 0 leads along +x of the odometry frame, leg 1 along +y, leg 2
-    along -x, leg 3 along -y, and leg 4 along +x again. The robot turns while it drives straight
-    along a leg: by 90° to the left on even legs, and back on odd legs.
+    This robot drives along a leg and turns at the same time. It turns by 90° to the left on even
+    legs, and back on odd legs.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD
@@ -44,7 +47,10 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return leg and velocity for a robot that cannot drive sideways, and so turns at corners."""
+    """Return the present leg and the velocity for a robot that cannot drive sideways.
+
+    This robot turns at the corners.
+    """
     leg, along_m, aside_m = _progress(pose, leg)
     course_rad = leg % 4 * QUARTER_RAD - math.atan2(GAIN_PER_S * aside_m, 2 * SPEED_MPS)
     error_rad = math.remainder(course_rad - pose.yaw_rad, math.tau)
@@ -54,7 +60,7 @@ def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
-    """Return the present leg, and the robot's position along it and to the left of it, in m."""
+    """Return the present leg, and the robot's distances along it and to the left of it, in m."""
     turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
     along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
     return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)
